@@ -11,8 +11,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::spectral::{
-    AveragedSpectra, Lines, SpectralAverager, TapRecord, Transformer, average_records,
-    transform_block,
+    AveragedSpectra, DISPLAY_RATIO, Lines, SpectralAverager, TapRecord, Transformer,
+    average_records, transform_block,
 };
 
 const RATE: f64 = 5120.0;
@@ -45,7 +45,13 @@ fn one_by_one(
 }
 
 fn averages(criterion: &mut Criterion) {
-    let lines = Lines::baseband(RATE, BLOCK, BLOCK as f64 / RATE).unwrap();
+    let lines = Lines::zoom(
+        (0.0, RATE / DISPLAY_RATIO),
+        RATE,
+        BLOCK,
+        BLOCK as f64 / RATE,
+    )
+    .unwrap();
     for count in [10, 1000] {
         let (forces, responses) = signals(count);
         let pairs = forces.iter().zip(&responses);

@@ -8,7 +8,7 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{ConsistentEstimator, ConsistentSettings, JointedStructure};
-use tapjoint::identify::pairs::{ModeLambda, estimate_three_parameter, estimate_two_parameter};
+use tapjoint::identify::pairs::{ModeLambda, PairsModel, estimate_pairs};
 use tapjoint::structure::interface::{JointWeights, JointedBody};
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, Slenderness, natural_lambdas,
@@ -119,10 +119,10 @@ fn backward(criterion: &mut Criterion) {
     );
     let mut group = criterion.benchmark_group("joint from five frequencies");
     group.bench_function("tapjoint: pair regression, 2 parameters", |b| {
-        b.iter(|| estimate_two_parameter(black_box(&modes)).unwrap());
+        b.iter(|| estimate_pairs(PairsModel::TwoParameter, black_box(&modes)).unwrap());
     });
     group.bench_function("tapjoint: pair regression, 3 parameters", |b| {
-        b.iter(|| estimate_three_parameter(black_box(&modes)).unwrap());
+        b.iter(|| estimate_pairs(PairsModel::ThreeParameter, black_box(&modes)).unwrap());
     });
     group.bench_function("Gauss-Newton on the frequencies, 2 parameters", |b| {
         b.iter(|| gauss_newton(black_box(&lambdas), (200.0, 20.0)));

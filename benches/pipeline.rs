@@ -16,7 +16,7 @@ use tapjoint::pipeline::{IdentifySettings, MeasureSettings, measure, run_test};
 use tapjoint::recording::{ReadSettings, Recording, WavFormat, write_wav};
 use tapjoint::report::{document_of, render_run};
 use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
-use tapjoint::spectral::{Lines, transform_block};
+use tapjoint::spectral::{DISPLAY_RATIO, Lines, transform_block};
 use tapjoint::taps::TapSource;
 
 const RATE: f64 = 12_800.0;
@@ -141,7 +141,7 @@ fn transforms(criterion: &mut Criterion, path: &Path) {
             .process(&mut buffer);
         buffer
     };
-    let full = Lines::baseband(RATE, block, RECORD).unwrap();
+    let full = Lines::zoom((0.0, RATE / DISPLAY_RATIO), RATE, block, RECORD).unwrap();
     group.bench_function("tapjoint: full band", |b| {
         b.iter(|| transform_block(black_box(&samples), RATE, &full));
     });

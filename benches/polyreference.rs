@@ -1,5 +1,5 @@
-//! Poles of six responses on 1380 lines up to order 40, and of two free decays. The roots of the
-//! denominators, most of the cost, stand beside nalgebra's eigenvalues of the same matrices.
+//! Poles of six responses on 1380 lines up to order 40. The roots of the denominators, most of the cost, stand beside
+//! nalgebra's eigenvalues of the same matrices.
 
 #![allow(clippy::unwrap_used, reason = "in a bench a panic is the message")]
 
@@ -11,10 +11,8 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tapjoint::modal::matrix_pencil::{MatrixPencilSettings, pencil_poles};
 use tapjoint::modal::polyreference::{
-    PolyreferenceSettings, ResponseMatrix, SubBandSettings, find_modes, select_modes,
-    stabilise_poles,
+    PolyreferenceSettings, ResponseMatrix, find_modes, select_modes, stabilise_poles,
 };
 
 const MODES: [(f64, f64); 5] = [
@@ -63,9 +61,8 @@ fn whole_band(criterion: &mut Criterion) {
     group.bench_function("tapjoint: selection", |b| {
         b.iter(|| select_modes(black_box(&matrix), &diagram, &settings));
     });
-    let bands = SubBandSettings::default();
     group.bench_function("tapjoint: all, with sub-bands", |b| {
-        b.iter(|| find_modes(black_box(&matrix), &settings, &bands).unwrap());
+        b.iter(|| find_modes(black_box(&matrix), &settings).unwrap());
     });
     group.bench_function("nalgebra: eigenvalues of companions of 2 to 40", |b| {
         let companions: Vec<DMatrix<Complex64>> = (2..=40).map(companion).collect();
@@ -87,24 +84,5 @@ fn companion(order: usize) -> DMatrix<Complex64> {
     })
 }
 
-fn decays(criterion: &mut Criterion) {
-    let mut random = ChaCha8Rng::seed_from_u64(2);
-    let record = |random: &mut ChaCha8Rng| -> Vec<f64> {
-        (0..8192)
-            .map(|n| {
-                let t = f64::from(n) / 2048.0;
-                let one = |f: f64| (-0.002 * TAU * f * t).exp() * (TAU * f * t).sin();
-                one(124.8) + 0.7 * one(125.2) + 1e-3 * random.random_range(-1.0..1.0)
-            })
-            .collect()
-    };
-    let records = [record(&mut random), record(&mut random)];
-    let columns: Vec<&[f64]> = records.iter().map(Vec::as_slice).collect();
-    let settings = MatrixPencilSettings::default();
-    criterion.bench_function("tapjoint: matrix pencil, two decays of 4 s, 20 Hz", |b| {
-        b.iter(|| pencil_poles(black_box(&columns), 2048.0, (115.0, 135.0), &settings).unwrap());
-    });
-}
-
-criterion_group!(benches, whole_band, decays);
+criterion_group!(benches, whole_band);
 criterion_main!(benches);

@@ -81,8 +81,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             .num_threads(threads)
             .build()?;
         let start = Instant::now();
-        let found = pool.install(|| estimator.monte_carlo(REPETITIONS, 1))?;
-        let kx = found.spreads[0];
+        let found = pool.install(|| {
+            let near = estimator.neighbourhood();
+            estimator.monte_carlo(&near, REPETITIONS, 1)
+        })?;
+        let kx = found.kx.ok_or("no repetition has an estimate")?;
         println!(
             "monte-carlo {threads} {:.3} {} {:?} {:?}",
             start.elapsed().as_secs_f64(),

@@ -15,7 +15,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use tapjoint::spectral::{
-    AveragedSpectra, FrfEstimator, Lines, TapRecord, Transformer, average_records,
+    AveragedSpectra, DISPLAY_RATIO, FrfEstimator, Lines, TapRecord, Transformer, average_records,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -38,7 +38,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             responses: vec![response],
         })
         .collect();
-    let lines = Lines::baseband(rate, block, block as f64 / rate)?;
+    let lines = Lines::zoom(
+        (0.0, rate / DISPLAY_RATIO),
+        rate,
+        block,
+        block as f64 / rate,
+    )?;
     let mut times = Vec::with_capacity(repetitions);
     for _ in 0..repetitions {
         let start = Instant::now();

@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use tapjoint::modal::fit::{
-    FitSettings, FreeDecayCollector, ModeFit, PoleStart, UncertaintySource, bands_for, fit_modes,
+    FitSettings, FreeDecayCollector, ModeFit, PoleStart, UncertaintySource, fit_modes,
 };
 use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
 
@@ -26,6 +26,17 @@ const TAPS: usize = 5;
 const FREQUENCIES: [f64; 5] = [42.7, 118.3, 231.9, 383.4, 572.6];
 const DAMPINGS: [f64; 5] = [0.004, 0.003, 0.0035, 0.005, 0.006];
 const LEVELS: [f64; 3] = [60.0, 40.0, 30.0];
+
+/// Bands (Hz) about these modes (frequency in Hz, damping ratio), twice as wide as a fit from there asks for: a fitted
+/// mode may turn out wider. `resolution` is 1/T (Hz).
+fn bands_for(modes: &[(f64, f64)], resolution: f64) -> Vec<(f64, f64)> {
+    let bands = modes.iter().map(|&(frequency, damping_ratio)| {
+        let half_width = (damping_ratio * frequency / resolution).hypot(0.5);
+        let half = 2.0 * (10.0 * half_width).max(12.0) * resolution;
+        (frequency - half, frequency + half)
+    });
+    bands.collect()
+}
 
 /// Shape of mode k at x of a unit length.
 fn shape(k: usize, x: f64) -> f64 {

@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use num_complex::Complex64;
 use tapjoint::modal::polyreference::{
-    PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings, all_modes,
-    find_modes, select_modes, stabilise_poles,
+    PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes, find_modes, select_modes,
+    stabilise_poles,
 };
 
 type Failure = Box<dyn std::error::Error>;
@@ -45,11 +45,7 @@ fn main() -> Result<(), Failure> {
         let found = start.elapsed();
         whole = select_modes(&matrix, &diagram, &settings);
         let selected = start.elapsed();
-        parts = all_modes(&find_modes(
-            &matrix,
-            &settings,
-            &SubBandSettings::default(),
-        )?);
+        parts = all_modes(&find_modes(&matrix, &settings)?);
         let times = [found, selected - found, start.elapsed() - selected];
         for (least, time) in shortest.iter_mut().zip(times) {
             *least = least.min(1e3 * time.as_secs_f64());
@@ -75,9 +71,6 @@ fn read_numbers(path: &str) -> Result<Vec<f64>, Failure> {
 
 fn print_modes(name: &str, modes: &[PolyreferenceMode]) {
     for mode in modes {
-        println!(
-            "{name} {:.9} {:.9e} {:.3e} {}",
-            mode.frequency, mode.damping_ratio, mode.frequency_spread, mode.count
-        );
+        println!("{name} {:.9} {:.9e}", mode.frequency, mode.damping_ratio);
     }
 }

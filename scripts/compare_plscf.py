@@ -67,7 +67,7 @@ def with_pyema(frequency, response, repeats):
 
 
 def with_tapjoint(program, frequency, response, repeats):
-    """Modes of the whole band and with sub-bands (rows of frequency, damping, spread, count), times (ms)."""
+    """Modes of the whole band and with sub-bands (rows of frequency, damping), times (ms)."""
     inside = frequency >= LOWER
     lines = np.ascontiguousarray(response[:, inside])
     spacing = frequency[1] - frequency[0]

@@ -6,7 +6,7 @@
 NEW, and what it is compared with, is a `cases.csv`, the folder of a blind check's results, its score.json (the
 cases.csv beside it is read as well), or a file as lies in tests/golden. Listed is each case whose verdict, named
 effects or first hypothesis differs, or whose probability differs by more than --tolerance; "near" marks those whose
-old or new probability lies within 0.01 of a threshold of src/gap/verdict.rs: 0.8, from which a name is given, and
+old or new probability lies within 0.01 of a threshold of src/diagnosis/settings.rs: 0.8, from which a name is given, and
 0.9, which the shortest list has to hold. Of two score.json the figures are compared too. The exit code is 1 where
 anything differs.
 

@@ -73,7 +73,6 @@ pub use tapjoint_analysis as pipeline;
 pub use tapjoint_beam as structure;
 pub use tapjoint_beam::effects;
 pub use tapjoint_description as description;
-pub use tapjoint_description::described;
 pub use tapjoint_diagnosis as gap;
 pub use tapjoint_identify as identify;
 pub use tapjoint_numerics::{quantity, stats};

@@ -38,11 +38,6 @@
 //!   and operational modal analysis", thesis, Vrije Universiteit Brussel. Which coefficient to fix.
 //! - **Golub & Van Loan**: "Matrix Computations". The shifted QR algorithm.
 //! - **Parlett 1998**: "The Symmetric Eigenvalue Problem", SIAM. Rayleigh quotient iteration and its third order.
-//! - **Hua & Sarkar 1990**: "Matrix pencil method for estimating parameters of exponentially
-//!   damped/undamped sinusoids in noise", IEEE Transactions on Acoustics, Speech, and Signal
-//!   Processing 38, 814-824.
-//! - **Wax & Kailath 1985**: "Detection of signals by information theoretic criteria", IEEE
-//!   Transactions on Acoustics, Speech, and Signal Processing 33, 387-392.
 //! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
 //!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.
 //! - **Iwan 1966**: "A distributed-element model for hysteresis and its steady-state dynamic response",

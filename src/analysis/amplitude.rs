@@ -1,10 +1,13 @@
-//! Modes whose frequency or damping changes with the amplitude.
+//! Modes whose frequency or damping changes with the amplitude, and the warnings about them.
 
+use super::recording_result::RecordingResult;
+use super::warnings::Warning;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::fmt;
 use tapjoint_numerics::stats::median;
+use tapjoint_signal::modal::ModeReading;
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
 
 /// Smallest relative change of a frequency that is reported: 0.01 %, a fifth of the smallest
@@ -36,10 +39,21 @@ pub struct AmplitudeChange {
     pub damping_bound: [f64; 2],
 }
 
+impl RecordingResult {
+    /// Change of a mode with its amplitude, where it is beyond the uncertainty and large enough to matter.
+    pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
+        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+        let change = AmplitudeChange::of(curve)?;
+        let response = curve.sensor.and_then(|sensor| self.responses.get(sensor));
+        let unit = response.and_then(|response| response.unit.clone());
+        Some(AmplitudeChange { unit, ..change })
+    }
+}
+
 impl AmplitudeChange {
     /// The change of a mode's curve where it is beyond its uncertainty and large enough to matter, its amplitude
     /// without a unit.
-    pub(super) fn of(curve: &AmplitudeCurve) -> Option<AmplitudeChange> {
+    fn of(curve: &AmplitudeCurve) -> Option<AmplitudeChange> {
         if curve.verdict != AmplitudeVerdict::Changes {
             return None;
         }
@@ -72,7 +86,7 @@ impl AmplitudeChange {
 
     /// Changes of the frequency and of the damping ratio relative to them; 0 within their bounds. They are
     /// compared in this order.
-    pub(super) fn size(&self) -> (f64, f64) {
+    fn size(&self) -> (f64, f64) {
         (
             relative_change(self.frequency, self.frequency_bound),
             relative_change(self.damping_ratio, self.damping_bound),
@@ -80,7 +94,7 @@ impl AmplitudeChange {
     }
 
     /// Returns the way in which a mode changes, by the signs of the changes beyond their bounds.
-    pub(super) fn way(&self) -> Way {
+    fn way(&self) -> Way {
         let frequency = direction(self.frequency, self.frequency_bound);
         let damping = direction(self.damping_ratio, self.damping_bound);
         match (frequency, damping) {
@@ -118,14 +132,21 @@ impl fmt::Display for AmplitudeChange {
     /// 33 to 2.3 m/s\u{b2}".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = self.unit.as_deref().unwrap_or("of the file's unit");
+        let values = self.damping_ratio.map(|ratio| 100.0 * ratio);
+        let bounds = self.damping_bound.map(|bound| 100.0 * bound);
+        let (mean, bound) = (0.5 * (values[0] + values[1]), bounds[0].max(bounds[1]));
+        // A damping is never negative, whatever noise makes of it.
+        let damping = if differs(values, bounds) {
+            moves(values.map(|value| value.max(0.0)), bounds)
+        } else if mean > bound {
+            moves(values, bounds)
+        } else {
+            format!("stays below {}", two_digits(mean.max(0.0) + bound))
+        };
         write!(
             f,
-            "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
+            "{} Hz and its damping {damping} % as the amplitude falls from {} to {} {}",
             moves(self.frequency, self.frequency_bound),
-            damping_moves(
-                self.damping_ratio.map(|ratio| 100.0 * ratio),
-                self.damping_bound.map(|bound| 100.0 * bound)
-            ),
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
@@ -145,22 +166,9 @@ fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
     format!("{verb} from {first:.decimals$} to {last:.decimals$}")
 }
 
-/// Words for a damping (%), which is never negative, whatever noise makes of it: "stays below 0.02".
-fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
-    if differs(values, bounds) {
-        return moves(values.map(|value| value.max(0.0)), bounds);
-    }
-    let (mean, bound) = (0.5 * (values[0] + values[1]), bounds[0].max(bounds[1]));
-    if mean > bound {
-        moves(values, bounds)
-    } else {
-        format!("stays below {}", two_digits(mean.max(0.0) + bound))
-    }
-}
-
 /// Way in which a mode changes with the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+enum Way {
     /// Softer, or more damped, the harder it is driven.
     Slips,
     /// Stiffer the harder it is driven.
@@ -205,40 +213,208 @@ fn decimals(value: f64) -> usize {
     (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
 }
 
-/// Writes the warning about modes of a recording that change in one way, and the other recordings in which modes do so.
-pub(super) fn write_dependence(
-    f: &mut fmt::Formatter<'_>,
-    file: &str,
-    changes: &[(usize, AmplitudeChange)],
-    others: &[(String, Vec<usize>)],
-) -> fmt::Result {
+/// Returns one warning for each way in which modes change, with the recording in which they change most.
+pub(super) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
+    let mut all = Vec::new();
+    for recording in recordings {
+        let numbered = recording.readings().iter().zip(&recording.mode_numbers);
+        let changes: Changes = numbered
+            .filter_map(|(reading, &mode)| Some((mode?, recording.amplitude_change(reading)?)))
+            .collect();
+        all.push((recording.file.clone(), changes));
+    }
+    by_way(all)
+}
+
+/// Numbers of modes, and how each changes.
+type Changes = Vec<(usize, AmplitudeChange)>;
+
+/// Groups the changes of all recordings by their way.
+fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
+    let mut groups: Vec<(Way, Vec<(String, Changes)>)> = Vec::new();
+    for (file, changes) in all {
+        for (mode, change) in changes {
+            let way = change.way();
+            let place = groups.iter().position(|group| group.0 == way);
+            let place = place.unwrap_or_else(|| {
+                groups.push((way, Vec::new()));
+                groups.len() - 1
+            });
+            let own = &mut groups[place].1;
+            match own.last_mut().filter(|one| one.0 == file) {
+                Some(one) => one.1.push((mode, change)),
+                None => own.push((file.clone(), vec![(mode, change)])),
+            }
+        }
+    }
+    let warnings = groups.into_iter().map(|(_, group)| dependence(group));
+    warnings.collect()
+}
+
+/// The warning about recordings, at least one, whose modes change in one way: that in which they change most, and the
+/// others.
+fn dependence(mut group: Vec<(String, Changes)>) -> Warning {
+    let (mut worst, mut most) = (0, (0.0, 0.0));
+    for (place, (_, changes)) in group.iter().enumerate() {
+        for (_, change) in changes {
+            if change.size() > most {
+                (worst, most) = (place, change.size());
+            }
+        }
+    }
+    let (file, changes) = group.remove(worst);
     let named: Vec<String> = changes
         .iter()
         .take(MOST_NAMED)
         .map(|(mode, change)| format!("mode {mode} {change}"))
         .collect();
-    write!(f, "{file}: {}", named.join("; "))?;
-    let more = changes.len().saturating_sub(MOST_NAMED);
-    if more > 0 {
-        let modes = if more == 1 {
-            "mode changes"
-        } else {
-            "modes change"
-        };
-        write!(f, "; {more} more {modes} with it")?;
+    let mut text = named.join("; ");
+    match changes.len().saturating_sub(MOST_NAMED) {
+        0 => {}
+        1 => text += "; 1 more mode changes with it",
+        more => text += &format!("; {more} more modes change with it"),
     }
     if let Some((_, first)) = changes.first() {
-        write!(f, "; {}", first.way().cause())?;
+        text += &format!("; {}", first.way().cause());
     }
-    f.write_str(
-        "; a recording at a second tap level would confirm it, and frequencies should be stated with their amplitude, \
-         or taken from softer taps",
-    )?;
-    for (place, (file, modes)) in others.iter().enumerate() {
+    text += "; a recording at a second tap level would confirm it, and frequencies should be stated with their \
+             amplitude, or taken from softer taps";
+    for (place, (file, changes)) in group.iter().enumerate() {
         let begin = if place == 0 { "; the same in" } else { ";" };
-        let numbers: Vec<String> = modes.iter().map(usize::to_string).collect();
-        let plural = if modes.len() == 1 { "" } else { "s" };
-        write!(f, "{begin} {file}: mode{plural} {}", numbers.join(", "))?;
+        let numbers: Vec<String> = changes.iter().map(|(mode, _)| mode.to_string()).collect();
+        let plural = if changes.len() == 1 { "" } else { "s" };
+        text += &format!("{begin} {file}: mode{plural} {}", numbers.join(", "));
     }
-    Ok(())
+    Warning::about(&file, "amplitude-dependent", text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_a_change_in_words() {
+        let change = AmplitudeChange {
+            amplitude: [33.2, 2.31],
+            unit: Some("m/s2".into()),
+            frequency: [80.281, 80.543],
+            frequency_bound: [0.01, 0.02],
+            damping_ratio: [0.00283, 0.00149],
+            damping_bound: [0.0001, 0.0001],
+        };
+        let plain = |change: &AmplitudeChange| change.to_string().replace('\u{a0}', " ");
+        assert_eq!(
+            plain(&change),
+            "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
+             falls from 33 to 2.3 m/s\u{b2}"
+        );
+        let steady = AmplitudeChange {
+            damping_bound: [0.001, 0.001],
+            ..change
+        };
+        assert!(plain(&steady).contains("its damping stays near 0.2 %"));
+        let undamped = AmplitudeChange {
+            damping_ratio: [-0.000_12, -0.000_05],
+            damping_bound: [0.0002, 0.0002],
+            ..steady
+        };
+        assert!(plain(&undamped).contains("its damping stays below 0.020 %"));
+    }
+
+    /// A change of frequency and damping as the amplitude falls.
+    fn change(frequency: [f64; 2], damping_ratio: [f64; 2]) -> AmplitudeChange {
+        AmplitudeChange {
+            amplitude: [10.0, 1.0],
+            unit: None,
+            frequency,
+            frequency_bound: [0.01, 0.01],
+            damping_ratio,
+            damping_bound: [0.0001, 0.0001],
+        }
+    }
+
+    #[test]
+    fn regress_the_cause_follows_the_sign_of_the_change() {
+        let steady = [0.002, 0.002];
+        let cases = [
+            ([80.0, 80.5], steady, "softens and damps more"),
+            ([80.0, 80.0], [0.004, 0.002], "softens and damps more"),
+            ([80.5, 80.0], steady, "stiffens the harder"),
+            ([80.0, 80.0], [0.002, 0.004], "damped less the harder"),
+            ([80.0, 80.5], [0.002, 0.004], "softens but is damped less"),
+        ];
+        for (frequency, damping, cause) in cases {
+            let changes = vec![(1, change(frequency, damping))];
+            let text = by_way(vec![("a.wav".into(), changes)])[0].to_string();
+            assert!(text.contains(cause), "{frequency:?} {damping:?}: {text}");
+        }
+    }
+
+    #[test]
+    fn regress_a_cause_is_said_of_the_modes_that_go_its_way_alone() {
+        let softer = change([80.0, 80.5], [0.002, 0.002]);
+        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
+        let text = |changes: Vec<(usize, AmplitudeChange)>| {
+            by_way(vec![("a.wav".into(), changes)])[0].to_string()
+        };
+        let alike = text(vec![(1, softer.clone()), (2, softer.clone())]);
+        assert!(
+            alike.contains("1 more mode changes with it; a joint"),
+            "{alike}"
+        );
+        let mixed = by_way(vec![(
+            "a.wav".into(),
+            vec![(1, softer.clone()), (2, softer), (3, stiffer)],
+        )]);
+        let texts: Vec<String> = mixed.iter().map(ToString::to_string).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        let told = "1 more mode changes with it; a joint";
+        assert!(texts[0].contains(told), "{texts:?}");
+        let other = texts[1].starts_with("a.wav: mode 3 falls");
+        assert!(
+            other && texts[1].contains("stiffens the harder"),
+            "{texts:?}"
+        );
+    }
+
+    #[test]
+    fn regress_recordings_that_change_alike_are_one_warning() {
+        let softer = change([80.0, 80.5], [0.002, 0.002]);
+        let softest = change([79.0, 80.5], [0.002, 0.002]);
+        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
+        let one = |file: &str, changes: &[(usize, &AmplitudeChange)]| {
+            let own = changes.iter().map(|&(mode, one)| (mode, one.clone()));
+            (file.to_owned(), own.collect())
+        };
+        let found = by_way(vec![
+            one("a.wav", &[(1, &softer), (2, &softer)]),
+            one("b.wav", &[(3, &stiffer)]),
+            one("c.wav", &[(1, &softest)]),
+            one("d.wav", &[(2, &softer), (3, &stiffer)]),
+        ]);
+        let texts: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert!(texts[0].starts_with("c.wav: mode 1 rises"), "{}", texts[0]);
+        let also = "; the same in a.wav: modes 1, 2; d.wav: mode 2";
+        assert!(texts[0].ends_with(also), "{}", texts[0]);
+        assert!(texts[1].starts_with("b.wav: mode 3 falls"), "{}", texts[1]);
+        assert!(
+            texts[1].ends_with("; the same in d.wav: mode 3"),
+            "{}",
+            texts[1]
+        );
+    }
+
+    /// A mode whose frequency stays within its bounds is ranked by its damping, and not by noise.
+    #[test]
+    fn regress_modes_that_rub_are_ranked_by_their_damping() {
+        let little = change([80.0, 80.015], [0.002, 0.003]);
+        let much = change([80.0, 80.001], [0.002, 0.006]);
+        let found = by_way(vec![
+            ("a.wav".to_owned(), vec![(1, little)]),
+            ("b.wav".to_owned(), vec![(1, much)]),
+        ]);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].to_string().starts_with("b.wav"), "{found:?}");
+    }
 }

@@ -1,19 +1,21 @@
-//! Modes fitted to what one recording measured, beside its peak readings.
+//! Modes fitted to the free decays or the response functions of one recording, beside its peak readings.
 //!
 //! Starts come from the peaks and from a polyreference fit over the band, which also sees modes that
 //! make no peak of their own. The fit itself is the maximum-likelihood one of [`fit_modes`]; a mode that
 //! only the polyreference fit proposes must be asked for by the data.
 
 use num_complex::Complex64;
-
+use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
-    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
+    Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
+    PoleStart, TapForce, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
-    BandSearch, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings,
-    all_modes, find_modes,
+    BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,
+    find_modes,
 };
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
+use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
@@ -46,7 +48,7 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
             order: (matrix.points() / 5).clamp(2, default.order),
             ..default
         };
-        find_modes(&matrix, &settings, &SubBandSettings::default())
+        find_modes(&matrix, &settings)
     });
     Stabilisation {
         searches: found.unwrap_or_default(),
@@ -102,15 +104,12 @@ impl Candidates<'_> {
         for (proposal, fit) in added.into_iter().zip(of_added) {
             let Ok(fit) = fit else { continue };
             let line = self.lines.nearest(fit.frequency.value);
-            readings.push(ModeReading {
-                frequency: fit.frequency.value,
-                source: ReadBy::Fit,
-                interval: (fit.frequency.low, fit.frequency.high),
-                std: Some(fit.frequency.std),
-                above_noise_db: Some(proposal.above_noise_db),
-                fit: Some(Box::new(FittedReading::new(fit.clone()))),
-                ..ModeReading::on_line(self.lines.frequency(line), self.lines.half_line())
-            });
+            let mut reading =
+                ModeReading::on_line(self.lines.frequency(line), self.lines.half_line());
+            reading.above_noise_db = Some(proposal.above_noise_db);
+            reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
+            reading.select_estimate(ReadBy::Fit);
+            readings.push(reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
@@ -148,17 +147,13 @@ impl Candidates<'_> {
         let (mut starts, mut peaks) = (Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
             // The mode that belongs to a peak: the nearest within a line and its half-power width.
-            let mut nearest: Option<(usize, f64)> = None;
-            for (place, mode) in free.iter().enumerate() {
-                let Some(mode) = mode else { continue };
+            let near = free.iter().enumerate().filter_map(|(place, mode)| {
+                let mode = (*mode)?;
                 let distance = (mode.frequency - reading.frequency).abs();
                 let width = mode.damping_ratio * mode.frequency;
-                if distance <= 2.0 * self.lines.half_line() + width
-                    && nearest.is_none_or(|(_, least)| distance < least)
-                {
-                    nearest = Some((place, distance));
-                }
-            }
+                (distance <= 2.0 * self.lines.half_line() + width).then_some((place, distance))
+            });
+            let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
             let own = nearest.and_then(|(place, _)| free[place].take());
             match (reading.label, own) {
                 (None, None) => starts.push(PoleStart {
@@ -178,7 +173,6 @@ impl Candidates<'_> {
     /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
     /// search for modes lets pass. At the ends of a band poles stand for what lies beyond it.
     fn may_be_added(&self, fit: &ModeFit) -> bool {
-        let most_damping = PolyreferenceSettings::default().most_damping;
         let lines = self.data.frequencies();
         let Some((first, last)) = lines.first().zip(lines.last()) else {
             return false;
@@ -186,12 +180,12 @@ impl Candidates<'_> {
         let margin = NEAR_ENDS.0 * self.data.spacing();
         let low = first + margin.max(NEAR_ENDS.1 * first);
         let high = last - margin.max(NEAR_ENDS.1 * last);
-        (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < most_damping
+        (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < MOST_DAMPING
     }
 
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
     fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
-        let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
+        let (true, Ok(fit)) = (test.needed, &test.fit) else {
             return false;
         };
         let own = fit.frequency.value * fit.damping_ratio.value;
@@ -246,4 +240,126 @@ fn is_clear(fit: &ModeFit) -> bool {
         .map(|amplitude| amplitude.value.norm() / amplitude.std)
         .fold(0.0, f64::max);
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
+}
+
+/// Decays of all taps, and what of them is fitted.
+pub(super) struct FreeDecays {
+    /// Transforms of every tap and sensor on the lines of the band.
+    data: ModalData,
+    /// Force of each tap; empty without a hammer.
+    forces: Vec<TapForce>,
+    /// Samples of each tap.
+    decays: Vec<Decay>,
+    /// Transforms of the forces, time zero at the decays' first sample; empty without a hammer.
+    force_columns: Vec<Column>,
+}
+
+impl FreeDecays {
+    /// Transforms the decays (`samples` of each) and the forces before them onto the lines of their band.
+    ///
+    /// # Errors
+    /// [`FitError`]: too few lines.
+    pub(super) fn new(
+        samples: usize,
+        lines: &Lines,
+        decays: Vec<Decay>,
+        forces: Vec<TapForce>,
+    ) -> Result<Self, FitError> {
+        let band = (lines.low, lines.high);
+        let rate = decays.first().map_or(0.0, |decay| decay.sample_rate);
+        let mut responses = FreeDecayCollector::new(rate, samples, &[band])?;
+        for decay in &decays {
+            responses.add_tap(&decay.responses)?;
+        }
+        let mut pulses = FreeDecayCollector::new(rate, samples, &[band])?;
+        for force in &forces {
+            // The force before time zero stands at the end of the block: on multiples of rate/block a transform
+            // cannot tell a time from one a block later.
+            let kept = force.samples.len().min(samples);
+            let mut block = vec![0.0; samples - kept];
+            block.extend_from_slice(&force.samples[force.samples.len() - kept..]);
+            pulses.add_tap(&[block])?;
+        }
+        let force_columns = match forces[..] {
+            [] => Vec::new(),
+            _ => pulses.finish()?.columns().to_vec(),
+        };
+        Ok(FreeDecays {
+            data: responses.finish()?,
+            forces,
+            decays,
+            force_columns,
+        })
+    }
+
+    /// Fits the decays, and puts into the readings the fits with what else the decays give: modal constants, and
+    /// frequency and damping against amplitude.
+    pub(super) fn fit(
+        &self,
+        readings: &mut Vec<ModeReading>,
+        lines: &Lines,
+        kinds: &[Option<ResponseForm>],
+    ) -> Stabilisation {
+        let functions = self.functions();
+        let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
+        let first = self.data.frequencies().first().copied().unwrap_or(0.0);
+        let stabilisation = stabilisation(first, self.data.spacing(), &columns);
+        let candidates = Candidates {
+            lines,
+            data: &self.data,
+            stabilisation: &stabilisation,
+        };
+        candidates.fit(readings);
+        let fitted: Vec<&mut FittedReading> = readings
+            .iter_mut()
+            .filter_map(|reading| reading.fit.as_deref_mut())
+            .collect();
+        let known: Vec<KnownMode> = fitted
+            .iter()
+            .map(|fit| KnownMode {
+                frequency: fit.mode.frequency.value,
+                damping_ratio: fit.mode.damping_ratio.value,
+            })
+            .collect();
+        let curves = follow_amplitude(&self.decays, &known);
+        for (fit, curve) in fitted.into_iter().zip(curves) {
+            fit.amplitude = Some(curve);
+            fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
+        }
+        stabilisation
+    }
+
+    /// Columns of the polyreference fit, all on the same lines: with a hammer the response of
+    /// every sensor to the force, H = sum conj(F) X/sum |F|^2 over the taps; without one every tap's
+    /// transforms.
+    fn functions(&self) -> Vec<Vec<Complex64>> {
+        let columns = self.data.columns();
+        if self.force_columns.is_empty() {
+            return columns.iter().map(|column| column.values.clone()).collect();
+        }
+        let sensors = columns.iter().map(|column| column.sensor + 1).max();
+        let lines = self.data.frequencies().len();
+        let mut power = vec![0.0; lines];
+        for force in &self.force_columns {
+            let values = power.iter_mut().zip(&force.values);
+            values.for_each(|(sum, f)| *sum += f.norm_sqr());
+        }
+        let mut sums = vec![vec![Complex64::ZERO; lines]; sensors.unwrap_or(0)];
+        for column in columns {
+            let Some(force) = self.force_columns.get(column.tap) else {
+                continue;
+            };
+            let pairs = force.values.iter().zip(&column.values);
+            let sum = &mut sums[column.sensor];
+            sum.iter_mut()
+                .zip(pairs)
+                .for_each(|(sum, (f, x))| *sum += f.conj() * x);
+        }
+        for sum in &mut sums {
+            for (value, &power) in sum.iter_mut().zip(&power) {
+                *value /= power.max(f64::MIN_POSITIVE);
+            }
+        }
+        sums
+    }
 }

@@ -5,8 +5,8 @@ use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::analysis::{RecordingResult, Response};
-use super::measure::MeasuredSpectra;
+use super::measurement::MeasuredSpectra;
+use super::recording_result::{RecordingResult, Response};
 use tapjoint_description::SensorKind;
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::{FrfEstimator, LineQuality, Lines, Window, random_error};
@@ -149,17 +149,6 @@ pub fn frfs_of(recording: &RecordingResult, settings: &FrfSettings) -> Result<Ve
     Ok(frfs)
 }
 
-/// The unit of a quotient; a unit that is not stated is not invented.
-fn unit_per_force(response: Option<&str>, force: Option<&str>) -> String {
-    match (response, force) {
-        (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
-        (Some(unit), Some(force)) => format!("{unit}/{force}"),
-        (Some(unit), None) => format!("{unit} per unit of the file"),
-        (None, Some(force)) => format!("unit of the file per {force}"),
-        (None, None) => "per unit of the file".to_string(),
-    }
-}
-
 /// The function of one response, without its resonances.
 fn frf(
     recording: &RecordingResult,
@@ -169,7 +158,14 @@ fn frf(
     settings: &FrfSettings,
 ) -> Result<Frf, FrfError> {
     let force_unit = recording.tap_unit.as_deref();
-    let measured_unit = unit_per_force(response.unit.as_deref(), force_unit);
+    // A unit that is not stated is not invented.
+    let measured_unit = match (response.unit.as_deref(), force_unit) {
+        (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
+        (Some(unit), Some(force)) => format!("{unit}/{force}"),
+        (Some(unit), None) => format!("{unit} per unit of the file"),
+        (None, Some(force)) => format!("unit of the file per {force}"),
+        (None, None) => "per unit of the file".to_string(),
+    };
     let measured = form_of(response, force_unit);
     let form = match (measured, settings.form) {
         (None, Some(wanted)) => {
@@ -196,10 +192,8 @@ fn frf(
     });
     let coherence = averages.coherence(index);
     let errors = coherence.as_ref().map(|lines| {
-        let errors = lines.iter();
-        errors
-            .map(|coherence| random_error((*coherence)?, averages.taps))
-            .collect()
+        let errors = lines.iter().map(|one| random_error((*one)?, averages.taps));
+        errors.collect()
     });
     Ok(Frf {
         recording: recording.file.clone(),

@@ -1,16 +1,15 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
-use super::analysis::{
-    Analysis, AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification,
-    ModeResult, MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
-    SensitivitySection,
+use super::Analysis;
+use super::results::{
+    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
+    MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
+    SensitivitySection, common_share,
 };
-use super::between_recordings::common_share;
-use super::doubts;
 use super::structure::{
     StructureDetails, TestedStructure, frequencies_of, jointed, predicted_specimen,
 };
-use super::warning::Warning;
+use super::warnings::{Warning, of_estimate, of_prediction};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
@@ -26,7 +25,7 @@ use tapjoint_identify::{
 /// Settings of the identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifySettings {
-    /// Which estimate is the main one: the consistent one, because it satisfies its own frequency
+    /// Method of the main estimate: the consistent one, because it satisfies its own frequency
     /// equation.
     pub method: EstimateMethod,
     /// Details of the structure beyond beam and joint; none.
@@ -114,7 +113,7 @@ pub fn identify(
         predicted: None,
         perturbations: perturbations(structure, estimator.as_ref(), modes, &used, settings),
     };
-    let mut warnings = doubts::of_estimate(structure, &found, modes);
+    let mut warnings = of_estimate(structure, &found, modes);
     // An estimate that no joint can have has its warning already; it predicts nothing.
     match prediction(structure, &found, &measured, &used, settings) {
         Ok(Some((prediction, predicted))) => {
@@ -129,7 +128,7 @@ pub fn identify(
             }
         }
     }
-    warnings.extend(doubts::of_prediction(&found.prediction, &measured));
+    warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
 }
 
@@ -289,10 +288,9 @@ pub(super) fn perturbations(
     {
         let near = estimator.neighbourhood();
         // Without the uncertainties of all modes there is nothing to draw from.
-        let random = settings.monte_carlo.and_then(|(samples, seed)| {
-            let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
-            Some(found.joint)
-        });
+        let random = settings.monte_carlo;
+        let random =
+            random.and_then(|(samples, seed)| estimator.monte_carlo(&near, samples, seed).ok());
         let estimator = estimator.stiffnesses_near(&near);
         add(
             &mut found,

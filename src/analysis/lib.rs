@@ -1,7 +1,7 @@
 //! The whole chain as one library call.
 //!
 //! ```text
-//! test.toml -> recordings -> taps -> spectra -> readings      (measure, per recording)
+//! test.toml -> recordings -> taps -> spectra -> readings      (measurement, per recording)
 //!           -> one list of numbered modes                      (modes)
 //!           -> joint, prediction, perturbation                 (identification)
 //! ```
@@ -10,49 +10,75 @@
 //! writes.
 
 mod amplitude;
-mod analysis;
-mod between_recordings;
 mod checks;
-mod doubts;
 mod fits;
 mod frf;
+mod function_file;
 mod identification;
-mod measure;
+mod measurement;
 mod modes;
-mod noise;
 mod observations;
 mod observed_mode;
-mod recordings;
+mod recording_result;
+mod results;
 mod structure;
-mod warning;
-
-use std::path::Path;
+mod warnings;
+mod wiring;
 
 pub use amplitude::AmplitudeChange;
-pub use analysis::{
-    Analysis, AverageSection, BetweenRecordings, CloseUp, Conditions, Estimate, EstimateMethod,
-    Identification, ModeResult, MonteCarloSection, Overview, PerturbationSection, Perturbations,
-    PipelineError, RecordingResult, ResolutionSpanSection, Response, SensitivitySection,
-};
-pub use checks::together;
+use amplitude::of_amplitude;
+use checks::judge;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
+pub use function_file::FunctionSettings;
+use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
-pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+pub use measurement::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+use modes::{modes_of_bare, modes_of_test, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
-use modes::{modes_of_test, set_aside};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
-use recordings::measure_test;
-pub use recordings::{
-    FunctionSettings, Wiring, inspect_bare, measure_bare, run_functions, run_wired, si_unit,
+pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
+pub use results::{
+    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
+    MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
+    SensitivitySection,
 };
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
 };
-pub use warning::Warning;
+use warnings::neglected_effects;
+pub use warnings::{Warning, together};
+pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
+use wiring::{finish, measure_test};
 
+use std::path::Path;
+use std::slice::from_ref;
 use tapjoint_description::{ChannelRef, TestDescription};
-use tapjoint_signal::recording::Recording;
+use tapjoint_signal::quality::Verdict;
+use tapjoint_signal::recording::{FrequencyResponses, Recording};
+
+/// A finished analysis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// Name of the test.
+    pub name: String,
+    /// The structure; `None` for a bare recording.
+    pub structure: Option<TestedStructure>,
+    /// The recordings, in the order of the description.
+    pub recordings: Vec<RecordingResult>,
+    /// Difference of each recording from the first, "8.8 times its tap level", for which modes and estimate leave
+    /// it out; `None` where they do not.
+    pub aside: Vec<Option<String>>,
+    /// Resonances of the reference configuration, ascending: the first recording and all others
+    /// with its sensor positions and tap level.
+    pub modes: Vec<ModeResult>,
+    /// The joint or the material by the modes; `None` for a bare recording.
+    pub identification: Option<Identification>,
+    /// Quality of the test: good practice, check by check.
+    pub verdicts: Vec<Verdict>,
+    /// Everything that a reader of the results has to know.
+    pub warnings: Vec<Warning>,
+}
 
 /// Runs a described test: its recordings, or the frequencies it gives.
 ///
@@ -71,7 +97,10 @@ pub fn run_test(
     let structure = tested_structure(test);
     let details = structure_details(test, &structure.beam);
     let mut recordings = measure_test(test, place.0, place.1)?;
-    let mut warnings = doubts::of_description(test);
+    let doubts = test.warnings.iter();
+    let mut warnings: Vec<Warning> = doubts
+        .map(|doubt| Warning::new("description", doubt.to_string()))
+        .collect();
     for recording in &recordings {
         warnings.extend_from_slice(&recording.measurement.warnings);
     }
@@ -84,7 +113,7 @@ pub fn run_test(
         warnings.extend(doubts);
         modes
     };
-    warnings.extend(checks::of_amplitude(&recordings));
+    warnings.extend(of_amplitude(&recordings));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
         details,
@@ -92,9 +121,9 @@ pub fn run_test(
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
     let method = identification.method(&structure, settings.method);
-    warnings.extend(doubts::neglected_effects(test, &structure, method));
+    warnings.extend(neglected_effects(test, &structure, method));
     warnings.extend(doubts);
-    let (verdicts, doubts) = checks::judge(&recordings);
+    let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
@@ -118,5 +147,56 @@ pub fn run_recording(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    measure_bare(recording, hammer, adjust).map(recordings::analysis_of)
+    measure_bare(recording, hammer, adjust).map(analysis_of)
+}
+
+/// Takes a bare recording with known channels as far as it goes: taps, spectra, readings. `adjust` may
+/// change the defaults of the measurement.
+///
+/// # Errors
+/// An unreadable recording, a band or block that does not fit.
+pub fn run_wired(
+    recording: Recording,
+    wiring: &Wiring,
+    adjust: impl FnOnce(&mut MeasureSettings),
+) -> Result<Analysis, PipelineError> {
+    let mut settings = MeasureSettings::new(wiring.source());
+    adjust(&mut settings);
+    let mut result = finish(recording, settings, wiring)?;
+    for (channel, unit) in wiring.units() {
+        if let Some(info) = result.channels.get_mut(channel) {
+            info.unit.clone_from(unit);
+        }
+    }
+    Ok(analysis_of(result))
+}
+
+/// Takes frequency response functions about which nothing is described as far as they go.
+///
+/// # Errors
+/// A band without enough lines.
+pub fn run_functions(
+    functions: &FrequencyResponses,
+    settings: &FunctionSettings,
+) -> Result<Analysis, PipelineError> {
+    Ok(analysis_of(measure_functions(functions, settings)?))
+}
+
+/// The analysis of a recording about which nothing is described.
+fn analysis_of(mut recording: RecordingResult) -> Analysis {
+    let modes = modes_of_bare(&mut recording);
+    let (verdicts, doubts) = judge(from_ref(&recording));
+    let mut warnings = recording.measurement.warnings.clone();
+    warnings.extend(of_amplitude(from_ref(&recording)));
+    warnings.extend(doubts);
+    Analysis {
+        name: recording.file.clone(),
+        structure: None,
+        aside: vec![None],
+        verdicts,
+        warnings: together(warnings),
+        modes,
+        identification: None,
+        recordings: vec![recording],
+    }
 }

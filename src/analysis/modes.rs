@@ -1,22 +1,21 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
-use super::analysis::{ModeResult, RecordingResult};
-use super::between_recordings::between;
 use super::identification::measured_modes;
 use super::observed_mode::shape_of;
+use super::recording_result::RecordingResult;
+use super::results::{ModeResult, between};
 use super::structure::{
     NO_SPRING, StructureDetails, TestedStructure, estimator, fitted, frequencies_of, jointed,
     masses_in,
 };
-use super::warning::Warning;
+use super::warnings::Warning;
 use std::f64::consts::TAU;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
 use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::pairing::{
-    MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
-    ShapeAt, is_plain,
+    MeasuredPeak, MissingCause, MissingMode, Pairing, PairingSettings, PeakStrength, ShapeAt,
 };
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};
@@ -224,7 +223,11 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
     number_in_order(modes);
     match free.is_empty() {
         true => Vec::new(),
-        false => vec![Warning::numbered_in_order()],
+        false => vec![Warning::new(
+            "numbered-in-order",
+            "no peak lies near a natural frequency of the described free beam, so the peaks were \
+             numbered in ascending order; check the beam's dimensions and modulus",
+        )],
     }
 }
 
@@ -260,24 +263,28 @@ fn number_in_order(modes: &mut [ModeResult]) {
 fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
-        let mut nearest: Option<(usize, f64)> = None;
-        for (index, reading) in readings.iter().enumerate() {
-            let distance = (mode.frequency - reading.frequency).abs();
-            let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-            if reading.label.is_none()
-                && numbers[index].is_none()
-                && distance <= half_lines + OTHER_CONFIGURATION * mode.frequency
-                && nearest.is_none_or(|(_, least)| distance < least)
+        let near = readings.iter().enumerate().filter(|(index, reading)| {
+            reading.label.is_none()
+                && numbers[*index].is_none()
+                && is_within(reading, mode, OTHER_CONFIGURATION)
                 && !is_of_another(reading, mode, modes, readings)
-            {
-                nearest = Some((index, distance));
-            }
-        }
+        });
+        let nearest = near.min_by(|a, b| distance(a.1, mode).total_cmp(&distance(b.1, mode)));
         if let Some((nearest, _)) = nearest {
             numbers[nearest] = mode.mode;
         }
     }
     numbers
+}
+
+fn distance(reading: &ModeReading, mode: &ModeResult) -> f64 {
+    (reading.frequency - mode.frequency).abs()
+}
+
+/// Returns true if a reading lies within the half lines of both and this share of the mode's frequency (1).
+fn is_within(reading: &ModeReading, mode: &ModeResult, share: f64) -> bool {
+    let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+    distance(reading, mode) <= half_lines + share * mode.frequency
 }
 
 /// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
@@ -291,14 +298,11 @@ fn is_of_another(
     modes: &[ModeResult],
     readings: &[ModeReading],
 ) -> bool {
-    let own = (reading.frequency - mode.frequency).abs();
     modes.iter().filter(|peak| peak.is_unpaired()).any(|peak| {
         let apart = (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
-        let distance = (reading.frequency - peak.frequency).abs();
+        let own = distance(reading, peak);
         let mut others = readings.iter().filter(|other| other.label.is_none());
-        apart
-            && distance < own
-            && !others.any(|other| (other.frequency - peak.frequency).abs() < distance)
+        apart && own < distance(reading, mode) && !others.any(|other| distance(other, peak) < own)
     })
 }
 
@@ -348,8 +352,8 @@ fn number_jointed(
         number_in_order(modes);
         return Vec::new();
     };
-    let text = "with them no joint explains the peaks as well; torsion, another direction of \
-                bending, the fixture or the suspension are the usual causes";
+    let text = "as modes they would make every joint fit worse; torsion, another direction of bending, the \
+                fixture or the suspension are the usual causes";
     let mut warnings = apply_numbers(modes, &free, &pairing.chosen.numbers, text);
     warnings.extend(missing(&pairing.chosen.missing));
     warnings.extend(ambiguous(&pairing, &peaks));
@@ -365,15 +369,18 @@ fn measured_peak(
     let mode = &modes[index];
     let (mut shape, mut strengths) = (Vec::new(), Vec::new());
     for (group, recording) in (1..).zip(recordings) {
-        let Some(reading) = reading_of(mode, recording) else {
+        // The recording's own reading of the peak.
+        let readings = recording.readings().iter();
+        let near = readings.filter(|one| one.label.is_none() && is_within(one, mode, SAME_PEAK));
+        let nearest = near.min_by(|a, b| distance(a, mode).total_cmp(&distance(b, mode)));
+        let Some(reading) = nearest else {
             strengths.push(None);
             continue;
         };
         shape.extend(shape_in(recording, reading, group));
         // Where the reading is nearer to another peak, it is the other peak's.
-        let own = (mode.frequency - reading.frequency).abs();
-        let mut others = modes.iter();
-        let of_another = others.any(|other| (other.frequency - reading.frequency).abs() < own);
+        let own = distance(reading, mode);
+        let of_another = modes.iter().any(|other| distance(reading, other) < own);
         strengths.push((!of_another).then(|| PeakStrength {
             energy: energy(reading),
             level_db: reading.prominence_db.and(reading.above_noise_db),
@@ -422,22 +429,6 @@ fn shape_in(recording: &RecordingResult, reading: &ModeReading, group: usize) ->
     values
 }
 
-/// Returns the recording's own reading of a peak.
-fn reading_of<'a>(mode: &ModeResult, recording: &'a RecordingResult) -> Option<&'a ModeReading> {
-    let mut nearest: Option<(&ModeReading, f64)> = None;
-    for reading in recording.readings() {
-        let distance = (reading.frequency - mode.frequency).abs();
-        let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-        if reading.label.is_none()
-            && distance <= half_lines + SAME_PEAK * mode.frequency
-            && nearest.is_none_or(|(_, least)| distance < least)
-        {
-            nearest = Some((reading, distance));
-        }
-    }
-    nearest.map(|(reading, _)| reading)
-}
-
 /// The warning about modes that no peak was taken for.
 fn missing(modes: &[MissingMode]) -> Option<Warning> {
     let mut list = Vec::with_capacity(modes.len());
@@ -454,22 +445,17 @@ fn missing(modes: &[MissingMode]) -> Option<Warning> {
         ));
     }
     let text = format!(
-        "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
-         and measure elsewhere, or from a lower frequency on, to see it",
+        "no peak was taken for {}; higher peaks keep the mode numbers of the model; tap and measure elsewhere, or from a \
+         lower frequency on, to see it",
         list.join(", ")
     );
     (!list.is_empty()).then(|| Warning::new("missing-mode", text))
 }
 
-/// The warning about another numbering that explains the peaks comparably.
+/// The warning about the most probable other numbering, with the peaks that it numbers otherwise.
 fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     let other = pairing.others.first()?;
     let chosen = &pairing.chosen;
-    let kept = if is_plain(&chosen.numbers) {
-        "kept in ascending order"
-    } else {
-        "taken as the most probable"
-    };
     let times = chosen.odds / other.odds;
     let odds = if (0.95..1.05).contains(&times) {
         "as probable".to_owned()
@@ -478,24 +464,34 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     } else {
         format!("{:.1} times less probable", 1.0 / times)
     };
+    let mut changes = Vec::new();
+    for ((peak, now), then) in peaks.iter().zip(&chosen.numbers).zip(&other.numbers) {
+        if now != then {
+            let [now, then] = [now, then].map(|number| match number {
+                Some(number) => format!("mode {number}"),
+                None => "no mode".to_owned(),
+            });
+            changes.push(format!(
+                "{:.2} Hz as {then} instead of {now}",
+                peak.frequency
+            ));
+        }
+    }
+    let more = changes.len().saturating_sub(MOST_CHANGES);
+    changes.truncate(MOST_CHANGES);
+    if more > 0 {
+        changes.push(format!("{more} more"));
+    }
     let text = format!(
-        "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
-         ({odds}); another sensor or tap position, or more modes, would decide",
-        words(chosen, peaks),
-        words(other, peaks),
+        "the mode numbers are not certain: another numbering is {odds}, with {}; another sensor or tap position, or more \
+         modes, would decide",
+        changes.join(", ")
     );
     Some(Warning::new("ambiguous-pairing", text))
 }
 
-/// "(1: 17.00 Hz, 3: 335.60 Hz, none: 50.00 Hz)".
-fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
-    let mut list = Vec::with_capacity(peaks.len());
-    for (number, peak) in numbering.numbers.iter().zip(peaks) {
-        let number = number.map_or("none".to_string(), |number| number.to_string());
-        list.push(format!("{number}: {:.2} Hz", peak.frequency));
-    }
-    format!("({})", list.join(", "))
-}
+/// Peaks that a warning about the numbering lists.
+const MOST_CHANGES: usize = 4;
 
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
 /// which these masses take the reference configuration's modes. Where that is not known they lose the numbers

@@ -6,13 +6,14 @@
 //!                                         -> covariance of the frequencies
 //! ```
 
-use super::analysis::{Analysis, RecordingResult};
+use super::Analysis;
 use super::observed_mode::{ModeSeen, SeenTaps, independent, judge_scatter, of_taps, shape_of};
+use super::recording_result::RecordingResult;
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::Joint;
-use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
+use tapjoint_description::{coupling, described_beam, described_specimen};
 use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
 use tapjoint_identify::observation::{
     Configuration, ExtraPeak, Observations, ObservedMode, ObservedSensor, UNPAIRED,
@@ -217,8 +218,8 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
     let estimate = found.and_then(|found| found.consistent.as_ref());
     // The estimate's stiffnesses are in units of the beam that was estimated with them.
     let joint_before = estimate.map(|estimate| {
-        let units = StiffnessUnits::of(&estimate.beam);
-        [estimate.joint.kx * units.kt, estimate.joint.ky * units.kr]
+        let joint = estimate.joint.in_si(&estimate.beam);
+        [joint.kt, joint.kr]
     });
     Nominal {
         joint_before: joint_before.filter(|joint| joint.iter().all(|k| *k > 0.0 && k.is_finite())),
@@ -258,14 +259,8 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> Option<Joint>
     }
     let units = StiffnessUnits::of(&described_beam(test));
     let [kx, ky] = USUAL_JOINT;
-    let kx = found
-        .map(|joint| joint.kx)
-        .filter(|kx| *kx > 0.0)
-        .unwrap_or(kx);
-    let ky = found
-        .map(|joint| joint.ky)
-        .filter(|ky| *ky > 0.0)
-        .unwrap_or(ky);
+    let kx = found.map_or(kx, |joint| if joint.kx > 0.0 { joint.kx } else { kx });
+    let ky = found.map_or(ky, |joint| if joint.ky > 0.0 { joint.ky } else { ky });
     let model = test.joint.model;
     let kt = test.joint.kt.unwrap_or(units.kt * kx.min(STIFFEST_START));
     let kr = test.joint.kr.unwrap_or(units.kr * ky.min(STIFFEST_START));

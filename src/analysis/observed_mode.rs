@@ -1,17 +1,15 @@
 //! One mode as the taps of one level saw it: frequency, damping, covariance, shape, amplitude.
 
-use super::RecordingResult;
 use super::frf::{form_of, form_of_kind};
-use super::measure::MeasuredSpectra;
+use super::recording_result::RecordingResult;
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use tapjoint_description::SensorKind;
 use tapjoint_identify::observation::{
     AlongDecay, DecayEnd, DecayVerdict, Observed, ObservedMode, ShapeValue,
 };
-use tapjoint_numerics::stats::{median, root_mean_square};
+use tapjoint_numerics::stats::{chi_square_tail, median, root_mean_square};
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict};
 use tapjoint_signal::modal::fit::{
     FittedValue, UncertaintySource, scatter_about_mean, weighted_mean,
@@ -63,11 +61,7 @@ impl<'a> ModeSeen<'a> {
         // Without a fit the reading is what there is.
         let read = Repeats {
             taps: Vec::new(),
-            by_noise: Observed {
-                value: reading.frequency,
-                std: reading.std.unwrap_or(f64::NAN),
-                freedom: None,
-            },
+            by_noise: normal(reading.frequency, reading.std.unwrap_or(f64::NAN)),
             scattered: false,
         };
         ModeSeen {
@@ -90,7 +84,7 @@ impl<'a> ModeSeen<'a> {
         self.frequency.observed()
     }
 
-    /// The plain data; `hardest`: whether what belongs to all taps of the recording stands here.
+    /// The plain data. With the `hardest` taps stands what belongs to all taps of the recording.
     pub fn observed(&self, hardest: bool) -> ObservedMode {
         let frequency = self.frequency();
         let shape = self.shape();
@@ -120,14 +114,13 @@ impl<'a> ModeSeen<'a> {
     }
 
     fn damping(&self) -> Option<Observed> {
-        if let Some(damping) = &self.damping {
-            return Some(damping.observed());
+        match &self.damping {
+            Some(damping) => Some(damping.observed()),
+            None => Some(normal(
+                self.reading.damping_ratio?,
+                self.reading.damping_std?,
+            )),
         }
-        Some(Observed {
-            value: self.reading.damping_ratio?,
-            std: self.reading.damping_std?,
-            freedom: None,
-        })
     }
 
     /// Number of time derivatives of the displacement that a sensor senses; `None` where it is not known.
@@ -178,22 +171,16 @@ impl<'a> ModeSeen<'a> {
         };
         let mut shape = Vec::with_capacity(all.len());
         for (sensor, amplitudes) in all.iter().enumerate() {
-            if sensor == reference {
-                shape.push(ShapeValue {
-                    sensor,
-                    value: 1.0,
-                    std: 0.0,
-                });
-                continue;
-            }
-            let repeats = Repeats::new(ratios(amplitudes, &all[reference]), None, 1.0);
-            if let Some(observed) = repeats.map(|repeats| repeats.observed()) {
-                shape.push(ShapeValue {
-                    sensor,
-                    value: observed.value,
-                    std: observed.std,
-                });
-            }
+            let ratio = match sensor == reference {
+                true => Some(normal(1.0, 0.0)),
+                false => Repeats::new(ratios(amplitudes, &all[reference]), None, 1.0)
+                    .map(|repeats| repeats.observed()),
+            };
+            shape.extend(ratio.map(|ratio| ShapeValue {
+                sensor,
+                value: ratio.value,
+                std: ratio.std,
+            }));
         }
         shape
     }
@@ -204,14 +191,24 @@ impl<'a> ModeSeen<'a> {
         let found = constants
             .iter()
             .find(|constant| constant.sensor == sensor)?;
-        let spectra = self.recording.measurement.spectra.as_ref();
-        let of_force = spectra.map(|spectra| noise_of_force(spectra, self.reading));
-        let of_force = of_force.unwrap_or(Some(ForceNoise::NONE))?;
-        Some(Observed {
-            value: found.value,
-            std: of_force.added_to(found.std, found.value),
-            freedom: None,
-        })
+        // Noise of the hammer at the mode's line; none without a hammer or a quiet stretch.
+        let mut of_force = ForceNoise::NONE;
+        if let Some(spectra) = &self.recording.measurement.spectra {
+            let averages = &spectra.averages;
+            let line = averages.lines.nearest(self.reading.frequency);
+            let noise = spectra
+                .force_noise
+                .as_ref()
+                .and_then(|noise| noise.get(line));
+            let force = averages.force.as_ref().and_then(|force| force.get(line));
+            if let Some((&noise, &force)) = noise.zip(force) {
+                of_force = ForceNoise::of(noise, force, averages.taps)?;
+            }
+        }
+        Some(normal(
+            found.value,
+            of_force.added_to(found.std, found.value),
+        ))
     }
 
     /// Median displacement amplitude at the decays' begin (m).
@@ -280,16 +277,8 @@ impl<'a> ModeSeen<'a> {
         });
         Some(DecayEnd {
             amplitude: displacement,
-            frequency: Observed {
-                value: reading.frequency,
-                std: reading.frequency_bound / BOUND,
-                freedom: None,
-            },
-            damping: Observed {
-                value: reading.damping_ratio,
-                std: reading.damping_bound / BOUND,
-                freedom: None,
-            },
+            frequency: normal(reading.frequency, reading.frequency_bound / BOUND),
+            damping: normal(reading.damping_ratio, reading.damping_bound / BOUND),
         })
     }
 }
@@ -328,6 +317,15 @@ const LEAST_TAPS: usize = 3;
 /// With more degrees of freedom than this Student's t is as good as normal: 2 % wider at 100.
 const KNOWN: f64 = 100.0;
 
+/// A value with the standard uncertainty of a normal distribution.
+fn normal(value: f64, std: f64) -> Observed {
+    Observed {
+        value,
+        std,
+        freedom: None,
+    }
+}
+
 /// One quantity by repeated taps.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
@@ -353,14 +351,22 @@ impl Repeats {
                 std: joint.std,
                 freedom: Some(joint.freedom).filter(|freedom| *freedom < KNOWN),
             },
-            _ => mean_by_noise(&taps, inflation)?,
+            // Weighted mean with the weights 1/std^2.
+            _ => {
+                let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
+                let sum: f64 = taps.iter().map(|tap| tap.1 * tap.2.powi(-2)).sum();
+                let mean = sum / total;
+                (total > 0.0 && mean.is_finite()).then(|| normal(mean, inflation / total.sqrt()))?
+            }
         };
         let mut repeats = Repeats {
             taps,
             by_noise,
             scattered: false,
         };
-        repeats.scattered = repeats.probability().is_some_and(|p| p < SCATTER_LEVEL);
+        repeats.scattered = repeats.chi_squared().is_some_and(|(chi_squared, freedom)| {
+            chi_square_tail(chi_squared, freedom) < SCATTER_LEVEL
+        });
         Some(repeats)
     }
 
@@ -374,12 +380,6 @@ impl Repeats {
         (taps.len() >= LEAST_TAPS)
             .then(|| (scatter_about_mean(&taps), taps.len() as f64 - 1.0))
             .filter(|(chi_squared, _)| chi_squared.is_finite())
-    }
-
-    /// Probability that noise alone scatters as much; `None` with too few taps.
-    fn probability(&self) -> Option<f64> {
-        let (chi_squared, freedom) = self.chi_squared()?;
-        Some(ChiSquared::new(freedom).ok()?.sf(chi_squared))
     }
 
     /// The value, from the noise or from the scatter.
@@ -407,25 +407,13 @@ impl Repeats {
     }
 }
 
-/// Weighted mean with the weights 1/std^2, and its standard uncertainty.
-fn mean_by_noise(taps: &[(usize, f64, f64)], inflation: f64) -> Option<Observed> {
-    let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
-    let mean = taps.iter().map(|tap| tap.1 * tap.2.powi(-2)).sum::<f64>() / total;
-    (total > 0.0 && mean.is_finite()).then(|| Observed {
-        value: mean,
-        std: inflation / total.sqrt(),
-        freedom: None,
-    })
-}
-
 /// Judges the frequencies' scatter over all modes together: what makes the structure differ between
 /// taps moves several modes a little, and is seen in their sum where it is not in each. Then every mode
 /// that scatters beyond its noise at all counts as scattered.
 pub(super) fn judge_scatter(modes: &mut [ModeSeen<'_>]) {
     let sums = modes.iter().filter_map(|mode| mode.frequency.chi_squared());
     let (chi_squared, freedom) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
-    let probability = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(chi_squared));
-    if probability >= SCATTER_LEVEL {
+    if chi_square_tail(chi_squared, freedom) >= SCATTER_LEVEL {
         return;
     }
     for mode in modes {
@@ -487,10 +475,17 @@ fn shrunk_correlation(modes: &[ModeSeen<'_>], which: &[usize]) -> Option<Vec<Vec
     if which.len() < 2 || common.len() < LEAST_TAPS {
         return None;
     }
-    let columns: Vec<Vec<f64>> = values
-        .iter()
-        .map(|mode| unit_deviations(common.iter().map(|tap| mode[tap]).collect()))
-        .collect();
+    // Deviations from the mean, scaled to a unit sum of squares.
+    let mut columns: Vec<Vec<f64>> = Vec::with_capacity(values.len());
+    for mode in &values {
+        let mut column: Vec<f64> = common.iter().map(|tap| mode[tap]).collect();
+        let mean = column.iter().sum::<f64>() / column.len() as f64;
+        column.iter_mut().for_each(|value| *value -= mean);
+        let size = column.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let size = size.max(f64::MIN_POSITIVE);
+        column.iter_mut().for_each(|value| *value /= size);
+        columns.push(column);
+    }
     let mut sample = vec![vec![0.0; which.len()]; which.len()];
     let (mut squares, mut variances) = (0.0, 0.0);
     for (i, a) in columns.iter().enumerate() {
@@ -508,16 +503,6 @@ fn shrunk_correlation(modes: &[ModeSeen<'_>], which: &[usize]) -> Option<Vec<Vec
         *r *= 1.0 - shrinkage;
     }
     Some(sample)
-}
-
-/// Deviations from the mean, scaled to a unit sum of squares.
-fn unit_deviations(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
-    let size = values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let size = size.max(f64::MIN_POSITIVE);
-    values.iter_mut().for_each(|value| *value /= size);
-    values
 }
 
 /// Error of a ratio to the force by the hammer's noise (1, relative).
@@ -552,21 +537,6 @@ impl ForceNoise {
     fn added_to(self, std: f64, value: f64) -> f64 {
         std.max(self.random * value.abs())
             .hypot(self.common * value)
-    }
-}
-
-/// Noise of the hammer at a mode's line; none without a hammer or a quiet stretch.
-fn noise_of_force(spectra: &MeasuredSpectra, reading: &ModeReading) -> Option<ForceNoise> {
-    let averages = &spectra.averages;
-    let line = averages.lines.nearest(reading.frequency);
-    let noise = spectra
-        .force_noise
-        .as_ref()
-        .and_then(|noise| noise.get(line));
-    let force = averages.force.as_ref().and_then(|force| force.get(line));
-    match (noise, force) {
-        (Some(&noise), Some(&force)) => ForceNoise::of(noise, force, averages.taps),
-        _ => Some(ForceNoise::NONE),
     }
 }
 

@@ -3,10 +3,10 @@
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
-use tapjoint_description::described::{described_beam, lap_layout};
 use tapjoint_description::{
     FitParameter, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
 };
+use tapjoint_description::{described_beam, lap_layout};
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, JointedStructure,
     LapLayout, Parameter, ResidualWeights,

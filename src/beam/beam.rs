@@ -1,6 +1,6 @@
 //! The beam: geometry, material, and the two stiffnesses and two inertias that follow from them.
 
-use super::StructureError;
+use super::{StructureError, require};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -44,7 +44,7 @@ impl Beam {
     /// Checks that every property can belong to a beam.
     ///
     /// # Errors
-    /// [`StructureError::NotPositive`] or [`StructureError::PoissonRatio`], naming the property.
+    /// [`StructureError::Unphysical`], naming the property.
     pub fn check(&self) -> Result<(), StructureError> {
         let positive = [
             ("length", self.length),
@@ -54,17 +54,12 @@ impl Beam {
             ("density", self.density),
         ];
         for (quantity, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(StructureError::NotPositive { quantity, value });
-            }
+            let is_possible = value > 0.0 && value.is_finite();
+            let rule = ", but must be positive and finite";
+            require(is_possible, quantity, value, rule)?;
         }
-        if self.poisson > -1.0 && self.poisson <= 0.5 {
-            Ok(())
-        } else {
-            Err(StructureError::PoissonRatio {
-                value: self.poisson,
-            })
-        }
+        let (ratio, rule) = (self.poisson, ", but must lie above -1 and at most at 0.5");
+        require(ratio > -1.0 && ratio <= 0.5, "poisson's ratio", ratio, rule)
     }
 
     /// Cross-sectional area A = width thickness (m2).

@@ -232,8 +232,23 @@ impl JointedBody {
     pub fn functions(&self, lambda: f64) -> InterfaceFunctions {
         match self {
             Self::Rooted(slenderness) => rooted(slenderness, lambda),
-            Self::Joined([left, right]) => {
-                joined(&left.functions(lambda), &right.functions(lambda))
+            Self::Joined(halves) => {
+                let [left, right] = halves.each_ref().map(|half| half.functions(lambda));
+                // The receptance of the relative motion is the sum of both.
+                let first = combined(&left.slopes, &right.values);
+                let second = combined(&left.values, &right.slopes);
+                InterfaceFunctions {
+                    lambda: left.lambda,
+                    values: combined(&left.values, &right.values),
+                    slopes: Coefficients {
+                        p: first.p + second.p,
+                        x: first.x + second.x,
+                        y: first.y + second.y,
+                        z: first.z + second.z,
+                        q: first.q + second.q,
+                    },
+                    free_count: left.free_count + right.free_count,
+                }
             }
             Self::Elements(modes) => modes.functions(lambda),
         }
@@ -449,24 +464,6 @@ fn rooted(slenderness: &Slenderness, lambda: f64) -> InterfaceFunctions {
     }
 }
 
-/// Receptance of the relative motion: the sum of both.
-fn joined(left: &InterfaceFunctions, right: &InterfaceFunctions) -> InterfaceFunctions {
-    let first = combined(&left.slopes, &right.values);
-    let second = combined(&left.values, &right.slopes);
-    InterfaceFunctions {
-        lambda: left.lambda,
-        values: combined(&left.values, &right.values),
-        slopes: Coefficients {
-            p: first.p + second.p,
-            x: first.x + second.x,
-            y: first.y + second.y,
-            z: first.z + second.z,
-            q: first.q + second.q,
-        },
-        free_count: left.free_count + right.free_count,
-    }
-}
-
 /// Functions of the sum of two receptances. The left beam is seen in the mirror, which turns the sign
 /// of its eta12: Q = P1 Q2 + P2 Q1 + X1 Y2 + X2 Y1 + 2 Z1 Z2.
 fn combined(l: &Coefficients, r: &Coefficients) -> Coefficients {
@@ -509,13 +506,11 @@ struct Attachment {
 
 impl Attachment {
     fn new(size: f64, place: &Place, modes: &[Motion]) -> Self {
-        Self {
-            size,
-            motion: modes
-                .iter()
-                .map(|mode| place.displacement(&mode.ends(place.node)))
-                .collect(),
-        }
+        let motion = modes
+            .iter()
+            .map(|mode| place.displacement(&mode.ends(place.node)));
+        let motion = motion.collect();
+        Self { size, motion }
     }
 }
 
@@ -532,25 +527,21 @@ impl InterfaceModes {
         let model = Model::new(&free, &vec![elements; free.body.beams().len()])?;
         let (stiffness, mass) = model.matrices();
         let pairs = all_pairs(&stiffness, &mass, SHIFT)?;
-        let motions: Vec<_> = pairs
-            .vectors
-            .iter()
-            .map(|vector| model.motion(vector))
-            .collect();
+        let vectors = pairs.vectors.iter();
+        let motions: Vec<Motion> = vectors.map(|vector| model.motion(vector)).collect();
         let joint = motions.iter().map(|motion| {
             let [w, theta] = model.joint_motion(motion);
             [w, -theta]
         });
-        let (masses, springs) = (model.masses.iter(), model.springs.iter());
+        let masses = model.masses.iter();
+        let masses = masses.map(|item| Attachment::new(item.mass, &item.place, &motions));
+        let springs = model.springs.iter();
+        let springs = springs.map(|item| Attachment::new(item.stiffness, &item.place, &motions));
         Ok(Self {
             squares: pairs.values,
             joint: joint.collect(),
-            masses: masses
-                .map(|item| Attachment::new(item.mass, &item.place, &motions))
-                .collect(),
-            springs: springs
-                .map(|item| Attachment::new(item.stiffness, &item.place, &motions))
-                .collect(),
+            masses: masses.collect(),
+            springs: springs.collect(),
             rigid_modes: model.rigid_motions(),
             uncounted: match specimen.body {
                 Body::One(_) => 0,
@@ -571,10 +562,9 @@ impl InterfaceModes {
         let index = mode + self.rigid_modes;
         // d(omega^2)/dm = -omega^2 psi^2 and d(omega^2)/dk = psi^2 for unit modal mass.
         let [masses, springs] = [&self.masses, &self.springs].map(|list| -> f64 {
-            let energies = list
-                .iter()
-                .map(|item| item.size * item.motion[index].powi(2));
-            energies.sum()
+            let list = list.iter();
+            list.map(|item| item.size * item.motion[index].powi(2))
+                .sum()
         });
         [-0.5 * masses, 0.5 * springs / self.squares[index]]
     }
@@ -593,12 +583,11 @@ impl InterfaceModes {
             .collect();
         let modal_mass: f64 = weights.iter().map(|weight| weight * weight).sum();
         let [masses, springs] = [&self.masses, &self.springs].map(|list| {
-            let mut sum = 0.0;
-            for item in list {
+            let energies = list.iter().map(|item| {
                 let psi: f64 = item.motion.iter().zip(&weights).map(|(m, w)| m * w).sum();
-                sum += item.size * psi.powi(2);
-            }
-            sum / modal_mass
+                item.size * psi.powi(2)
+            });
+            energies.fold(0.0, |sum, energy| sum + energy) / modal_mass
         });
         [-0.5 * masses, 0.5 * springs / square]
     }

@@ -1,7 +1,7 @@
 //! The joint: two or three springs, from none at all to rigid, in SI units ([`Joint`]) and as the beam feels
 //! them ([`JointStiffness`]).
 
-use super::{Beam, StructureError};
+use super::{Beam, STIFFNESS_RULE, StructureError, require};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -95,10 +95,9 @@ impl JointStiffness {
 
     /// Returns the coupling sqrt(Kx Ky)/Kz (1), between -1 and 1 for a physical joint.
     pub fn coupling(&self) -> f64 {
-        if self.cross_compliance == 0.0 {
-            0.0
-        } else {
-            self.kx.sqrt() * self.ky.sqrt() * self.cross_compliance
+        match self.cross_compliance == 0.0 {
+            true => 0.0,
+            false => self.kx.sqrt() * self.ky.sqrt() * self.cross_compliance,
         }
     }
 
@@ -106,22 +105,16 @@ impl JointStiffness {
     /// is positive definite, Kz^2 > Kx Ky.
     ///
     /// # Errors
-    /// [`StructureError::Stiffness`] or [`StructureError::NotPhysical`].
+    /// [`StructureError::Unphysical`] or [`StructureError::NotPhysical`].
     pub fn check(&self) -> Result<(), StructureError> {
         for (quantity, value) in [("kx", self.kx), ("ky", self.ky)] {
-            if value.is_nan() || value < 0.0 {
-                return Err(StructureError::Stiffness { quantity, value });
-            }
+            require(value >= 0.0, quantity, value, STIFFNESS_RULE)?;
         }
         let kz = 1.0 / self.cross_compliance.abs();
-        if self.cross_compliance == 0.0 {
-            return Ok(());
-        }
         let limit = self.kx.sqrt() * self.ky.sqrt();
-        if kz > limit {
-            Ok(())
-        } else {
-            Err(StructureError::NotPhysical { kz, limit })
+        match self.cross_compliance == 0.0 || kz > limit {
+            true => Ok(()),
+            false => Err(StructureError::NotPhysical { kz, limit }),
         }
     }
 }

@@ -10,8 +10,7 @@
 //! ```text
 //! Beam, JointStiffness -> natural_lambdas / natural_frequencies -> mode_shapes
 //!                          (closed form, counted so that no root is missed)
-//! finite_elements          the same structures by an independent route
-//! specimen                 the structure with everything fastened to it -> modes
+//! specimen                 the structure with everything fastened to it, by finite elements -> modes
 //! interface                either of both seen from the joint, with exact derivatives
 //! ```
 //!
@@ -22,48 +21,35 @@ pub mod effects;
 
 pub mod interface;
 pub mod joint;
-pub mod mode_shape;
 pub mod natural_modes;
 pub mod receptance;
 pub mod specimen;
 
-mod banded;
 mod eigen;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::{Assembly, Joint, JointStiffness};
-pub use mode_shape::{ModeShape, mode_shapes};
+use natural_modes::MODE_LIMIT;
 pub use natural_modes::{
-    NaturalMode, Symmetry, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint,
-    natural_modes,
+    ModeShape, NaturalMode, Symmetry, mode_shapes, natural_frequencies, natural_lambdas,
+    natural_lambdas_of_any_joint, natural_modes,
 };
+
+/// Rule for a stiffness of the joint.
+const STIFFNESS_RULE: &str = ", but a joint stiffness must be at least 0 (infinite means rigid)";
 
 /// Reason for which a question about a structure has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StructureError {
-    /// A property that must be positive and finite is not.
-    #[error("{quantity} is {value}, but must be positive and finite")]
-    NotPositive {
+    /// A property that no structure can have.
+    #[error("{quantity} is {value}{rule}")]
+    Unphysical {
         /// Name of the property.
         quantity: &'static str,
-        /// Its value (SI).
+        /// The value given (SI; non-dimensional for the joint of a beam).
         value: f64,
-    },
-    /// Poisson's ratio outside its physical range.
-    #[error("poisson's ratio is {value}, but must lie above -1 and at most at 0.5")]
-    PoissonRatio {
-        /// The value given.
-        value: f64,
-    },
-    /// A joint stiffness that is negative or not a number.
-    #[error(
-        "{quantity} is {value}, but a joint stiffness must be at least 0 (infinite means rigid)"
-    )]
-    Stiffness {
-        /// Name of the stiffness.
-        quantity: &'static str,
-        /// The value given (non-dimensional).
-        value: f64,
+        /// What it has to be, in words that continue the sentence.
+        rule: &'static str,
     },
     /// A joint whose compliance matrix is not positive definite: it would release energy.
     #[error(
@@ -93,22 +79,10 @@ pub enum StructureError {
         length: f64,
     },
     /// More modes than a beam theory says anything about.
-    #[error("{count} modes were asked for; at most {limit} are computed")]
+    #[error("{count} modes were asked for; at most {MODE_LIMIT} are computed")]
     TooManyModes {
         /// Number asked for.
         count: usize,
-        /// Number allowed.
-        limit: usize,
-    },
-    /// A part of a specimen that cannot exist.
-    #[error("{quantity} is {value}: {remedy}")]
-    Unphysical {
-        /// Name of the quantity.
-        quantity: &'static str,
-        /// The value given (SI).
-        value: f64,
-        /// Condition that it has to meet.
-        remedy: &'static str,
     },
     /// A finite-element model that cannot be solved.
     #[error("the finite-element model cannot be solved: {reason}")]
@@ -116,4 +90,21 @@ pub enum StructureError {
         /// Cause and advice.
         reason: String,
     },
+}
+
+/// Refuses a value that is not possible, with the rule that it breaks.
+fn require(
+    is_possible: bool,
+    quantity: &'static str,
+    value: f64,
+    rule: &'static str,
+) -> Result<(), StructureError> {
+    match is_possible {
+        true => Ok(()),
+        false => Err(StructureError::Unphysical {
+            quantity,
+            value,
+            rule,
+        }),
+    }
 }

@@ -50,23 +50,6 @@ impl EndFunctions {
         Self::new(lambda, &Slenderness::EULER)
     }
 
-    /// Displacement per force at one end of the free beam, in units of L^3/(E I):
-    /// eta11 = -F5 / (lambda^3 F3).
-    pub fn eta11(&self) -> f64 {
-        -self.f5 / (self.lambda.powi(4) * self.f3)
-    }
-
-    /// Rotation per force, or displacement per moment, in units of L^2/(E I):
-    /// eta12 = F1 / (lambda^2 F3). Its sign belongs to rotation = -dw/dx, x along the beam.
-    pub fn eta12(&self) -> f64 {
-        self.f1 / (self.lambda.powi(4) * self.f3)
-    }
-
-    /// Rotation per moment, in units of L/(E I): eta22 = F6 / (lambda F3).
-    pub fn eta22(&self) -> f64 {
-        self.f6 / (self.lambda.powi(4) * self.f3)
-    }
-
     /// Number of natural frequencies below lambda of the beam clamped at the near end and free at
     /// the far end.
     ///
@@ -241,6 +224,30 @@ impl Waves {
         }
     }
 
+    fn functions(&self) -> WaveFunctions {
+        let beta = self.beta2.sqrt();
+        let (sine, cosine) = beta.sin_cos();
+        let alpha = self.alpha2.abs().sqrt();
+        let (one, cosh, sinh) = if self.alpha2 < 0.0 {
+            (1.0, alpha.cos(), alpha.sin() / alpha)
+        } else if alpha < 1e-8 {
+            // sinh x / x = 1 + x^2/6 is 1 to the last digit.
+            (1.0, 1.0, 1.0)
+        } else {
+            let decay = (-alpha).exp();
+            // 1 - e^{-2 alpha} without cancellation.
+            let sinh = -0.5 * (-2.0 * alpha).exp_m1();
+            (decay, 0.5 * (1.0 + decay * decay), sinh / alpha)
+        };
+        WaveFunctions {
+            one,
+            cosine,
+            sine: sine / beta,
+            cosh,
+            sinh,
+        }
+    }
+
     /// (ma^2 alpha^2 - mb^2 beta^2) / b^4, written so that the leading terms do not cancel.
     fn free_coefficient(&self, s2: f64) -> f64 {
         let spread = self.both * self.difference;
@@ -266,6 +273,19 @@ impl Waves {
     }
 }
 
+/// The circular and the hyperbolic functions, the latter with `one` scaled by e^-alpha where alpha is real.
+struct WaveFunctions {
+    one: f64,
+    /// cos beta.
+    cosine: f64,
+    /// sin beta / beta.
+    sine: f64,
+    /// cosh alpha.
+    cosh: f64,
+    /// sinh alpha / alpha.
+    sinh: f64,
+}
+
 /// Products of the circular and the hyperbolic functions, all scaled alike.
 struct Products {
     /// 1, scaled.
@@ -284,41 +304,26 @@ struct Products {
     pinned: f64,
 }
 
+impl Products {
+    fn of(w: &Waves, f: &WaveFunctions) -> Self {
+        let (cos_sinh, sin_cosh) = (f.cosine * f.sinh, f.sine * f.cosh);
+        Self {
+            one: f.one,
+            cos_cosh: f.cosine * f.cosh,
+            cos_cosh_less_one: (f.cosine * f.cosh - f.one) / w.b2,
+            sin_sinh: f.sine * f.sinh,
+            cos_sinh,
+            sin_cosh,
+            pinned: (w.ma * w.alpha2 * cos_sinh - w.mb * w.beta2 * sin_cosh) / (w.b2 * w.b2),
+        }
+    }
+}
+
 /// At frequencies where the products can be formed directly.
 pub(super) fn closed_form(lambda: f64, slenderness: &Slenderness) -> EndFunctions {
     let waves = Waves::new(lambda, slenderness);
-    let beta = waves.beta2.sqrt();
-    let (sine, cosine) = beta.sin_cos();
-    let (one, cosh, sinh) = hyperbolic(waves.alpha2);
-    let (cos_sinh, sin_cosh) = (cosine * sinh, sine / beta * cosh);
-    let products = Products {
-        one,
-        cos_cosh: cosine * cosh,
-        cos_cosh_less_one: (cosine * cosh - one) / waves.b2,
-        sin_sinh: sine / beta * sinh,
-        cos_sinh,
-        sin_cosh,
-        pinned: (waves.ma * waves.alpha2 * cos_sinh - waves.mb * waves.beta2 * sin_cosh)
-            / (waves.b2 * waves.b2),
-    };
+    let products = Products::of(&waves, &waves.functions());
     assemble(lambda, slenderness, &waves, &products)
-}
-
-/// (1, cosh alpha, sinh alpha / alpha) scaled by e^-alpha where alpha is real.
-fn hyperbolic(alpha2: f64) -> (f64, f64, f64) {
-    let alpha = alpha2.abs().sqrt();
-    if alpha2 < 0.0 {
-        (1.0, alpha.cos(), alpha.sin() / alpha)
-    } else if alpha < 1e-8 {
-        // sinh x / x = 1 + x^2/6 is 1 to the last digit.
-        (1.0, 1.0, 1.0)
-    } else {
-        let decay = (-alpha).exp();
-        let cosh = 0.5 * (1.0 + decay * decay);
-        // 1 - e^{-2 alpha} without cancellation.
-        let sinh = -0.5 * (-2.0 * alpha).exp_m1();
-        (decay, cosh, sinh / alpha)
-    }
 }
 
 /// At low frequency: series in z = (alpha + i beta)^2 = -d + 2 i alpha beta, from
@@ -446,48 +451,40 @@ pub(super) fn slopes(lambda: f64, slenderness: &Slenderness) -> EndSlopes {
 
 /// The products of [`closed_form`] and their derivatives.
 fn products_and_slopes(w: &Waves, dw: &WaveSlopes) -> (Products, Products) {
-    let beta = w.beta2.sqrt();
-    let (sine, cosine) = beta.sin_cos();
-    let sine = sine / beta;
-    let (one, cosh, sinh) = hyperbolic(w.alpha2);
+    let functions = w.functions();
+    let values = Products::of(w, &functions);
+    let WaveFunctions {
+        one,
+        cosine,
+        sine,
+        cosh,
+        sinh,
+    } = functions;
     // d(cos b) = -(sin b / b) d(b^2)/2 and d(sin b / b) = (cos b - sin b / b) d(b^2)/(2 b^2).
     let cosine_slope = -0.5 * sine * dw.beta2;
     let sine_slope = 0.5 * (cosine - sine) / w.beta2 * dw.beta2;
     let cosh_slope = 0.5 * sinh * dw.alpha2;
     let sinh_slope = dw.alpha2
-        * if w.alpha2.abs() < 1e-6 {
-            one / 6.0
-        } else {
-            0.5 * (cosh - sinh) / w.alpha2
+        * match w.alpha2.abs() < 1e-6 {
+            true => one / 6.0,
+            false => 0.5 * (cosh - sinh) / w.alpha2,
         };
-    let (cos_sinh, sin_cosh) = (cosine * sinh, sine * cosh);
-    let less_one = (cosine * cosh - one) / w.b2;
-    let cos_cosh_slope = cosine_slope * cosh + cosine * cosh_slope;
-    let cos_sinh_slope = cosine_slope * sinh + cosine * sinh_slope;
-    let sin_cosh_slope = sine_slope * cosh + sine * cosh_slope;
+    let cos_cosh = cosine_slope * cosh + cosine * cosh_slope;
+    let cos_sinh = cosine_slope * sinh + cosine * sinh_slope;
+    let sin_cosh = sine_slope * cosh + sine * cosh_slope;
     let b4 = w.b2 * w.b2;
-    let pinned = (w.ma * w.alpha2 * cos_sinh - w.mb * w.beta2 * sin_cosh) / b4;
-    let pinned_slope = (dw.ma * w.alpha2 + w.ma * dw.alpha2) * cos_sinh
-        + w.ma * w.alpha2 * cos_sinh_slope
-        - (dw.mb * w.beta2 + w.mb * dw.beta2) * sin_cosh
-        - w.mb * w.beta2 * sin_cosh_slope;
-    let values = Products {
-        one,
-        cos_cosh: cosine * cosh,
-        cos_cosh_less_one: less_one,
-        sin_sinh: sine * sinh,
-        cos_sinh,
-        sin_cosh,
-        pinned,
-    };
+    let pinned = (dw.ma * w.alpha2 + w.ma * dw.alpha2) * values.cos_sinh
+        + w.ma * w.alpha2 * cos_sinh
+        - (dw.mb * w.beta2 + w.mb * dw.beta2) * values.sin_cosh
+        - w.mb * w.beta2 * sin_cosh;
     let slopes = Products {
         one: 0.0,
-        cos_cosh: cos_cosh_slope,
-        cos_cosh_less_one: (cos_cosh_slope - less_one * dw.b2) / w.b2,
+        cos_cosh,
+        cos_cosh_less_one: (cos_cosh - values.cos_cosh_less_one * dw.b2) / w.b2,
         sin_sinh: sine_slope * sinh + sine * sinh_slope,
-        cos_sinh: cos_sinh_slope,
-        sin_cosh: sin_cosh_slope,
-        pinned: pinned_slope / b4 - 2.0 * pinned * dw.b2 / w.b2,
+        cos_sinh,
+        sin_cosh,
+        pinned: pinned / b4 - 2.0 * values.pinned * dw.b2 / w.b2,
     };
     (values, slopes)
 }

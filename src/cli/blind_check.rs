@@ -2,9 +2,8 @@
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
-use super::output::{OutputError, OutputFolder, files_made_in};
-use super::overwrite::Expanded;
-use super::signature::CHECKSUMS;
+use super::output::{OutputFolder, failed, files_made_in};
+use super::overwrite::{CHECKSUMS, Expanded};
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -274,10 +273,7 @@ fn diagnose_recorded(
     folder: &Path,
     shown: &Path,
 ) -> anyhow::Result<Case> {
-    fs::create_dir_all(folder).map_err(|cause| OutputError::Failed {
-        path: shown.to_owned(),
-        cause,
-    })?;
+    fs::create_dir_all(folder).map_err(|cause| failed(shown, &cause))?;
     write_file(folder, shown, "test.toml", recorded.description.as_bytes())?;
     for recording in &recorded.recordings {
         let mut bytes = Vec::new();
@@ -295,16 +291,13 @@ fn diagnose_recorded(
 }
 
 /// Writes a file of a test; `shown` is its folder in messages.
-fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
-    fs::write(folder.join(name), bytes).map_err(|cause| OutputError::Failed {
-        path: shown.join(name),
-        cause,
-    })
+fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
+    fs::write(folder.join(name), bytes).map_err(|cause| failed(&shown.join(name), &cause))
 }
 
 /// Diagnoses a test. A test that cannot be analysed has no answer, which is counted separately.
 fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
-    let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
+    let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::default(), |d| Answer::of(&d));
     (truth.clone(), answer)
 }
 
@@ -374,7 +367,7 @@ fn elsewhere(
                 "the test \"{}\" could not be diagnosed, and counts as not diagnosed: {error:#}",
                 truth.name
             ));
-            Answer::none()
+            Answer::default()
         });
         (truth, answer)
     });

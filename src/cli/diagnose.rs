@@ -1,16 +1,20 @@
 //! `tapjoint diagnose`: the cause of the gap between model and measurement.
+//!
+//! The model with the diagnosed effects goes into report.json and into a file, here and in `run`.
 
 use super::Outcome;
 use super::identify::{FrequencyArguments, resolve};
-use super::input::file_name;
+use super::input::{TestFile, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use super::updated_model::add_model;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
-use tapjoint::pipeline::{IdentifySettings, diagnose_test};
-use tapjoint::report::{document_of, gap_section, render_gap_text};
+use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
+use tapjoint::report::document::{GapSection, UpdatedModelSection};
+use tapjoint::report::{MODEL_FILE, document_of, gap_section, render_gap_text};
+use tapjoint::study::updated_model::{described_frequencies, updated_model};
 
 /// Find the cause of the gap between model and measurement.
 ///
@@ -51,35 +55,47 @@ pub(super) fn run(
     let name = arguments.model.as_deref().map(file_name);
     let text = add_model(&mut gap, &file, name, &analysis, diagnosis.as_ref().ok());
     document.gap = Some(gap);
-    if let Some(output) = output {
-        match text {
-            Some(text) => output.write(text.as_bytes())?,
-            None => terminal.warn(&no_model(
-                diagnosis.as_ref().ok(),
-                arguments.model.as_deref(),
-            )),
+    match (output, text) {
+        (None, _) => {}
+        (Some(output), Some(text)) => output.write(text.as_bytes())?,
+        (Some(_), None) => {
+            let reason = match diagnosis.as_ref().map(|found| &found.verdict) {
+                Err(_) => "nothing was diagnosed",
+                Ok(Verdict::Unknown) => "nothing in the catalogue explains the readings",
+                Ok(_) => "what was found cannot be written as a description",
+            };
+            // An existing file stays, although it belongs to another diagnosis.
+            let file = arguments.model.as_ref().filter(|file| file.exists());
+            let stays = file.map(|file| format!("; {} is left as it was", file.display()));
+            terminal.warn(&format!(
+                "there is no model to write: {reason}{}",
+                stays.unwrap_or_default()
+            ));
         }
     }
     terminal.say(&render_gap_text(&document))?;
     terminal.write_document(&document)?;
-    Ok(if diagnosis.is_ok() {
-        Outcome::Answered
-    } else {
-        Outcome::NoAnswer
-    })
+    Ok(Outcome::of(diagnosis.is_ok()))
 }
 
-/// Returns the warning that no model is written. An existing file stays, although it belongs to another
-/// diagnosis.
-fn no_model(diagnosis: Option<&Diagnosis>, file: Option<&Path>) -> String {
-    let reason = match diagnosis.map(|found| &found.verdict) {
-        None => "nothing was diagnosed",
-        Some(Verdict::Unknown) => "nothing in the catalogue explains the readings",
-        Some(_) => "what was found cannot be written as a description",
-    };
-    let mut text = format!("there is no model to write: {reason}");
-    if let Some(file) = file.filter(|file| file.exists()) {
-        text.push_str(&format!("; {} is left as it was", file.display()));
-    }
-    text
+/// Adds the model with the diagnosed effects to a section of report.json, and returns its text; `None` without
+/// such a model. `name` is the name of the file that will hold the text.
+pub(super) fn add_model(
+    gap: &mut GapSection,
+    file: &TestFile,
+    name: Option<String>,
+    analysis: &Analysis,
+    diagnosis: Option<&Diagnosis>,
+) -> Option<String> {
+    let model = updated_model(&file.test, diagnosis?)?;
+    let highest = analysis.modes.iter().filter_map(|mode| mode.mode).max()?;
+    // The text is read back, so that report.json holds the frequencies of the file.
+    let written = TestDescription::parse(&model.text, MODEL_FILE).ok()?;
+    let frequencies = described_frequencies(&written, highest).ok()?;
+    gap.updated_model = Some(UpdatedModelSection {
+        effect: model.hypothesis,
+        file: name,
+        frequencies,
+    });
+    Some(model.text)
 }

@@ -1,10 +1,9 @@
 //! `tapjoint export`: the beam with its joint as input of a finite-element program.
 
 use super::Outcome;
-use super::input::{TestFile, read_model};
+use super::input::{TestFile, effect_at, read_model};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use super::updated_model::effect_at;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
@@ -212,7 +211,28 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         .with_context(|| format!("{name}: is no report; give a report.json of `tapjoint run`"))?;
     let estimate = &report["estimate"];
     let structure = tested_structure(test);
-    let beam = reported_beam(estimate, &structure.beam);
+    // The described beam with the properties that the report estimates.
+    let mut beam = structure.beam;
+    if let Some(modulus) = estimate["modulus"]["value"].as_f64() {
+        beam.modulus = modulus;
+    }
+    // A free beam's closed form gives its modulus, or else its density, never both.
+    if let Some(density) = estimate["density"]["value"].as_f64()
+        && estimate["method"] != "free-beam"
+    {
+        beam.density = density;
+    }
+    for (key, property) in [
+        ("length", &mut beam.length),
+        ("width", &mut beam.width),
+        ("thickness", &mut beam.thickness),
+        ("modulus", &mut beam.modulus),
+        ("density", &mut beam.density),
+    ] {
+        if let Some(value) = estimate["beam"][key].as_f64() {
+            *property = value;
+        }
+    }
     let joint = reported_joint(estimate, &structure, &beam).with_context(|| {
         format!(
             "{name}: has no estimate of the joint; give a report with one, or leave --report out"
@@ -238,32 +258,6 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         origin: format!("from {name}"),
         doubts: doubts_of(&report),
     })
-}
-
-/// Returns the described beam with the properties that the report estimates.
-fn reported_beam(estimate: &Value, described: &Beam) -> Beam {
-    let mut beam = *described;
-    if let Some(modulus) = estimate["modulus"]["value"].as_f64() {
-        beam.modulus = modulus;
-    }
-    // A free beam's closed form gives its modulus, or else its density, never both.
-    if let Some(density) = estimate["density"]["value"].as_f64()
-        && estimate["method"] != "free-beam"
-    {
-        beam.density = density;
-    }
-    for (key, property) in [
-        ("length", &mut beam.length),
-        ("width", &mut beam.width),
-        ("thickness", &mut beam.thickness),
-        ("modulus", &mut beam.modulus),
-        ("density", &mut beam.density),
-    ] {
-        if let Some(value) = estimate["beam"][key].as_f64() {
-            *property = value;
-        }
-    }
-    beam
 }
 
 /// Returns the joint of a report, non-dimensional by its beam.

@@ -1,12 +1,13 @@
 //! `tapjoint frf`: frequency response functions of a recording with a hammer, or of a test.
 
 use super::Outcome;
-use super::arguments::{RecordingArguments, SpectrumSettings, channel_scale};
-use super::bare::{analyse, holds_functions, refuse_given};
-use super::choices::{estimator, response_form, sensor_kind};
+use super::arguments::{
+    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form, sensor_kind,
+};
 use super::input::{TestFile, check_file, is_description, read_test, stem};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
+use super::recording::{analyse, holds_functions, refuse_given};
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
@@ -16,9 +17,7 @@ use tapjoint::pipeline::{
     Analysis, Frf, FrfSettings, IdentifySettings, Response, Wiring, frfs_of, run_wired, si_unit,
 };
 use tapjoint::recording::{Recording, RecordingError, UffFormat};
-use tapjoint::report::{
-    frf_document, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
-};
+use tapjoint::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
 use tapjoint::spectral::FrfEstimator;
 
 /// Compute frequency response functions with their coherence.
@@ -212,7 +211,16 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         .iter()
         .map(|recording| frfs_of(recording, &settings))
         .collect::<Result<_, _>>()?;
-    write_pictures(pictures, &analysis, &frfs, &terminal)?;
+    let drawn = pictures.into_iter().zip(&analysis.recordings).zip(&frfs);
+    for ((file, recording), frfs) in drawn {
+        match render_frf_picture(recording, frfs, file.picture_format())? {
+            Some(bytes) => file.write(&bytes)?,
+            None => terminal.warn(&format!(
+                "{}: no tap was accepted, so there is no function to draw",
+                recording.file
+            )),
+        }
+    }
     let all = frfs.concat();
     for (file, format) in outputs {
         match format {
@@ -224,30 +232,8 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         }
     }
     let document = frf_document(&analysis, &all);
-    terminal.say(&render_text(&document))?;
-    terminal.write_document(&document)?;
-    Ok(match all.is_empty() {
-        true => Outcome::NoAnswer,
-        false => Outcome::Answered,
-    })
-}
-
-fn write_pictures(
-    files: Vec<OutputFile>,
-    analysis: &Analysis,
-    frfs: &[Vec<Frf>],
-    terminal: &Terminal,
-) -> anyhow::Result<()> {
-    for ((file, recording), frfs) in files.into_iter().zip(&analysis.recordings).zip(frfs) {
-        match render_frf_picture(recording, frfs, file.picture_format())? {
-            Some(bytes) => file.write(&bytes)?,
-            None => terminal.warn(&format!(
-                "{}: no tap was accepted, so there is no function to draw",
-                recording.file
-            )),
-        }
-    }
-    Ok(())
+    terminal.answer(&document)?;
+    Ok(Outcome::of(!all.is_empty()))
 }
 
 /// Analyses a bare recording with a hammer: finds the sensors' channels and scales them.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 use tapjoint::description::TestDescription;
 use tapjoint::pipeline::{Analysis, IdentifySettings, PipelineError, run_test};
+use tapjoint::study::updated_model::DescribedEffectError;
 
 /// A test description and where it was found.
 #[derive(Debug)]
@@ -58,6 +59,14 @@ pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<Tes
     }
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
     Ok(TestFile { test, name, folder })
+}
+
+/// Returns the error of a described effect with its file and line.
+pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Error {
+    match error.line {
+        Some(line) => anyhow!("{file}:{line}: {}", error.cause),
+        None => anyhow!("{file}: {}", error.cause),
+    }
 }
 
 impl TestFile {

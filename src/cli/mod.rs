@@ -1,37 +1,26 @@
-//! The command line: arguments, one file per command, exit codes.
+//! The command line: arguments, commands, exit codes.
 //!
 //! Each command turns its clap arguments into library types, calls the library, prints and
 //! writes. Exit codes: 0 = answered, 1 = these data give no answer, 2 = wrong usage or bad input.
 
 mod arguments;
-mod bare;
-mod choices;
-mod help;
 mod input;
-mod laboratory;
 mod output;
 mod overwrite;
-mod signature;
+mod program;
 mod terminal;
-mod updated_model;
 
 mod blind_check;
-mod completions;
 mod diagnose;
 mod export;
 mod frf;
 mod identify;
-mod init;
-mod inspect;
-mod man;
-mod perturb;
 mod plan;
 mod predict;
-mod reproduce;
+mod recording;
 mod resolution;
 mod run;
 mod simulate;
-mod spectrum;
 
 use arguments::CommonArguments;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -42,6 +31,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 use tapjoint::description::TestDescription;
+use tapjoint::pipeline::Analysis;
 use terminal::Terminal;
 
 /// From hammer taps to joint stiffness.
@@ -66,21 +56,21 @@ struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::RunArguments),
-    Init(init::InitArguments),
-    Inspect(inspect::InspectArguments),
-    Spectrum(spectrum::SpectrumArguments),
+    Init(program::InitArguments),
+    Inspect(recording::InspectArguments),
+    Spectrum(recording::SpectrumArguments),
     Frf(frf::FrfArguments),
     Identify(identify::IdentifyArguments),
     Predict(predict::PredictArguments),
-    Perturb(perturb::PerturbArguments),
+    Perturb(identify::PerturbArguments),
     Plan(plan::PlanArguments),
     Diagnose(diagnose::DiagnoseArguments),
     BlindCheck(blind_check::BlindCheckArguments),
     Resolution(resolution::ResolutionArguments),
-    Reproduce(reproduce::ReproduceArguments),
+    Reproduce(program::ReproduceArguments),
     Export(export::ExportArguments),
-    Completions(completions::CompletionsArguments),
-    Man(man::ManArguments),
+    Completions(program::CompletionsArguments),
+    Man(program::ManArguments),
     Simulate(Box<simulate::SimulateArguments>),
 }
 
@@ -93,15 +83,35 @@ enum Outcome {
     NoAnswer,
 }
 
+impl Outcome {
+    fn of(answered: bool) -> Outcome {
+        match answered {
+            true => Outcome::Answered,
+            false => Outcome::NoAnswer,
+        }
+    }
+
+    /// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
+    /// A bare recording is answered by a mode.
+    fn of_analysis(analysis: &Analysis) -> Outcome {
+        Outcome::of(match &analysis.identification {
+            Some(found) => {
+                found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
+            }
+            None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
+        })
+    }
+}
+
 /// Reads the arguments, runs the command, reports errors, and returns the exit code.
 pub(super) fn main() -> ExitCode {
-    let parsed = help::grouped::<CommandLine>()
+    let parsed = program::grouped::<CommandLine>()
         .try_get_matches()
         .and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
     let (line, matches) = match parsed {
         Ok(parsed) => parsed,
         Err(usage) => {
-            let usage = help::with_suggestion(usage, &CommandLine::command());
+            let usage = program::with_suggestion(usage, &CommandLine::command());
             // Help whose reader stops early (`tapjoint --help | head`) is no error.
             let _ = usage.print();
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
@@ -121,8 +131,14 @@ pub(super) fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Answered) => ExitCode::SUCCESS,
         Ok(Outcome::NoAnswer) => ExitCode::from(1),
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
+            // The reader of the output may have closed it, as `head` does.
+            let mut causes = error
+                .chain()
+                .filter_map(|cause| cause.downcast_ref::<io::Error>());
+            if causes.any(|cause| cause.kind() == io::ErrorKind::BrokenPipe) {
+                return ExitCode::SUCCESS;
+            }
             terminal::print_error(&error);
             ExitCode::from(2)
         }
@@ -130,46 +146,45 @@ pub(super) fn main() -> ExitCode {
 }
 
 fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
-    let files = files_of(line, matches);
+    // The files that the command reads and writes, from its arguments and its test description.
+    let files = matches
+        .subcommand()
+        .map_or_else(Files::default, |(_, own)| {
+            let [test, file] =
+                ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
+            let description = test.or(file.filter(|path| is_description(path)));
+            let test = description.and_then(|path| described(path));
+            let expanded = line.command.expanded(test.as_ref());
+            // `simulate` writes the recordings that the description names.
+            let read = description.map(PathBuf::as_path).zip(test.as_ref());
+            let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
+            Files::of(own, read, expanded)
+        });
     files.check()?;
     line.common.set_threads()?;
     let terminal = Terminal::new(&line.common, files)?;
+    let seed = line.common.seed;
     match &line.command {
-        Command::Run(arguments) => run::run(arguments, line.common.seed, terminal),
-        Command::Init(arguments) => init::run(arguments, terminal),
-        Command::Inspect(arguments) => inspect::run(arguments, terminal),
-        Command::Spectrum(arguments) => spectrum::run(arguments, terminal),
+        Command::Run(arguments) => run::run(arguments, seed, terminal),
+        Command::Init(arguments) => program::print_template(arguments, terminal),
+        Command::Inspect(arguments) => recording::inspect(arguments, terminal),
+        Command::Spectrum(arguments) => recording::spectrum(arguments, terminal),
         Command::Frf(arguments) => frf::run(arguments, terminal),
-        Command::Identify(arguments) => identify::run(arguments, terminal),
+        Command::Identify(arguments) => identify::identify(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
-        Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
-        Command::Plan(arguments) => plan::run(arguments, line.common.seed, terminal),
-        Command::Diagnose(arguments) => diagnose::run(arguments, line.common.seed, terminal),
-        Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
-        Command::Resolution(arguments) => resolution::run(arguments, line.common.seed, terminal),
-        Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
-        Command::Simulate(arguments) => simulate::run(arguments, line.common.seed, terminal),
+        Command::Perturb(arguments) => identify::perturb(arguments, seed, terminal),
+        Command::Plan(arguments) => plan::run(arguments, seed, terminal),
+        Command::Diagnose(arguments) => diagnose::run(arguments, seed, terminal),
+        Command::BlindCheck(arguments) => blind_check::run(arguments, seed, terminal),
+        Command::Resolution(arguments) => resolution::run(arguments, seed, terminal),
+        Command::Reproduce(_) => program::print_reproduction(terminal),
+        Command::Simulate(arguments) => simulate::run(arguments, seed, terminal),
         Command::Export(arguments) => export::run(arguments, terminal),
         Command::Completions(arguments) => {
-            completions::run(arguments, CommandLine::command(), terminal)
+            program::print_completions(arguments, CommandLine::command(), terminal)
         }
-        Command::Man(arguments) => man::run(arguments, CommandLine::command(), terminal),
+        Command::Man(arguments) => program::man(arguments, CommandLine::command(), terminal),
     }
-}
-
-/// Collects the files that a command reads and writes, from its arguments and its test description.
-fn files_of(line: &CommandLine, matches: &ArgMatches) -> Files {
-    let Some((_, own)) = matches.subcommand() else {
-        return Files::default();
-    };
-    let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
-    let description = test.or(file.filter(|path| is_description(path)));
-    let test = description.and_then(|path| described(path));
-    let expanded = line.command.expanded(test.as_ref());
-    // `simulate` writes the recordings that the description names.
-    let read = description.map(PathBuf::as_path).zip(test.as_ref());
-    let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
-    Files::of(own, read, expanded)
 }
 
 impl Command {
@@ -184,15 +199,6 @@ impl Command {
             _ => Vec::new(),
         }
     }
-}
-
-/// Returns true if the reader of the output has closed it, as `head` does.
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause
-            .downcast_ref::<std::io::Error>()
-            .is_some_and(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
-    })
 }
 
 #[cfg(test)]

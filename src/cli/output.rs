@@ -7,74 +7,34 @@
 //! caller names. The temporary file or folder is made before any work, which shows that writing will be
 //! possible; when the work fails, it is removed.
 
-use super::overwrite::{Files, OverwriteError};
-use super::signature::{CHECKSUMS, carries_mark, checksum_list, signed};
+use super::overwrite::{CHECKSUMS, Files, carries_mark, checksum_list, signed};
+use anyhow::{anyhow, bail};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use tapjoint::report::chart::PictureFormat;
+use tapjoint::report::picture::PictureFormat;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Beginning of the names of everything temporary.
 const PREFIX: &str = ".tapjoint-";
 
-/// An output that cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum OutputError {
-    /// The folder is missing, or nothing may be created in it.
-    #[error("{}: cannot be written: {cause}; choose another place, or make {} a folder that you may write to", path.display(), folder.display())]
-    NotWritable {
-        /// The output.
-        path: PathBuf,
-        /// The folder of the output.
-        folder: PathBuf,
-        /// The system's error.
-        cause: io::Error,
-    },
-    /// A file was wanted and a folder is there, or the other way round.
-    #[error("{}: is {found}, but {wanted} is needed; choose another name", path.display())]
-    WrongKind {
-        /// The output.
-        path: PathBuf,
-        /// The kind that is there.
-        found: &'static str,
-        /// The kind that is wanted.
-        wanted: &'static str,
-    },
-    /// A file that must not be overwritten.
-    #[error("{}: is read-only; choose another name, or allow writing to it", path.display())]
-    ReadOnly {
-        /// That file.
-        path: PathBuf,
-    },
-    /// Files of an earlier run that stay beside the new ones.
-    #[error(
-        "{}: left by an earlier run, and cannot be removed: {cause}; the new files are written, so remove the old ones by hand",
-        listed(paths)
-    )]
-    Leftovers {
-        /// These files.
-        paths: Vec<PathBuf>,
-        /// The system's error for the first file.
-        cause: io::Error,
-    },
-    /// A folder that the program did not fill.
-    #[error("{}: is there already and was not made by tapjoint; give the name of a new folder, or write into it with --force", path.display())]
-    NotNew {
-        /// That folder.
-        path: PathBuf,
-    },
-    /// A file must not be replaced.
-    #[error(transparent)]
-    NotReplaced(#[from] OverwriteError),
-    /// Writing failed on the way; nothing half-written is left.
-    #[error("{}: could not be written: {cause}; nothing was changed there", path.display())]
-    Failed {
-        /// The output.
-        path: PathBuf,
-        /// The system's error.
-        cause: io::Error,
-    },
+/// Returns the error of an output for which nothing may be created in its folder.
+fn not_writable(path: &Path, folder: &Path, cause: &io::Error) -> anyhow::Error {
+    // `tempfile` adds the name of the temporary file, which tells the user nothing.
+    let text = cause.to_string();
+    let cause = text
+        .split_once(" at path ")
+        .map_or(&*text, |(cause, _)| cause);
+    let (path, folder) = (path.display(), folder.display());
+    anyhow!(
+        "{path}: cannot be written: {cause}; choose another place, or make {folder} a folder that you may write to"
+    )
+}
+
+/// Returns the error of an output whose writing failed on the way; nothing half-written is left.
+pub(super) fn failed(path: &Path, cause: &io::Error) -> anyhow::Error {
+    let path = path.display();
+    anyhow!("{path}: could not be written: {cause}; nothing was changed there")
 }
 
 /// A file to be written in one piece.
@@ -96,47 +56,37 @@ impl OutputFile {
     /// Checks that the file of an option can be written, if the option is given.
     ///
     /// # Errors
-    /// [`OutputError`] if it cannot be written.
-    pub(super) fn prepare_optional(path: Option<&Path>) -> Result<Option<Self>, OutputError> {
+    /// The file cannot be written.
+    pub(super) fn prepare_optional(path: Option<&Path>) -> anyhow::Result<Option<Self>> {
         path.map(Self::prepare).transpose()
     }
 
     /// Checks that `path` can be written, without touching it.
     ///
     /// # Errors
-    /// [`OutputError`] if it cannot be written.
-    pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
+    /// The file cannot be written.
+    pub(super) fn prepare(path: &Path) -> anyhow::Result<Self> {
         // A link stays a link: what it points to is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let folder = folder_of(&path);
+        let (folder, shown) = (folder_of(&path), path.display());
         let target = match fs::metadata(&path) {
             Ok(found) if found.is_dir() => {
-                return Err(OutputError::WrongKind {
-                    path,
-                    found: "a folder",
-                    wanted: "a file",
-                });
+                bail!("{shown}: is a folder, but a file is needed; choose another name")
             }
             Ok(found) if !found.is_file() => {
                 let device = File::options().write(true).open(&path);
                 device.map(Target::Direct)
             }
             Ok(found) if found.permissions().readonly() => {
-                return Err(OutputError::ReadOnly { path });
+                bail!("{shown}: is read-only; choose another name, or allow writing to it")
             }
             _ => {
                 let file = builder(READABLE_FILE).tempfile_in(folder);
                 file.map(Target::Aside)
             }
         };
-        match target {
-            Ok(target) => Ok(Self { path, target }),
-            Err(cause) => Err(OutputError::NotWritable {
-                folder: folder.to_owned(),
-                path,
-                cause: without_path(cause),
-            }),
-        }
+        let target = target.map_err(|cause| not_writable(&path, folder, &cause))?;
+        Ok(Self { path, target })
     }
 
     /// Returns the format of a picture in this file, by its name.
@@ -147,8 +97,8 @@ impl OutputFile {
     /// Writes the whole file and puts it in its place.
     ///
     /// # Errors
-    /// [`OutputError::Failed`]; the earlier file is then still there.
-    pub(super) fn write(self, bytes: &[u8]) -> Result<(), OutputError> {
+    /// Writing fails; the earlier file is then still there.
+    pub(super) fn write(self, bytes: &[u8]) -> anyhow::Result<()> {
         let path = self.path;
         let bytes: &[u8] = &signed(bytes);
         let written = match self.target {
@@ -158,7 +108,7 @@ impl OutputFile {
                 .and_then(|()| file.flush())
                 .and_then(|()| file.persist(&path).map(drop).map_err(|error| error.error)),
         };
-        written.map_err(|cause| OutputError::Failed { path, cause })
+        written.map_err(|cause| failed(&path, &cause))
     }
 }
 
@@ -173,45 +123,34 @@ impl OutputFolder {
     /// Checks that the folder can be made or written to.
     ///
     /// # Errors
-    /// [`OutputError`] if it cannot.
-    pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
+    /// The folder cannot be made or written to.
+    pub(super) fn prepare(path: &Path) -> anyhow::Result<Self> {
         // The nearest folder that exists: the output folder itself, or the one it will grow in.
-        let existing = path
-            .ancestors()
-            .map(or_here)
-            .find(|ancestor| ancestor.exists());
+        let mut ancestors = path.ancestors().map(or_here);
+        let existing = ancestors.find(|ancestor| ancestor.exists());
         let existing = existing.unwrap_or(Path::new("."));
         if !existing.is_dir() {
-            let path = existing.to_owned();
-            return Err(OutputError::WrongKind {
-                path,
-                found: "a file",
-                wanted: "a folder",
-            });
+            let shown = existing.display();
+            bail!("{shown}: is a file, but a folder is needed; choose another name");
         }
-        let staging = builder(READABLE_FOLDER)
-            .tempdir_in(existing)
-            .map_err(|cause| OutputError::NotWritable {
-                path: path.to_owned(),
-                folder: existing.to_owned(),
-                cause: without_path(cause),
-            })?;
+        let staging = builder(READABLE_FOLDER).tempdir_in(existing);
         Ok(Self {
             path: path.to_owned(),
-            staging,
+            staging: staging.map_err(|cause| not_writable(path, existing, &cause))?,
         })
     }
 
     /// Prepares a folder that is new, empty, or was filled by the program; with `force` any folder.
     ///
     /// # Errors
-    /// [`OutputError`] if it cannot be written, or was not made by the program.
-    pub(super) fn prepare_own(path: &Path, force: bool) -> Result<Self, OutputError> {
+    /// It cannot be written, or was not made by the program.
+    pub(super) fn prepare_own(path: &Path, force: bool) -> anyhow::Result<Self> {
         let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
         if path.exists() && !is_empty && !force && !path.join(CHECKSUMS).is_file() {
-            return Err(OutputError::NotNew {
-                path: path.to_owned(),
-            });
+            bail!(
+                "{}: is there already and was not made by tapjoint; give the name of a new folder, or write into it with --force",
+                path.display()
+            );
         }
         Self::prepare(path)
     }
@@ -219,13 +158,10 @@ impl OutputFolder {
     /// Adds a file to the folder.
     ///
     /// # Errors
-    /// [`OutputError::Failed`] if it cannot be written.
-    pub(super) fn add(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+    /// The file cannot be written.
+    pub(super) fn add(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
         let written = fs::write(self.staging.path().join(name), signed(bytes));
-        written.map_err(|cause| OutputError::Failed {
-            path: self.path.join(name),
-            cause,
-        })
+        written.map_err(|cause| failed(&self.path.join(name), &cause))
     }
 
     /// Returns the path for a file that is too long to be added in one piece.
@@ -237,29 +173,20 @@ impl OutputFolder {
     /// `files` allows it.
     ///
     /// # Errors
-    /// [`OutputError::NotReplaced`], and nothing was changed; [`OutputError::Failed`], and every file is
-    /// either the old or the new one, whole.
-    pub(super) fn publish(self, files: &Files) -> Result<PathBuf, OutputError> {
-        let names = self.add_checksums().map_err(|cause| OutputError::Failed {
-            path: self.path.clone(),
-            cause,
-        })?;
-        for name in names {
+    /// A file must not be replaced, and nothing was changed; or writing fails, and every file is either the old or
+    /// the new one, whole.
+    pub(super) fn publish(self, files: &Files) -> anyhow::Result<PathBuf> {
+        let names = self.add_checksums();
+        for name in names.map_err(|cause| failed(&self.path, &cause))? {
             files.check_again(&self.path.join(name))?;
         }
-        let moved = if self.path.exists() {
-            self.move_files()
-        } else {
-            fs::create_dir_all(folder_of(&self.path))
-                .and_then(|()| fs::rename(self.staging.path(), &self.path))
+        let moved = match self.path.exists() {
+            true => self.move_files(),
+            false => fs::create_dir_all(folder_of(&self.path))
+                .and_then(|()| fs::rename(self.staging.path(), &self.path)),
         };
-        match moved {
-            Ok(()) => Ok(self.path),
-            Err(cause) => Err(OutputError::Failed {
-                path: self.path,
-                cause,
-            }),
-        }
+        moved.map_err(|cause| failed(&self.path, &cause))?;
+        Ok(self.path)
     }
 
     /// Returns the text of a file that the folder already has; `None` without such a file.
@@ -273,18 +200,18 @@ impl OutputFolder {
     /// be removed. The results are written all the same, so the caller reports this error last.
     ///
     /// # Errors
-    /// [`OutputError::Failed`].
+    /// Those of [`publish`](Self::publish).
     pub(super) fn publish_without(
         self,
         stale: &[String],
         files: &Files,
-    ) -> Result<(PathBuf, Option<OutputError>), OutputError> {
+    ) -> anyhow::Result<(PathBuf, Option<anyhow::Error>)> {
         let stale: Vec<&String> = stale
             .iter()
             .filter(|name| !self.staging.path().join(name).exists())
             .collect();
         let folder = self.publish(files)?;
-        let (mut paths, mut causes) = (Vec::new(), Vec::new());
+        let (mut names, mut causes) = (Vec::new(), Vec::new());
         for name in stale {
             let path = folder.join(name);
             let is_file = fs::symlink_metadata(&path).is_ok_and(|found| !found.is_dir());
@@ -292,12 +219,16 @@ impl OutputFolder {
                 continue;
             }
             if let Err(cause) = fs::remove_file(&path) {
-                paths.push(path);
+                names.push(path.display().to_string());
                 causes.push(cause);
             }
         }
-        let cause = causes.into_iter().next();
-        let left = cause.map(|cause| OutputError::Leftovers { paths, cause });
+        let left = causes.first().map(|cause| {
+            let names = names.join(", ");
+            anyhow!(
+                "{names}: left by an earlier run, and cannot be removed: {cause}; the new files are written, so remove the old ones by hand"
+            )
+        });
         Ok((folder, left))
     }
 
@@ -372,20 +303,6 @@ fn builder(mode: u32) -> Builder<'static, 'static> {
     #[cfg(not(unix))]
     let _ = mode;
     builder
-}
-
-/// Returns the system's error without the temporary name that `tempfile` adds, which tells the user nothing.
-fn without_path(error: io::Error) -> io::Error {
-    let text = error.to_string();
-    match text.split_once(" at path ") {
-        Some((cause, _)) => io::Error::new(error.kind(), cause),
-        None => error,
-    }
-}
-
-fn listed(paths: &[PathBuf]) -> String {
-    let names = paths.iter().map(|path| path.display().to_string());
-    names.collect::<Vec<_>>().join(", ")
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -527,14 +444,16 @@ mod tests {
         for path in [file.clone(), file.join("below")] {
             let error = OutputFolder::prepare(&path).expect_err("a file is in the way");
             assert!(
-                matches!(error, OutputError::WrongKind { .. }),
+                error.to_string().contains(": is a file, but a folder"),
                 "{path:?}: {error}"
             );
         }
         let error = OutputFile::prepare(folder.path()).expect_err("a folder is in the way");
-        assert!(matches!(error, OutputError::WrongKind { .. }), "{error}");
+        let said = error.to_string();
+        assert!(said.contains(": is a folder, but a file"), "{said}");
         let error = OutputFile::prepare(&folder.path().join("no/such")).expect_err("no folder");
-        assert!(matches!(error, OutputError::NotWritable { .. }), "{error}");
+        let said = error.to_string();
+        assert!(said.contains(": cannot be written: "), "{said}");
         #[cfg(unix)]
         {
             OutputFile::prepare(Path::new("/dev/null"))

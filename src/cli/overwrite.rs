@@ -4,11 +4,18 @@
 //! All files that a command reads and writes are collected from its arguments and from the test description,
 //! and checked before any work. Every path among the arguments is an input, unless its option stands in
 //! [`OUTPUTS`]. A new option therefore counts as an input until it is added there.
+//!
+//! A file that tapjoint made has a mark: in the file, or in a list of checksums beside it.
 
 use super::arguments::JsonDestination;
-use super::signature::is_made_here;
+use anyhow::bail;
 use clap::ArgMatches;
-use std::fs;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use tapjoint::description::TestDescription;
 
@@ -16,37 +23,6 @@ use tapjoint::description::TestDescription;
 const OUTPUTS: [&str; 8] = [
     "json", "out", "png", "csv", "uff58", "uff58b", "model", "keep",
 ];
-
-/// An output that a command must not write.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum OverwriteError {
-    /// The command reads this file.
-    #[error("{}: is an input of this command and cannot be its output ({option}); give another name", path.display())]
-    Input {
-        /// The output as it was named.
-        path: PathBuf,
-        /// Option of this output.
-        option: String,
-    },
-    /// Two outputs are one file.
-    #[error("{}: is the output of both {first} and {second}; give each a name of its own", path.display())]
-    Twice {
-        /// The second output as it was named.
-        path: PathBuf,
-        /// Option of the first.
-        first: String,
-        /// Option of the second.
-        second: String,
-    },
-    /// There is a file that the program did not make.
-    #[error("{}: is there already and was not made by tapjoint, or was changed since; give another name ({option}), or replace it with --force", path.display())]
-    Foreign {
-        /// The output as it was named.
-        path: PathBuf,
-        /// Option of this output.
-        option: String,
-    },
-}
 
 /// An option with all files that it writes.
 pub(super) type Expanded = (&'static str, Vec<PathBuf>);
@@ -81,9 +57,17 @@ impl Files {
         for (id, paths) in expanded {
             outputs.extend(paths.into_iter().map(|path| (id, path)));
         }
-        let below = inputs.iter().filter(|path| path.is_dir());
-        let below: Vec<PathBuf> = below.flat_map(|folder| tests_in(folder)).collect();
-        inputs.extend(below);
+        // Descriptions and recordings of all tests in a folder of tests.
+        let folders = inputs.iter().filter(|path| path.is_dir());
+        let entries = folders.filter_map(|folder| fs::read_dir(folder).ok());
+        let tests = entries.flatten().flatten();
+        let tests = tests.map(|entry| entry.path().join("test.toml"));
+        let tests: Vec<PathBuf> = tests.filter(|path| path.is_file()).collect();
+        for path in tests {
+            let test = described(&path);
+            inputs.extend(test.iter().flat_map(|test| recordings_of(&path, test)));
+            inputs.push(path);
+        }
         if let Some((path, test)) = test {
             inputs.extend(recordings_of(path, test));
         }
@@ -101,7 +85,7 @@ impl Files {
     ///
     /// # Errors
     /// An output is an input, two outputs are one file, or an existing file was not made by the program.
-    pub(super) fn check(&self) -> Result<(), OverwriteError> {
+    pub(super) fn check(&self) -> anyhow::Result<()> {
         let mut before: Vec<(Place, &str)> = Vec::new();
         for (option, path) in &self.outputs {
             let Some(place) = Place::of(path) else {
@@ -109,11 +93,10 @@ impl Files {
             };
             self.check_output(path, option)?;
             if let Some((_, first)) = before.iter().find(|(other, _)| other.is(&place)) {
-                return Err(OverwriteError::Twice {
-                    path: path.clone(),
-                    first: (*first).to_owned(),
-                    second: option.clone(),
-                });
+                bail!(
+                    "{}: is the output of both {first} and {option}; give each a name of its own",
+                    path.display()
+                );
             }
             before.push((place, option));
         }
@@ -123,23 +106,27 @@ impl Files {
     /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
-    /// [`OverwriteError::Input`], [`OverwriteError::Foreign`].
-    fn check_output(&self, path: &Path, option: &str) -> Result<(), OverwriteError> {
-        let (path, option) = (path.to_owned(), option.to_owned());
-        if self.reads(&path) {
-            Err(OverwriteError::Input { path, option })
-        } else if !self.force && !is_free(&path) {
-            Err(OverwriteError::Foreign { path, option })
-        } else {
-            Ok(())
+    /// The output is an input, or a file that the program did not make.
+    fn check_output(&self, path: &Path, option: &str) -> anyhow::Result<()> {
+        let shown = path.display();
+        if self.reads(path) {
+            bail!(
+                "{shown}: is an input of this command and cannot be its output ({option}); give another name"
+            );
         }
+        if !self.force && !is_free(path) {
+            bail!(
+                "{shown}: is there already and was not made by tapjoint, or was changed since; give another name ({option}), or replace it with --force"
+            );
+        }
+        Ok(())
     }
 
     /// Checks an output again just before it is replaced, for files that were not known before the work.
     ///
     /// # Errors
     /// Those of [`check_output`](Self::check_output).
-    pub(super) fn check_again(&self, path: &Path) -> Result<(), OverwriteError> {
+    pub(super) fn check_again(&self, path: &Path) -> anyhow::Result<()> {
         let known = self.outputs.iter().find(|(_, output)| output == path);
         self.check_output(path, known.map_or("--out", |(option, _)| option))
     }
@@ -174,21 +161,6 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
         Ok(Some(names)) if id == "recordings" => names.map(PathBuf::from).collect(),
         _ => Vec::new(),
     }
-}
-
-/// Returns descriptions and recordings of all tests in a folder of tests.
-fn tests_in(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path().join("test.toml");
-        if path.is_file() {
-            if let Some(test) = described(&path) {
-                files.extend(recordings_of(&path, &test));
-            }
-            files.push(path);
-        }
-    }
-    files
 }
 
 fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
@@ -267,4 +239,259 @@ fn node_of(found: &fs::Metadata) -> Option<(u64, u64)> {
 #[cfg(not(unix))]
 fn node_of(_found: &fs::Metadata) -> Option<(u64, u64)> {
     None
+}
+
+/// Name of the list of checksums, in the format of `sha256sum`.
+pub(super) const CHECKSUMS: &str = "made-by-tapjoint.sha256";
+
+/// PNG files begin with these bytes and a header of 25 bytes.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+/// The chunk after the header of a PNG file: length, type, keyword and text, CRC-32.
+const PNG_SOFTWARE: &[u8] = b"\0\0\0\x11tEXtSoftware\0tapjoint\x7d\x96\x82\xb7";
+/// Place of this chunk (bytes).
+const PNG_HEADER_END: usize = 33;
+/// The last line of an SVG file.
+const SVG_COMMENT: &[u8] = b"<!-- Made by tapjoint -->\n";
+/// Universal files begin with this line.
+const UFF: &[u8] = b"    -1\n";
+/// The last dataset of a universal file: a header (151) that names the program. Its dates are left blank.
+const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
+    NONE                         0         0         0\nNONE                \ntapjoint\n\
+    NONE                         0         0         0\n    -1\n";
+
+/// First words of the CSV files that the program writes.
+const CSV_HEADS: [&str; 6] = [
+    "parameter,method,unit,value,std,low,high,",
+    "mode,label,recording,method,frequency_Hz,std_Hz,",
+    "method,kind,percent,mode,statistic,kx,ky,kz\n",
+    "recording,response,form,unit,frequency_Hz,h1_real,",
+    "quantity,name,method,unit,block,lines,window,reading,",
+    "name,planted,detectable,refutable,verdict,named,",
+];
+/// First words of the test descriptions that the program writes.
+const DESCRIPTION_HEADS: [&str; 2] = [
+    "# The model with what the diagnosis found (verdict:",
+    "# Recordings of a virtual test, made by `tapjoint simulate`.",
+];
+/// First words of the manual pages that the program writes.
+const PAGE_HEAD: &str = ".ie \\n(.g .ds Aq \\(aq\n.el .ds Aq '\n.TH tapjoint";
+/// End of the title of a report's page.
+const PAGE_TITLE: &str = " – tapjoint report</title>";
+/// Words in the comment at the head of a deck.
+const DECK_HEAD: &str = ": beam with its joint, written by tapjoint";
+
+/// Bytes that are read at the beginning and at the end of a file.
+const LOOKED_AT: u64 = 4096;
+
+/// Returns the file's content with a mark of the program, where the format has a place for one and does not
+/// name the program yet: PNG, SVG and universal files.
+pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let (place, mark) = if bytes.starts_with(PNG) && bytes.len() > PNG_HEADER_END {
+        (PNG_HEADER_END, PNG_SOFTWARE)
+    } else if bytes.starts_with(b"<svg") {
+        (bytes.len(), SVG_COMMENT)
+    } else if bytes.starts_with(UFF) {
+        (bytes.len(), UFF_HEADER)
+    } else {
+        return Cow::Borrowed(bytes);
+    };
+    let (before, after) = bytes.split_at(place);
+    Cow::Owned([before, mark, after].concat())
+}
+
+/// Returns true if the program made this file.
+///
+/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the folder above, names the file, the
+/// checksum decides: a file that has changed since counts as foreign. `simulate` and `blind-check` write such
+/// a list, because their recordings cannot carry a mark. Otherwise the content decides:
+///
+/// | Format | Mark |
+/// |---|---|
+/// | PNG | chunk tEXt "Software" after the header |
+/// | SVG | comment in the last line |
+/// | UFF | dataset 151 at the end |
+/// | HTML | end of the title |
+/// | JSON | an object with a whole `version` and a list `warnings` |
+/// | CSV | names of the first columns |
+/// | TOML, manual page, deck | first comment |
+///
+/// A file of any other format, and a file that cannot be read, counts as foreign.
+pub(super) fn is_made_here(path: &Path) -> bool {
+    let listed = path.ancestors().skip(1).take(2).find_map(|folder| {
+        let list = fs::read_to_string(folder.join(CHECKSUMS)).ok()?;
+        let name = name_in_list(path.strip_prefix(folder).ok()?);
+        let expected = checksums(&list).remove(&name)?;
+        Some(checksum(path).is_ok_and(|found| found == expected))
+    });
+    listed.unwrap_or_else(|| carries_mark(path).unwrap_or(false))
+}
+
+/// Returns true if the file's content shows that the program made it.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
+    let mut file = File::open(path)?;
+    let mut head = Vec::new();
+    file.by_ref().take(LOOKED_AT).read_to_end(&mut head)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LOOKED_AT)))?;
+    let mut tail = Vec::new();
+    file.take(LOOKED_AT).read_to_end(&mut tail)?;
+    if head.starts_with(PNG) {
+        return Ok(head
+            .get(PNG_HEADER_END..)
+            .unwrap_or_default()
+            .starts_with(PNG_SOFTWARE));
+    }
+    if head.starts_with(UFF) {
+        return Ok(tail.ends_with(UFF_HEADER));
+    }
+    // The last character of the head may be cut.
+    let text = String::from_utf8_lossy(&head);
+    Ok(match text.chars().next() {
+        // The documents of `--json` and report.json have `version` and `warnings`.
+        Some('{') => serde_json::from_slice::<Value>(&fs::read(path)?)
+            .is_ok_and(|found| found["version"].is_u64() && found["warnings"].is_array()),
+        Some('<') if text.starts_with("<svg") => tail.ends_with(SVG_COMMENT),
+        Some('<') => text.contains(PAGE_TITLE),
+        Some('$' | '*') => {
+            // The first comment names the program; a long name of the test wraps its lines.
+            let lines = text.lines().take_while(|line| line.starts_with(['$', '*']));
+            let words =
+                lines.flat_map(|line| line.trim_start_matches(['$', '*']).split_whitespace());
+            words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
+        }
+        _ if text.starts_with(PAGE_HEAD) => true,
+        _ if path.ends_with(CHECKSUMS) && !checksums(&text).is_empty() => true,
+        _ => CSV_HEADS
+            .iter()
+            .chain(&DESCRIPTION_HEADS)
+            .any(|begins| text.starts_with(begins)),
+    })
+}
+
+/// Returns the earlier list of checksums of a folder, updated for the new files.
+///
+/// `new` holds each file's name in the folder and the present place of its content.
+///
+/// # Errors
+/// A file cannot be read.
+pub(super) fn checksum_list(earlier: &str, new: &[(PathBuf, PathBuf)]) -> io::Result<String> {
+    let mut sums = checksums(earlier);
+    for (name, content) in new {
+        sums.insert(name_in_list(name), checksum(content)?);
+    }
+    Ok(sums
+        .iter()
+        .map(|(name, sum)| format!("{sum}  {name}\n"))
+        .collect())
+}
+
+/// Returns checksums by file name; empty if one line has another form.
+fn checksums(list: &str) -> BTreeMap<String, String> {
+    let lines = list.lines().map(|line| {
+        let (sum, name) = line.split_once("  ")?;
+        let is_sum = sum.len() == 64 && sum.bytes().all(|byte| byte.is_ascii_hexdigit());
+        is_sum.then(|| (name.to_owned(), sum.to_owned()))
+    });
+    lines.collect::<Option<_>>().unwrap_or_default()
+}
+
+/// Returns a file's name with slashes, on every system.
+fn name_in_list(name: &Path) -> String {
+    let parts = name
+        .components()
+        .map(|part| part.as_os_str().to_string_lossy());
+    parts.collect::<Vec<_>>().join("/")
+}
+
+fn checksum(path: &Path) -> io::Result<String> {
+    let mut sum = Sha256::new();
+    io::copy(&mut File::open(path)?, &mut sum)?;
+    Ok(sum
+        .finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    /// A PNG file of one pixel.
+    fn picture() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(png::ColorType::Grayscale);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[7]).unwrap();
+        drop(writer);
+        bytes
+    }
+
+    #[test]
+    fn val_a_signed_picture_is_a_sound_one_that_names_the_program() {
+        let bytes = signed(&picture()).into_owned();
+        let mut reader = png::Decoder::new(&bytes[..]).read_info().unwrap();
+        let texts = &reader.info().uncompressed_latin1_text;
+        assert_eq!(
+            (texts[0].keyword.as_str(), texts[0].text.as_str()),
+            ("Software", "tapjoint")
+        );
+        let mut pixels = [0];
+        reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(pixels, [7]);
+    }
+
+    #[test]
+    fn prop_what_was_signed_is_recognised_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let made = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            is_made_here(&path)
+        };
+        for bytes in [
+            &picture()[..],
+            b"<svg></svg>\n",
+            b"    -1\n    58\n    -1\n",
+        ] {
+            assert!(!made(bytes), "{:?}", String::from_utf8_lossy(bytes));
+            assert!(made(&signed(bytes)), "{:?}", String::from_utf8_lossy(bytes));
+        }
+        assert!(made(b"{\"version\": 1, \"warnings\": []}"));
+        assert!(made(
+            b"$ A beam of a very long name: beam with its\n$ joint, written by tapjoint\n"
+        ));
+        for other in [
+            "",
+            "{\"version\": 1}",
+            "time,force,a\n0,1,2\n",
+            "[beam]\n",
+            "$ a deck\n",
+            "<html>",
+        ] {
+            assert!(!made(other.as_bytes()), "{other:?}");
+        }
+        assert!(!is_made_here(folder.path()), "a folder");
+    }
+
+    #[test]
+    fn prop_a_listed_file_is_ours_until_it_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [below, file] = ["below", "below/taps.wav"].map(|name| folder.path().join(name));
+        fs::create_dir(&below).unwrap();
+        fs::write(&file, "RIFF").unwrap();
+        assert!(!is_made_here(&file));
+        let new = [(PathBuf::from("below/taps.wav"), file.clone())];
+        let list = checksum_list("", &new).unwrap();
+        fs::write(folder.path().join(CHECKSUMS), &list).unwrap();
+        assert!(is_made_here(&file));
+        assert!(is_made_here(&folder.path().join(CHECKSUMS)));
+        fs::write(&file, "RIFX").unwrap();
+        assert!(!is_made_here(&file));
+        // What an earlier list names and a new one does not stays listed.
+        assert_eq!(checksum_list(&list, &[]).unwrap(), list);
+    }
 }

@@ -9,9 +9,8 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::{JointModel, TestDescription};
+use tapjoint::description::JointModel;
 use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
-use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::{Conduct, score};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
@@ -58,7 +57,19 @@ pub(super) fn run(
     );
     let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
     let mut test = file.test.clone();
-    let joint = planned_joint(&arguments.stiffness, &test)?;
+    // A joint of --kx, --ky and --kz must be flexible: a test cannot observe a rigid one.
+    let joint = arguments.stiffness.given(test.joint.kind)?;
+    for (name, value) in joint.iter().flat_map(|j| [("--kx", j.kx), ("--ky", j.ky)]) {
+        ensure!(
+            value > 0.0 && value.is_finite(),
+            "{name} {value}: give a positive finite number; a plan needs a flexible joint"
+        );
+    }
+    let coupled = joint.is_some_and(|joint| joint.cross_compliance != 0.0);
+    ensure!(
+        !coupled || test.joint.model == JointModel::ThreeParameter,
+        "--kz is of a joint of three stiffnesses; write model = \"3p\" into [joint], or leave it out"
+    );
     if joint.is_some() {
         // It replaces the described joint.
         (test.joint.kt, test.joint.kr, test.joint.ktr) = (None, None, None);
@@ -82,24 +93,4 @@ pub(super) fn run(
     }
     terminal.write_json(&score_json(&score(&cases), &Conduct::default()))?;
     Ok(Outcome::Answered)
-}
-
-/// Returns the joint of --kx, --ky and --kz, which must be flexible: a test cannot observe a rigid joint.
-fn planned_joint(
-    arguments: &StiffnessArguments,
-    test: &TestDescription,
-) -> anyhow::Result<Option<JointStiffness>> {
-    let joint = arguments.given(test.joint.kind)?;
-    for (name, value) in joint.iter().flat_map(|j| [("--kx", j.kx), ("--ky", j.ky)]) {
-        ensure!(
-            value > 0.0 && value.is_finite(),
-            "{name} {value}: give a positive finite number; a plan needs a flexible joint"
-        );
-    }
-    let coupled = joint.is_some_and(|joint| joint.cross_compliance != 0.0);
-    ensure!(
-        !coupled || test.joint.model == JointModel::ThreeParameter,
-        "--kz is of a joint of three stiffnesses; write model = \"3p\" into [joint], or leave it out"
-    );
-    Ok(joint)
 }

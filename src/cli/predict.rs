@@ -1,11 +1,9 @@
 //! `tapjoint predict`: natural frequencies of a known joint.
 
 use super::Outcome;
-use super::arguments::StiffnessArguments;
-use super::choices::assembly;
-use super::input::{TestFile, read_model};
+use super::arguments::{StiffnessArguments, assembly};
+use super::input::{TestFile, effect_at, read_model};
 use super::terminal::Terminal;
-use super::updated_model::effect_at;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -13,7 +11,7 @@ use std::path::PathBuf;
 use tapjoint::identify::predict_lambdas;
 use tapjoint::pipeline::{TestedStructure, predict_described, structure_details, tested_structure};
 use tapjoint::report::document::{Document, PredictionSection};
-use tapjoint::report::{lambdas_of, prediction_of, render_text};
+use tapjoint::report::{lambdas_of, prediction_of};
 use tapjoint::structure::{Assembly, JointStiffness};
 use tapjoint::study::updated_model::described_frequencies;
 
@@ -64,8 +62,7 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
         }
         (None, None) => bail!("nothing to predict; give a test description, or --joint"),
     };
-    terminal.say(&render_text(&document))?;
-    terminal.write_document(&document)?;
+    terminal.answer(&document)?;
     Ok(Outcome::Answered)
 }
 

@@ -1,8 +1,7 @@
 //! `tapjoint resolution`: errors of frequencies and stiffness by block size, window and reading.
 
 use super::Outcome;
-use super::arguments::{StiffnessArguments, band, block_size};
-use super::choices::{reading, window};
+use super::arguments::{StiffnessArguments, band, block_size, reading, window};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;

@@ -1,20 +1,21 @@
 //! `tapjoint run`: from recordings to the joint, with a report.
 
 use super::Outcome;
-use super::arguments::{RecordingArguments, SpectrumSettings};
-use super::bare::analyse;
-use super::choices::{perturbed_by, perturbed_methods, reading};
+use super::arguments::{
+    RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
+};
+use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, is_description, read_test, stem};
 use super::output::OutputFolder;
 use super::overwrite::Expanded;
+use super::recording::analyse;
 use super::terminal::Terminal;
-use super::updated_model::add_model;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
-use tapjoint::pipeline::{Analysis, EstimateMethod, IdentifySettings, diagnose_test};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings, diagnose_test};
 use tapjoint::report::{
     MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
@@ -173,25 +174,7 @@ pub(super) fn run(
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
-    left.map_or_else(|| Ok(outcome(&analysis)), |left| Err(left.into()))
-}
-
-/// Returns the outcome of an analysis.
-///
-/// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
-/// A bare recording is answered by a mode.
-pub(super) fn outcome(analysis: &Analysis) -> Outcome {
-    let answered = match &analysis.identification {
-        Some(found) => {
-            found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
-        }
-        None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
-    };
-    if answered {
-        Outcome::Answered
-    } else {
-        Outcome::NoAnswer
-    }
+    left.map_or_else(|| Ok(Outcome::of_analysis(&analysis)), Err)
 }
 
 #[cfg(test)]

@@ -1,16 +1,14 @@
-//! `tapjoint simulate`: the recordings of a virtual test.
+//! `tapjoint simulate`: the recordings of a virtual test, and the options of the laboratory that records it.
 
 use super::Outcome;
-use super::arguments::StiffnessArguments;
-use super::input::read_model;
-use super::laboratory::LaboratoryArguments;
+use super::arguments::{StiffnessArguments, words};
+use super::input::{effect_at, read_model};
 use super::output::OutputFolder;
-use super::overwrite::Expanded;
-use super::signature::CHECKSUMS;
+use super::overwrite::{CHECKSUMS, Expanded};
 use super::terminal::Terminal;
-use super::updated_model::effect_at;
-use anyhow::{Context, anyhow};
-use clap::Args;
+use anyhow::{Context, anyhow, bail};
+use clap::builder::{RangedU64ValueParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -21,10 +19,10 @@ use tapjoint::effects::{self, Effect, EffectId};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
-use tapjoint::report::text::wrapped;
+use tapjoint::report::wrapped;
 use tapjoint::simulate::{
-    AntiAlias, Damping, JointTruth, Laboratory, RecordingTruth, TestPlan, Truth, VirtualRecording,
-    VirtualTest, nominal_description, plan_test, truth_of, wav_name,
+    AntiAlias, Damping, Laboratory, TestPlan, Tip, Truth, VirtualRecording, VirtualTest,
+    nominal_description, plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
 
@@ -211,12 +209,38 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
         folder.display()
     );
     for (recording, made) in truth.recordings.iter().zip(&test.recordings) {
-        let line = recording_line(recording, made.plan.taps.pulse_length);
+        let modes = recording.modes.iter().take(6);
+        let modes: Vec<String> = modes.map(|mode| format!("{:.3}", mode.frequency)).collect();
+        let more = if recording.modes.len() > 6 {
+            " ..."
+        } else {
+            ""
+        };
+        let line = format!(
+            "{}: {:.1} s at {} Hz, {} channels, {} taps (level {}, pulses of {} ms); modes at rest: {}{more} Hz",
+            recording.file,
+            recording.seconds,
+            recording.sample_rate,
+            recording.gains.len(),
+            recording.taps.len(),
+            recording.level,
+            1e3 * made.plan.taps.pulse_length,
+            modes.join(" ")
+        );
         text.push_str(&wrapped(&line, 2));
     }
     if let Some(joint) = &truth.joint {
-        text.push('\n');
-        text.push_str(&wrapped(&joint_line(joint), 2));
+        let [kt, kr] = [(joint.kt, "N/m"), (joint.kr, "N m/rad")].map(|(value, unit)| {
+            value.map_or_else(|| "rigid".to_owned(), |value| format!("{value:.6e} {unit}"))
+        });
+        let mut line = format!("Joint: Kt {kt}, Kr {kr}");
+        if let Some((kx, ky)) = joint.kx.zip(joint.ky) {
+            let _ = write!(line, " (Kx {kx:.6}, Ky {ky:.6})");
+        }
+        if let Some(ktr) = joint.ktr {
+            let _ = write!(line, ", Ktr {ktr:.6e} N/rad");
+        }
+        let _ = write!(text, "\n{}", wrapped(&line, 2));
     }
     if truth.effects.is_empty() {
         text.push_str("Nothing planted: the description is the truth\n");
@@ -235,42 +259,6 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
     text.push_str("\nLaboratory\n");
     for (name, value) in laboratory_lines(&truth.laboratory) {
         let _ = writeln!(text, "  {name:<18} {value}");
-    }
-    text
-}
-
-fn recording_line(recording: &RecordingTruth, pulse: f64) -> String {
-    let modes = recording.modes.iter().take(6);
-    let modes: Vec<String> = modes.map(|mode| format!("{:.3}", mode.frequency)).collect();
-    let more = if recording.modes.len() > 6 {
-        " ..."
-    } else {
-        ""
-    };
-    format!(
-        "{}: {:.1} s at {} Hz, {} channels, {} taps (level {}, pulses of {} ms); modes at rest: {}{more} Hz",
-        recording.file,
-        recording.seconds,
-        recording.sample_rate,
-        recording.gains.len(),
-        recording.taps.len(),
-        recording.level,
-        1e3 * pulse,
-        modes.join(" ")
-    )
-}
-
-fn joint_line(joint: &JointTruth) -> String {
-    let [kt, kr] = [(joint.kt, "N/m"), (joint.kr, "N m/rad")].map(|(value, unit)| match value {
-        Some(value) => format!("{value:.6e} {unit}"),
-        None => "rigid".to_owned(),
-    });
-    let mut text = format!("Joint: Kt {kt}, Kr {kr}");
-    if let (Some(kx), Some(ky)) = (joint.kx, joint.ky) {
-        let _ = write!(text, " (Kx {kx:.6}, Ky {ky:.6})");
-    }
-    if let Some(ktr) = joint.ktr {
-        let _ = write!(text, ", Ktr {ktr:.6e} N/rad");
     }
     text
 }
@@ -345,5 +333,235 @@ fn small_or_off(value: f64, unit: &str) -> String {
     match value {
         0.0 => "off".to_owned(),
         value => format!("{value:e} {unit}"),
+    }
+}
+
+/// Settings of a virtual test. The defaults are those of a good laboratory; the command prints them.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Laboratory")]
+pub(super) struct LaboratoryArguments {
+    /// Leave out all disturbances: noise, scatter, errors, and all filters but the anti-alias filter. The
+    /// other options still apply
+    #[arg(long)]
+    ideal: bool,
+    /// Leave out parts of the laboratory
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,...")]
+    without: Vec<Part>,
+    /// Number of taps in each recording; default: 5
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    taps: Option<usize>,
+    /// Length of each recording (s); default: long enough for the taps to ring down
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Sample rate (Hz); default: the lowest usual rate that covers the band
+    #[arg(long, value_name = "HZ", value_parser = sample_rate)]
+    rate: Option<u32>,
+    /// Bits of a sample, 32 = floating point; default: 24
+    #[arg(long, value_name = "N", value_parser = ["16", "24", "32"])]
+    bits: Option<String>,
+    /// Tip of the hammer; default: the softest that excites the band
+    #[arg(long, value_parser = tip())]
+    tip: Option<Tip>,
+    /// Peak force of a tap (N), multiplied by each recording's `level`; default: 20
+    #[arg(long, value_name = "N", value_parser = force)]
+    level: Option<f64>,
+    /// Noise of sensors and hammer relative to that of good ones; default: 1
+    #[arg(long, value_name = "X")]
+    noise: Option<f64>,
+    /// Share of the taps that strike twice; default: 0
+    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    double_hits: Option<f64>,
+    /// Share of the taps that are far too weak; default: 0
+    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    weak_hits: Option<f64>,
+    /// Quiet time before the first tap (s); default: 0.5
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    lead: Option<f64>,
+    /// Relative error of the recorder's clock, positive = frequencies are read too high; default: 5e-6
+    #[arg(long, value_name = "X", value_parser = ratio, allow_negative_numbers = true)]
+    clock_error: Option<f64>,
+    /// Resonance frequency of a mounted accelerometer (Hz); default: 18000
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    mounting: Option<f64>,
+    /// Mains frequency (Hz); default: 50
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    mains: Option<f64>,
+    /// Damping ratio of each mode. The last one applies to all higher modes; default:
+    /// 0.4%,0.3%,0.25%,0.2%
+    #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = ratio, conflicts_with = "rayleigh")]
+    damping: Vec<f64>,
+    /// Damping proportional to mass (1/s) and stiffness (s), instead of --damping
+    #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',')]
+    rayleigh: Vec<f64>,
+}
+
+/// Parts of the laboratory that can be left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Noise of sensors and hammer
+    Noise,
+    /// Mains hum
+    Hum,
+    /// Slow drift of the zero
+    Drift,
+    /// Offset of the zero
+    Offset,
+    /// Anti-alias filter
+    AntiAlias,
+    /// High-pass of AC-coupled inputs
+    AcCoupling,
+    /// Resonance of the mounted accelerometers
+    Mounting,
+    /// Errors of the sensitivities
+    SensitivityError,
+    /// Error of the clock
+    ClockError,
+    /// Scatter of level, length and place of the taps
+    Scatter,
+    /// Rigid-body motion of a free or lap-jointed beam on its suspension
+    Suspension,
+}
+
+fn tip() -> impl TypedValueParser<Value = Tip> {
+    let tips = [
+        ("steel", Tip::Steel),
+        ("nylon", Tip::Nylon),
+        ("rubber", Tip::Rubber),
+    ];
+    words(
+        tips,
+        ["0.3 ms, to 3.3 kHz", "1.4 ms, to 1 kHz", "5 ms, to 290 Hz"],
+    )
+}
+
+impl LaboratoryArguments {
+    /// Returns the laboratory with these options.
+    pub(super) fn resolve(&self) -> anyhow::Result<Laboratory> {
+        let mut laboratory = if self.ideal {
+            Laboratory::ideal()
+        } else {
+            Laboratory::default()
+        };
+        for part in &self.without {
+            part.leave_out(&mut laboratory);
+        }
+        self.set_hammer(&mut laboratory)?;
+        laboratory.recorder.sample_rate = self.rate;
+        if let Some(bits) = &self.bits {
+            laboratory.recorder.bits = bits.parse()?;
+        }
+        set(&mut laboratory.recorder.clock_error, self.clock_error);
+        set(&mut laboratory.recorder.mains, self.mains);
+        set(&mut laboratory.sensors.noise, self.noise);
+        set(&mut laboratory.sensors.mounting_resonance, self.mounting);
+        if !self.damping.is_empty() {
+            laboratory.specimen.damping = Damping::Modal(self.damping.clone());
+        }
+        match self.rayleigh[..] {
+            [] => {}
+            [mass, stiffness] => {
+                laboratory.specimen.damping = Damping::Rayleigh { mass, stiffness };
+            }
+            _ => bail!(
+                "--rayleigh has {} numbers; give two, MASS (1/s) and STIFFNESS (s), such as 0.5,1e-6",
+                self.rayleigh.len()
+            ),
+        }
+        Ok(laboratory)
+    }
+
+    fn set_hammer(&self, laboratory: &mut Laboratory) -> anyhow::Result<()> {
+        let hammer = &mut laboratory.hammer;
+        set(&mut hammer.taps, self.taps);
+        set(&mut hammer.lead, self.lead);
+        set(&mut hammer.peak_force, self.level);
+        set(&mut hammer.double_hits, self.double_hits);
+        set(&mut hammer.weak_hits, self.weak_hits);
+        hammer.tip = self.tip;
+        if let Some(seconds) = self.seconds {
+            let interval = (seconds - hammer.lead) / hammer.taps as f64;
+            // A tap needs room for its pulse and some of what rings.
+            if interval < 0.05 {
+                bail!(
+                    "--seconds {seconds} leaves {interval:.3} s for each of {} taps after {} s of lead; give at least {:.1} s, or fewer --taps",
+                    hammer.taps,
+                    hammer.lead,
+                    hammer.lead + 0.05 * hammer.taps as f64
+                );
+            }
+            hammer.interval = Some(interval);
+        }
+        Ok(())
+    }
+}
+
+fn set<T>(value: &mut T, given: Option<T>) {
+    if let Some(given) = given {
+        *value = given;
+    }
+}
+
+impl Part {
+    fn leave_out(self, laboratory: &mut Laboratory) {
+        let Laboratory {
+            hammer,
+            sensors,
+            recorder,
+            specimen,
+        } = laboratory;
+        match self {
+            Self::Noise => sensors.noise = 0.0,
+            Self::Hum => recorder.hum = 0.0,
+            Self::Drift => recorder.drift = 0.0,
+            Self::Offset => recorder.offset = 0.0,
+            Self::AntiAlias => recorder.anti_alias = AntiAlias::Off,
+            Self::AcCoupling => sensors.ac_coupling = 0.0,
+            Self::Mounting => sensors.mounting_resonance = 0.0,
+            Self::SensitivityError => sensors.sensitivity_error = 0.0,
+            Self::ClockError => recorder.clock_error = 0.0,
+            Self::Scatter => {
+                hammer.level_scatter = 0.0;
+                hammer.length_scatter = 0.0;
+                hammer.place_scatter = 0.0;
+            }
+            Self::Suspension => specimen.suspension = None,
+        }
+    }
+}
+
+fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
+    parse_quantity(text, dimension).map_err(|error| error.to_string())
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Ratio)
+}
+
+fn force(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Force)
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Frequency)
+}
+
+/// Parses a time of at most a day.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches('s').trim().parse::<f64>() {
+        Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),
+        _ => Err(format!(
+            "\"{text}\" is no time; give seconds from 0 to 86400"
+        )),
+    }
+}
+
+fn sample_rate(text: &str) -> Result<u32, String> {
+    let rate = quantity(text, Dimension::Rate)?;
+    if rate.fract() == 0.0 && (100.0..=1e6).contains(&rate) {
+        Ok(rate as u32)
+    } else {
+        Err(format!(
+            "{rate} Hz is no sample rate of a WAV file; give a whole number from 100 to 1000000"
+        ))
     }
 }

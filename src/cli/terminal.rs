@@ -8,8 +8,8 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
-use tapjoint::report::text::wrapped;
-use tapjoint::report::{document::Document, render_json, render_readings, render_stages};
+use tapjoint::report::document::Document;
+use tapjoint::report::{render_json, render_readings, render_stages, render_text, wrapped};
 
 /// Destinations of a command's output.
 #[derive(Debug)]
@@ -101,6 +101,12 @@ impl Terminal {
         }
         let end = if done == of { "\n" } else { "" };
         let _ = write!(error, "\r{done} of {of} {doing}{end}");
+    }
+
+    /// Prints a report's document, and writes it to the destination of `--json`. Call it last.
+    pub(super) fn answer(self, document: &Document) -> anyhow::Result<()> {
+        self.say(&render_text(document))?;
+        self.write_document(document)
     }
 
     /// Writes a report's document to the destination of `--json`. With `--verbose`, first prints on standard

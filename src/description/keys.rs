@@ -1,136 +1,73 @@
 //! Keys of a test description, and suggestions for unknown keys.
 
-use super::error::Suggestion;
+use std::str::SplitWhitespace;
 
 /// A table and its keys.
 pub(super) struct KnownTable {
     /// Name in messages.
     pub(super) header: &'static str,
-    /// Keys, in the usual order.
-    pub(super) keys: &'static [&'static str],
+    /// Keys in the usual order, with blanks between them.
+    keys: &'static str,
 }
 
-pub(super) const TOP: KnownTable = KnownTable {
-    header: "the top level",
-    keys: &[
-        "name",
-        "beam",
-        "joint",
-        "hammer",
-        "sensor",
-        "recording",
-        "measured",
-        "analysis",
-        "effect",
-    ],
-};
-pub(super) const BEAM: KnownTable = KnownTable {
-    header: "[beam]",
-    keys: &[
-        "length",
-        "width",
-        "thickness",
-        "modulus",
-        "density",
-        "poisson",
-        "tolerance",
-        "right",
-    ],
-};
-pub(super) const TOLERANCE: KnownTable = KnownTable {
-    header: "beam.tolerance",
-    keys: &["length", "width", "thickness", "modulus", "density"],
-};
-pub(super) const RIGHT: KnownTable = KnownTable {
-    header: "[beam.right]",
-    keys: &["width", "thickness", "modulus", "density", "poisson"],
-};
-pub(super) const JOINT: KnownTable = KnownTable {
-    header: "[joint]",
-    keys: &[
-        "kind", "model", "kt", "kr", "ktr", "beam", "position", "overlap",
-    ],
-};
-pub(super) const OVERLAP: KnownTable = KnownTable {
-    header: "joint.overlap",
-    keys: &["length", "mass"],
-};
-pub(super) const HAMMER: KnownTable = KnownTable {
-    header: "[hammer]",
-    keys: &["channel", "scale", "sensitivity"],
-};
-pub(super) const SENSOR: KnownTable = KnownTable {
-    header: "[[sensor]]",
-    keys: &[
-        "name",
-        "channel",
-        "scale",
-        "sensitivity",
-        "position",
-        "mass",
-        "kind",
-    ],
-};
-pub(super) const RECORDING: KnownTable = KnownTable {
-    header: "[[recording]]",
-    keys: &[
-        "file",
-        "tap",
-        "level",
-        "band",
-        "block",
-        "at",
-        "mass",
-        "sample_rate",
-        "form",
-        "sensor",
-        "torque",
-        "temperature",
-        "date",
-    ],
-};
-pub(super) const FASTENED: KnownTable = KnownTable {
-    header: "[[recording.mass]]",
-    keys: &["position", "mass"],
-};
-pub(super) const MEASURED: KnownTable = KnownTable {
-    header: "[measured]",
-    keys: &["frequencies", "modes", "half_line", "std", "scatter"],
-};
-pub(super) const ANALYSIS: KnownTable = KnownTable {
-    header: "[analysis]",
-    keys: &[
-        "window",
-        "reading",
-        "fit_modes",
-        "weights",
-        "sensor_mass",
-        "fit",
-    ],
-};
+impl KnownTable {
+    const fn new(header: &'static str, keys: &'static str) -> Self {
+        Self { header, keys }
+    }
+
+    fn keys(&self) -> SplitWhitespace<'static> {
+        self.keys.split_whitespace()
+    }
+
+    /// Returns true if the table has this key.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.keys().any(|known| known == key)
+    }
+
+    /// Returns the keys for a message.
+    pub(super) fn listed(&self) -> String {
+        self.keys.replace(' ', ", ")
+    }
+}
+
+pub(super) const TOP: KnownTable = KnownTable::new(
+    "the top level",
+    "name beam joint hammer sensor recording measured analysis effect",
+);
+pub(super) const BEAM: KnownTable = KnownTable::new(
+    "[beam]",
+    "length width thickness modulus density poisson tolerance right",
+);
+pub(super) const TOLERANCE: KnownTable =
+    KnownTable::new("beam.tolerance", "length width thickness modulus density");
+pub(super) const RIGHT: KnownTable =
+    KnownTable::new("[beam.right]", "width thickness modulus density poisson");
+pub(super) const JOINT: KnownTable =
+    KnownTable::new("[joint]", "kind model kt kr ktr beam position overlap");
+pub(super) const OVERLAP: KnownTable = KnownTable::new("joint.overlap", "length mass");
+pub(super) const HAMMER: KnownTable = KnownTable::new("[hammer]", "channel scale sensitivity");
+pub(super) const SENSOR: KnownTable = KnownTable::new(
+    "[[sensor]]",
+    "name channel scale sensitivity position mass kind",
+);
+pub(super) const RECORDING: KnownTable = KnownTable::new(
+    "[[recording]]",
+    "file tap level band block at mass sample_rate form sensor torque temperature date",
+);
+pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "position mass");
+pub(super) const MEASURED: KnownTable =
+    KnownTable::new("[measured]", "frequencies modes half_line std scatter");
+pub(super) const ANALYSIS: KnownTable = KnownTable::new(
+    "[analysis]",
+    "window reading fit_modes weights sensor_mass fit",
+);
 
 /// Not in [`ALL`], because many of its keys also belong to other tables.
-pub(super) const EFFECT: KnownTable = KnownTable {
-    header: "[[effect]]",
-    keys: &[
-        "id",
-        "mass",
-        "inertia",
-        "position",
-        "stiffness",
-        "coupling",
-        "ratio",
-        "exponent",
-        "loss_factor",
-        "std",
-        "frequency",
-        "relative",
-        "compliance",
-        "force",
-        "factor",
-        "offset",
-    ],
-};
+pub(super) const EFFECT: KnownTable = KnownTable::new(
+    "[[effect]]",
+    "id mass inertia position stiffness coupling ratio exponent loss_factor std frequency relative compliance force \
+     factor offset",
+);
 
 const ALL: [&KnownTable; 12] = [
     &TOP, &BEAM, &TOLERANCE, &RIGHT, &JOINT, &OVERLAP, &HAMMER, &SENSOR, &RECORDING, &FASTENED,
@@ -162,38 +99,31 @@ const SYNONYMS: [(&str, &str); 20] = [
 ];
 
 /// Suggests a key for an unknown `key` of `table`: a similar key of that table, else the same or a similar
-/// key of another table.
-pub(super) fn suggest(key: &str, table: &'static KnownTable) -> Suggestion {
+/// key of another table. Returns a part of a message; nothing where no key is similar.
+pub(super) fn suggest(key: &str, table: &KnownTable) -> String {
     let lower = key.to_lowercase().replace('-', "_");
-    if let Some(found) = table.keys.iter().find(|known| **known == lower) {
-        return Suggestion::Nearest(found);
-    }
-    let synonym = SYNONYMS
-        .iter()
-        .find(|(word, meant)| *word == lower && table.keys.contains(meant));
-    if let Some((_, meant)) = synonym {
-        return Suggestion::Nearest(meant);
+    let synonyms = SYNONYMS.iter().filter(|(word, _)| *word == lower);
+    let mut meant = synonyms.map(|(_, meant)| *meant);
+    let same = table.keys().find(|known| *known == lower);
+    if let Some(found) = same.or_else(|| meant.find(|meant| table.has(meant))) {
+        return format!("did you mean `{found}`? ");
     }
     if let Some(found) = elsewhere(&lower) {
         return found;
     }
-    if let Some(found) = nearest(&lower, table.keys.iter().copied()) {
-        return Suggestion::Nearest(found);
+    if let Some(found) = nearest(&lower, table.keys()) {
+        return format!("did you mean `{found}`? ");
     }
-    let everywhere = ALL.iter().flat_map(|table| table.keys.iter().copied());
-    nearest(&lower, everywhere)
+    nearest(&lower, ALL.iter().flat_map(|table| table.keys()))
         .and_then(elsewhere)
-        .unwrap_or(Suggestion::Nothing)
+        .unwrap_or_default()
 }
 
-fn elsewhere(key: &str) -> Option<Suggestion> {
-    let holders = ALL.iter().filter(|table| table.keys.contains(&key));
+/// Names the tables that have this key, if any has.
+fn elsewhere(key: &str) -> Option<String> {
+    let holders = ALL.iter().filter(|table| table.has(key));
     let tables: Vec<_> = holders.map(|table| table.header).collect();
-    let key = ALL
-        .iter()
-        .flat_map(|table| table.keys)
-        .find(|known| **known == key)?;
-    Some(Suggestion::BelongsInto { key, tables })
+    (!tables.is_empty()).then(|| format!("`{key}` belongs into {}; ", tables.join(" or ")))
 }
 
 /// Returns the known word that is most similar to `word`, if one is similar.

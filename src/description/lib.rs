@@ -4,25 +4,19 @@
 //! SI units, or a [`DescriptionError`] that names the line, the key, what is allowed and the
 //! nearest known key. It opens no files.
 
-mod analysis;
-pub mod described;
-mod error;
 mod keys;
 mod parse;
 mod reader;
 mod recordings;
-mod sensors;
 mod structure;
 mod template;
 
-pub use analysis::{AnalysisDescription, FitParameter, READINGS, WINDOWS, Weights, WindowKind};
-pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
-pub use parse::ChannelRefError;
-pub use recordings::FORMS;
+pub use parse::{ChannelRefError, READINGS, WINDOWS};
+pub use reader::DescriptionError;
+pub use recordings::{FORMS, SENSOR_KINDS};
 use schemars::JsonSchema;
-pub use sensors::SENSOR_KINDS;
 use serde::Serialize;
-pub use structure::ASSEMBLIES;
+pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, lap_layout};
 pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
@@ -54,7 +48,7 @@ pub struct TestDescription {
     /// Effects of the model, for predictions and virtual tests.
     pub effects: Vec<EffectDescription>,
     /// Doubtful values that can still be used, in the order of reading.
-    pub warnings: Vec<DescriptionWarning>,
+    pub warnings: Vec<DescriptionError>,
 }
 
 /// An effect of an updated model.
@@ -269,4 +263,56 @@ pub struct MeasuredFrequencies {
     pub std: Option<Vec<f64>>,
     /// Repeatability, relative: std^2 = half_line^2/3 + (scatter f)^2.
     pub scatter: Option<f64>,
+}
+
+/// Window over a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WindowKind {
+    /// None.
+    Rectangular,
+    /// Hann; for steady signals, not for taps.
+    Hann,
+    /// e^{-at} on force and response alike.
+    Exponential,
+}
+
+/// Weights of the frequencies in an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// By their measured uncertainty.
+    Measured,
+    /// Equal relative weights.
+    Relative,
+}
+
+/// A quantity that an estimate can determine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FitParameter {
+    /// Translational stiffness.
+    Kt,
+    /// Rotational stiffness.
+    Kr,
+    /// Cross-coupling stiffness.
+    Ktr,
+    /// Young's modulus.
+    Modulus,
+    /// Density.
+    Density,
+}
+
+/// Settings of the analysis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnalysisDescription {
+    /// Window; `None` = chosen from the decay in the record.
+    pub window: Option<WindowKind>,
+    /// Way of reading natural frequencies.
+    pub reading: ReadBy,
+    /// The first so many modes enter the estimate; `None` = all.
+    pub fit_modes: Option<usize>,
+    /// Weights of the frequencies; `None` = measured where bounds are known.
+    pub weights: Option<Weights>,
+    /// The sensors' masses enter the nominal model.
+    pub sensor_mass: bool,
+    /// Estimated quantities; `None` = the joint model's stiffnesses, of a free beam the modulus.
+    pub fit: Option<Vec<FitParameter>>,
 }

@@ -1,15 +1,16 @@
-//! From text to [`TestDescription`]: the tables in their order.
+//! From text to [`TestDescription`]: the tables in their order, and the settings of the analysis.
 
-use super::analysis::read_analysis;
-use super::error::{DescriptionError, DescriptionProblem};
-use super::reader::{Entry, Source, Table};
-use super::recordings::{Surroundings, read_measured, read_recording};
-use super::sensors::{check_places, read_hammer, read_sensors};
+use super::reader::{DescriptionError, Entry, Limits, Source, Table};
+use super::recordings::{check_places, read_hammer, read_measured, read_recording, read_sensors};
 use super::structure::{read_beam, read_effect, read_joint};
-use super::{ChannelRef, RecordingDescription, SensorDescription, TestDescription, keys};
+use super::{
+    AnalysisDescription, Assembly, ChannelRef, FitParameter, JointDescription, JointModel,
+    RecordingDescription, SensorDescription, TestDescription, Weights, WindowKind, keys,
+};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
+use tapjoint_signal::modal::ReadBy;
 use toml::de::DeTable;
 
 impl TestDescription {
@@ -26,84 +27,76 @@ impl TestDescription {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let source = Source::new(file_name, text);
         let document = DeTable::parse(text).map_err(|error| syntax_error(&source, text, &error))?;
-        let mut test = read_document(&Table::top(&source, document.get_ref())?, file_name)?;
-        test.warnings = source.into_warnings();
-        Ok(test)
+        let top = Table::top(&source, document.get_ref())?;
+        let name = top.optional("name", |entry| {
+            entry.text("a name such as \"Cantilever, one-bolt clamp\"")
+        })?;
+        let example = "[beam]` with `length`, `width`, `thickness`, `modulus` and `density";
+        let beam_table = top
+            .need("beam", "a description of the beam", example)?
+            .table(&keys::BEAM)?;
+        let beam = read_beam(&beam_table)?;
+        let example = "[joint]` with `kind = \"cantilever\"";
+        let joint_table = top
+            .need("joint", "the kind of joint", example)?
+            .table(&keys::JOINT)?;
+        let joint = read_joint(&joint_table, beam_table.get("right"), beam.length)?;
+        let hammer_table = top.optional("hammer", |entry| entry.table(&keys::HAMMER))?;
+        let hammer = hammer_table.as_ref().map(read_hammer).transpose()?;
+        let hammer_channel = hammer_table.and_then(|table| table.get("channel"));
+        let sensor_tables = array_of_tables(&top, "sensor", "[[sensor]]")?;
+        let sensors = read_sensors(&sensor_tables, hammer_channel.as_ref(), &beam)?;
+        let recordings = array_of_tables(&top, "recording", "[[recording]]")?
+            .iter()
+            .map(|entry| read_recording(entry, &beam, &sensors))
+            .collect::<Result<Vec<_>, _>>()?;
+        check_places(&sensor_tables, &sensors, &recordings)?;
+        let measured = top.optional("measured", |entry| {
+            let measured = read_measured(&entry.table(&keys::MEASURED)?)?;
+            match recordings.first() {
+                None => Ok(measured),
+                Some(first) => Err(entry.error(format!(
+                    "frequencies come from [measured] or from recordings (line {}), not from both; remove one of them",
+                    first.line
+                ))),
+            }
+        })?;
+        let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
+        let analysis = read_analysis(analysis.as_ref(), &joint)?;
+        let effects = array_of_tables(&top, "effect", "[[effect]]")?
+            .iter()
+            .map(read_effect)
+            .collect::<Result<Vec<_>, _>>()?;
+        // A test without a name is called like its file, without the ending.
+        let stem = Path::new(file_name).file_stem();
+        let stem = stem.map(|stem| stem.to_string_lossy().into_owned());
+        let stem = stem.filter(|stem| !stem.trim().is_empty());
+        Ok(TestDescription {
+            name: name.or(stem).unwrap_or_else(|| "test".to_owned()),
+            beam,
+            joint,
+            hammer,
+            sensors,
+            recordings,
+            measured,
+            analysis,
+            effects,
+            warnings: source.warnings.take(),
+        })
     }
 
     /// Asks for something to analyse.
     ///
     /// # Errors
-    /// [`DescriptionProblem::NothingToAnalyse`] when there are neither recordings nor measured
-    /// frequencies.
+    /// Neither recordings nor measured frequencies.
     pub fn check_has_data(&self, file_name: &str) -> Result<(), DescriptionError> {
         if self.measured.is_some() || !self.recordings.is_empty() {
             return Ok(());
         }
-        Err(Source::new(file_name, "").error(1, "", DescriptionProblem::NothingToAnalyse))
+        let problem = "nothing to analyse: neither [[recording]] nor [measured] is given; add `[[recording]]` with \
+                       `file = \"taps.wav\"`, or `[measured]` with `frequencies = [17, 118]`";
+        Err(Source::new(file_name, "").error(1, "", problem))
     }
-}
-
-fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, DescriptionError> {
-    let name = top.optional("name", |entry| {
-        entry.text("a name such as \"Cantilever, one-bolt clamp\"")
-    })?;
-    let example = "[beam]` with `length`, `width`, `thickness`, `modulus` and `density";
-    let beam_table = top
-        .need("beam", "a description of the beam", example)?
-        .table(&keys::BEAM)?;
-    let beam = read_beam(&beam_table)?;
-    let example = "[joint]` with `kind = \"cantilever\"";
-    let joint_table = top
-        .need("joint", "the kind of joint", example)?
-        .table(&keys::JOINT)?;
-    let right = beam_table.get("right");
-    let joint = read_joint(&joint_table, right.as_ref(), beam.length)?;
-    let hammer_table = top.optional("hammer", |entry| entry.table(&keys::HAMMER))?;
-    let hammer = hammer_table.as_ref().map(read_hammer).transpose()?;
-    let hammer_channel = hammer_table.and_then(|table| table.get("channel"));
-    let sensor_tables = array_of_tables(top, "sensor", "[[sensor]]")?;
-    let sensors = read_sensors(&sensor_tables, hammer_channel.as_ref(), &beam)?;
-    let surroundings = Surroundings {
-        beam: &beam,
-        sensors: &sensors,
-    };
-    let recordings = array_of_tables(top, "recording", "[[recording]]")?
-        .iter()
-        .map(|entry| read_recording(entry, &surroundings))
-        .collect::<Result<Vec<_>, _>>()?;
-    check_places(&sensor_tables, &sensors, &recordings)?;
-    let measured = top.optional("measured", |entry| {
-        let measured = read_measured(&entry.table(&keys::MEASURED)?)?;
-        match recordings.first() {
-            None => Ok(measured),
-            Some(first) => Err(entry.conflict(
-                format!(
-                    "frequencies come from [measured] or from recordings (line {}), not from both",
-                    first.line
-                ),
-                "remove one of them",
-            )),
-        }
-    })?;
-    let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
-    let analysis = read_analysis(analysis.as_ref(), &joint)?;
-    let effects = array_of_tables(top, "effect", "[[effect]]")?
-        .iter()
-        .map(read_effect)
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok(TestDescription {
-        name: name.unwrap_or_else(|| name_from_file(file_name)),
-        beam,
-        joint,
-        hammer,
-        sensors,
-        recordings,
-        measured,
-        analysis,
-        effects,
-        warnings: Vec::new(),
-    })
 }
 
 fn array_of_tables<'t>(
@@ -112,18 +105,8 @@ fn array_of_tables<'t>(
     header: &str,
 ) -> Result<Vec<Entry<'t>>, DescriptionError> {
     let wanted = format!("a list of tables, each under its own header {header},");
-    Ok(top
-        .optional(key, |entry| entry.list(&wanted))?
-        .unwrap_or_default())
-}
-
-/// Returns the file's name without its ending, for a test without a name.
-fn name_from_file(file_name: &str) -> String {
-    let stem = Path::new(file_name)
-        .file_stem()
-        .map(|stem| stem.to_string_lossy().into_owned());
-    stem.filter(|stem| !stem.trim().is_empty())
-        .unwrap_or_else(|| "test".to_owned())
+    let entries = top.optional(key, |entry| entry.list(&wanted))?;
+    Ok(entries.unwrap_or_default())
 }
 
 fn syntax_error(source: &Source<'_>, text: &str, error: &toml::de::Error) -> DescriptionError {
@@ -138,7 +121,101 @@ fn syntax_error(source: &Source<'_>, text: &str, error: &toml::de::Error) -> Des
     } else {
         "expected are lines such as `key = value` and headers such as `[beam]` or `[[sensor]]`"
     };
-    source.error(line, "", DescriptionProblem::Syntax { message, remedy })
+    source.error(line, "", format!("not valid TOML: {message}; {remedy}"))
+}
+
+/// Words of `window` in `[analysis]`.
+pub const WINDOWS: [(&str, WindowKind); 3] = [
+    ("rectangular", WindowKind::Rectangular),
+    ("hann", WindowKind::Hann),
+    ("exponential", WindowKind::Exponential),
+];
+/// Words of `reading` in `[analysis]`.
+pub const READINGS: [(&str, ReadBy); 3] = [
+    ("fit", ReadBy::Fit),
+    ("interpolated", ReadBy::Interpolated),
+    ("line", ReadBy::Line),
+];
+const WEIGHTS: [(&str, Weights); 2] = [
+    ("measured", Weights::Measured),
+    ("relative", Weights::Relative),
+];
+const PARAMETERS: [(&str, FitParameter); 5] = [
+    ("kt", FitParameter::Kt),
+    ("kr", FitParameter::Kr),
+    ("ktr", FitParameter::Ktr),
+    ("modulus", FitParameter::Modulus),
+    ("density", FitParameter::Density),
+];
+const FIT_MODES: Limits = Limits::between(1.0, 1000.0, "leave it out to use all modes");
+
+/// Reads `[analysis]`; an absent table is all defaults.
+fn read_analysis(
+    table: Option<&Table<'_>>,
+    joint: &JointDescription,
+) -> Result<AnalysisDescription, DescriptionError> {
+    let mut analysis = AnalysisDescription {
+        window: None,
+        reading: ReadBy::default(),
+        fit_modes: None,
+        weights: None,
+        sensor_mass: true,
+        fit: None,
+    };
+    if let Some(table) = table {
+        analysis.window = table.choice("window", &WINDOWS)?;
+        analysis.reading = table.choice("reading", &READINGS)?.unwrap_or_default();
+        analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
+        analysis.weights = table.choice("weights", &WEIGHTS)?;
+        let sensor_mass = table.optional("sensor_mass", Entry::boolean)?;
+        analysis.sensor_mass = sensor_mass.unwrap_or(true);
+        analysis.fit = table.optional("fit", |entry| read_fit(entry, joint))?;
+    }
+    Ok(analysis)
+}
+
+fn read_fit(
+    entry: &Entry<'_>,
+    joint: &JointDescription,
+) -> Result<Vec<FitParameter>, DescriptionError> {
+    let items = entry.list("a list such as [\"kr\", \"modulus\"]")?;
+    if items.is_empty() {
+        let remedy = "leave `fit` out for the joint's stiffnesses";
+        return Err(entry.wrong_count(0, "at least 1", remedy));
+    }
+    let mut fit: Vec<FitParameter> = Vec::new();
+    for item in &items {
+        let parameter = item.choice(&PARAMETERS)?;
+        let stated = match parameter {
+            FitParameter::Kt => Some(joint.kt),
+            FitParameter::Kr => Some(joint.kr),
+            FitParameter::Ktr => Some(joint.ktr),
+            FitParameter::Modulus | FitParameter::Density => None,
+        };
+        let is_ktr = parameter == FitParameter::Ktr;
+        let objection = match stated {
+            Some(_) if joint.kind == Assembly::Free => {
+                Some("a free beam has no joint stiffness; fit \"modulus\" or \"density\"")
+            }
+            Some(_) if is_ktr && joint.model == JointModel::TwoParameter => Some(
+                "the two-parameter model has no coupling stiffness; write `model = \"3p\"` in [joint], or remove it here",
+            ),
+            Some(Some(_)) => Some(
+                "this stiffness is stated as known in [joint], and known ones are compared, not fitted; remove it here \
+                 or there",
+            ),
+            Some(None) | None => None,
+        };
+        if let Some(objection) = objection {
+            return Err(item.error(objection));
+        }
+        if fit.contains(&parameter) {
+            let word = format!("\"{}\"", item.as_text().unwrap_or_default());
+            return Err(item.taken(&word, entry.line, "list each parameter once"));
+        }
+        fit.push(parameter);
+    }
+    Ok(fit)
 }
 
 impl fmt::Display for ChannelRef {
@@ -167,8 +244,10 @@ impl RecordingDescription {
     /// Returns the error of a recording that the caller cannot open. It points to the line of the
     /// description that names the file.
     pub fn file_error(&self, description: &str, path: &Path, cause: &str) -> DescriptionError {
-        let (path, cause) = (path.display().to_string(), cause.to_owned());
-        let problem = DescriptionProblem::UnreadableFile { path, cause };
+        let problem = format!(
+            "{} cannot be read: {cause}; name a file that exists, seen from the folder of this description",
+            path.display()
+        );
         Source::new(description, "").error(self.line, "recording.file", problem)
     }
 }

@@ -1,21 +1,60 @@
 //! Typed access to the tables of a TOML text: every value knows its line and its key path, so
 //! that whatever is wrong with it can say where.
 
-use super::error::{
-    DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, number, with_unit,
-};
 use super::keys::{self, KnownTable};
 use std::cell::RefCell;
-use std::ops::{Bound, RangeBounds};
+use std::fmt;
 use tapjoint_numerics::quantity::{Dimension, parse_quantity};
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
+
+/// A problem of a test description, or a doubt about it. Displays as
+/// `FILE:LINE: key: problem, allowed values, remedy`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DescriptionError {
+    /// The file, as the caller named it.
+    pub file: String,
+    /// The line, counted from 1.
+    pub line: usize,
+    /// Path of the key, such as `beam.length` or `sensor[2].position`; empty without a key.
+    pub key: String,
+    /// The problem there, what is allowed, and the remedy.
+    pub problem: String,
+}
+
+impl fmt::Display for DescriptionError {
+    /// Writes one line. It may quote any text of the file, so line breaks and control characters are escaped, and a
+    /// very long message is cut.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const LONGEST: usize = 1000;
+        let mut text = format!("{}:{}: ", self.file, self.line);
+        if !self.key.is_empty() {
+            text += &format!("`{}`: ", self.key);
+        }
+        text += &self.problem;
+        let mut line = String::with_capacity(text.len().min(LONGEST));
+        for character in text.chars().take(LONGEST) {
+            if character.is_control() {
+                line.extend(character.escape_default());
+            } else {
+                line.push(character);
+            }
+        }
+        if text.chars().nth(LONGEST).is_some() {
+            line.push_str(" ...");
+        }
+        out.write_str(&line)
+    }
+}
+
+impl std::error::Error for DescriptionError {}
 
 /// The file's name, the positions of its lines, and the warnings so far.
 pub(super) struct Source<'t> {
     file: &'t str,
     line_starts: Vec<usize>,
-    warnings: RefCell<Vec<DescriptionWarning>>,
+    /// Doubts, in the order of reading.
+    pub(super) warnings: RefCell<Vec<DescriptionError>>,
 }
 
 impl<'t> Source<'t> {
@@ -31,11 +70,6 @@ impl<'t> Source<'t> {
         }
     }
 
-    /// Returns all warnings, in the order of reading.
-    pub(super) fn into_warnings(self) -> Vec<DescriptionWarning> {
-        self.warnings.into_inner()
-    }
-
     /// Returns the line of a byte position, counted from 1.
     pub(super) fn line_at(&self, byte: usize) -> usize {
         self.line_starts
@@ -48,13 +82,13 @@ impl<'t> Source<'t> {
         &self,
         line: usize,
         key: impl Into<String>,
-        problem: DescriptionProblem,
+        problem: impl Into<String>,
     ) -> DescriptionError {
         DescriptionError {
             file: self.file.to_owned(),
             line,
             key: key.into(),
-            problem: Box::new(problem),
+            problem: problem.into(),
         }
     }
 }
@@ -84,20 +118,17 @@ impl<'t> Table<'t> {
     }
 
     /// Refuses the first unknown key, in the order of the text.
-    fn checked(self, known: &'static KnownTable) -> Result<Self, DescriptionError> {
-        let unknown = self
-            .entries
-            .keys()
-            .filter(|key| !known.keys.contains(&&**key.get_ref()));
+    fn checked(self, known: &KnownTable) -> Result<Self, DescriptionError> {
+        let unknown = self.entries.keys().filter(|key| !known.has(key.get_ref()));
         let Some(first) = unknown.min_by_key(|key| key.span().start) else {
             return Ok(self);
         };
-        let suggestion = keys::suggest(first.get_ref(), known);
-        let problem = DescriptionProblem::UnknownKey {
-            table: known.header,
-            suggestion,
-            known: known.keys,
-        };
+        let problem = format!(
+            "unknown key; {}known keys of {}: {}",
+            keys::suggest(first.get_ref(), known),
+            known.header,
+            known.listed()
+        );
         let line = self.source.line_at(first.span().start);
         Err(self
             .source
@@ -135,12 +166,13 @@ impl<'t> Table<'t> {
     pub(super) fn need(
         &self,
         key: &str,
-        wanted: &'static str,
-        example: &'static str,
+        wanted: &str,
+        example: &str,
     ) -> Result<Entry<'t>, DescriptionError> {
-        let missing = DescriptionProblem::Missing { wanted, example };
-        self.get(key)
-            .ok_or_else(|| self.source.error(self.line, self.path_of(key), missing))
+        self.get(key).ok_or_else(|| {
+            let missing = format!("missing; {wanted} is needed, such as `{example}`");
+            self.source.error(self.line, self.path_of(key), missing)
+        })
     }
 
     /// Reads a key that may be absent.
@@ -150,6 +182,25 @@ impl<'t> Table<'t> {
         read: impl FnOnce(&Entry<'t>) -> Result<T, DescriptionError>,
     ) -> Result<Option<T>, DescriptionError> {
         self.get(key).map(|entry| read(&entry)).transpose()
+    }
+
+    /// Reads a quantity within limits that may be absent, in SI units.
+    pub(super) fn within(
+        &self,
+        key: &str,
+        dimension: Dimension,
+        limits: &Limits,
+    ) -> Result<Option<f64>, DescriptionError> {
+        self.optional(key, |entry| entry.within(dimension, limits))
+    }
+
+    /// Reads one of a few words that may be absent.
+    pub(super) fn choice<T: Copy>(
+        &self,
+        key: &str,
+        words: &[(&'static str, T)],
+    ) -> Result<Option<T>, DescriptionError> {
+        self.optional(key, |entry| entry.choice(words))
     }
 }
 
@@ -164,33 +215,22 @@ pub(super) struct Entry<'t> {
 }
 
 impl<'t> Entry<'t> {
-    pub(super) fn error(&self, problem: DescriptionProblem) -> DescriptionError {
+    pub(super) fn error(&self, problem: impl Into<String>) -> DescriptionError {
         self.source.error(self.line, self.path.clone(), problem)
     }
 
-    /// Returns the error of a value that contradicts another one.
-    pub(super) fn conflict(
-        &self,
-        reason: impl Into<String>,
-        remedy: &'static str,
-    ) -> DescriptionError {
-        self.error(DescriptionProblem::Conflict {
-            reason: reason.into(),
-            remedy,
-        })
-    }
-
     /// Adds a warning about this value.
-    pub(super) fn warn(&self, doubt: Doubt) {
-        self.source.warnings.borrow_mut().push(DescriptionWarning {
-            file: self.source.file.to_owned(),
-            line: self.line,
-            key: self.path.clone(),
-            doubt,
-        });
+    pub(super) fn warn(&self, doubt: impl Into<String>) {
+        self.source.warnings.borrow_mut().push(self.error(doubt));
     }
 
-    pub(super) fn wrong_type(&self, wanted: impl Into<String>) -> DescriptionError {
+    /// Adds the warning about a possible, but unusual value (SI), with a question to the user.
+    pub(super) fn unusual(&self, value: f64, unit: &str, usual: &str, question: &str) {
+        let value = with_unit(value, unit);
+        self.warn(format!("{value} is unusual; usual: {usual}; {question}"));
+    }
+
+    pub(super) fn wrong_type(&self, wanted: &str) -> DescriptionError {
         let found = match self.value.get_ref() {
             DeValue::String(_) => "a string",
             DeValue::Integer(_) => "an integer",
@@ -200,24 +240,50 @@ impl<'t> Entry<'t> {
             DeValue::Array(_) => "a list",
             DeValue::Table(_) => "a table",
         };
-        self.error(DescriptionProblem::WrongType {
-            found,
-            wanted: wanted.into(),
-        })
+        self.error(format!("{found} stands here; wanted: {wanted}"))
     }
 
-    pub(super) fn out_of_range(
+    pub(super) fn out_of_range(&self, value: f64, unit: &str, limits: &Limits) -> DescriptionError {
+        self.impossible(value, unit, &limits.in_words(unit), limits.remedy)
+    }
+
+    /// Returns the error of a value (SI) that cannot be.
+    pub(super) fn impossible(
         &self,
         value: f64,
-        unit: &'static str,
-        limits: &Limits,
+        unit: &str,
+        allowed: &str,
+        remedy: &str,
     ) -> DescriptionError {
-        self.error(DescriptionProblem::OutOfRange {
-            value,
-            unit,
-            allowed: limits.in_words(unit),
-            remedy: limits.remedy.to_owned(),
-        })
+        let value = with_unit(value, unit);
+        self.error(format!(
+            "{value} is impossible; allowed: {allowed}; {remedy}"
+        ))
+    }
+
+    /// Returns the error of a list of a wrong length.
+    pub(super) fn wrong_count(
+        &self,
+        found: usize,
+        allowed: &str,
+        remedy: &str,
+    ) -> DescriptionError {
+        self.error(format!(
+            "{found} values stand here; allowed: {allowed}; {remedy}"
+        ))
+    }
+
+    /// Returns the error of a value that another one has taken.
+    pub(super) fn taken(&self, value: &str, first_line: usize, remedy: &str) -> DescriptionError {
+        self.error(format!(
+            "{value} is already taken in line {first_line}; {remedy}"
+        ))
+    }
+
+    fn not_finite(&self, text: impl fmt::Display) -> DescriptionError {
+        self.error(format!(
+            "{text} is not a finite number; write a finite one, or leave the key out"
+        ))
     }
 
     /// Returns the value as a string, if it is one.
@@ -232,10 +298,7 @@ impl<'t> Entry<'t> {
             .ok_or_else(|| self.wrong_type(wanted))?
             .trim();
         if text.is_empty() {
-            return Err(self.error(DescriptionProblem::WrongType {
-                found: "an empty string",
-                wanted: wanted.to_owned(),
-            }));
+            return Err(self.error(format!("an empty string stands here; wanted: {wanted}")));
         }
         Ok(text.to_owned())
     }
@@ -259,7 +322,8 @@ impl<'t> Entry<'t> {
     pub(super) fn quantity(&self, dimension: Dimension) -> Result<f64, DescriptionError> {
         let (value, text) = match self.value.get_ref() {
             DeValue::String(text) => {
-                return parse_quantity(text, dimension).map_err(|error| self.error(error.into()));
+                let read = parse_quantity(text, dimension);
+                return read.map_err(|error| self.error(error.to_string()));
             }
             DeValue::Integer(number) => (integer(number).map(|n| n as f64), number.to_string()),
             DeValue::Float(number) => (number.as_str().parse().ok(), number.to_string()),
@@ -269,14 +333,14 @@ impl<'t> Entry<'t> {
                     "" => "1",
                     si => si,
                 };
-                return Err(self.wrong_type(format!(
+                return Err(self.wrong_type(&format!(
                     "{} as a number ({si}) or a text such as \"1.5 {unit}\"",
                     dimension.in_words()
                 )));
             }
         };
         let finite = value.filter(|value: &f64| value.is_finite());
-        finite.ok_or_else(|| self.error(DescriptionProblem::NotFinite { text }))
+        finite.ok_or_else(|| self.not_finite(text))
     }
 
     /// Returns a quantity within limits, in SI units.
@@ -298,10 +362,7 @@ impl<'t> Entry<'t> {
         let DeValue::Integer(written) = self.value.get_ref() else {
             return Err(self.wrong_type("a whole number"));
         };
-        let Some(value) = integer(written) else {
-            let text = written.to_string();
-            return Err(self.error(DescriptionProblem::NotFinite { text }));
-        };
+        let value = integer(written).ok_or_else(|| self.not_finite(written))?;
         let in_range = limits.contain(value as f64);
         usize::try_from(value)
             .ok()
@@ -315,19 +376,17 @@ impl<'t> Entry<'t> {
         words: &[(&'static str, T)],
     ) -> Result<T, DescriptionError> {
         let allowed: Vec<_> = words.iter().map(|(word, _)| *word).collect();
+        let quoted = quoted(&allowed);
         let text = self
             .as_text()
-            .ok_or_else(|| self.wrong_type(format!("one of \"{}\"", allowed.join("\", \""))))?;
+            .ok_or_else(|| self.wrong_type(&format!("one of {quoted}")))?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(*meaning);
         }
-        let lower = text.to_lowercase();
-        let nearest = keys::nearest(&lower, allowed.iter().copied()).map(str::to_owned);
-        Err(self.error(DescriptionProblem::UnknownChoice {
-            value: text.to_owned(),
-            allowed,
-            nearest,
-        }))
+        let meant = did_you_mean(&text.to_lowercase(), &allowed);
+        Err(self.error(format!(
+            "\"{text}\" is not known here; allowed: {quoted}{meant}"
+        )))
     }
 
     /// Returns the items of a list.
@@ -354,11 +413,11 @@ impl<'t> Entry<'t> {
     }
 
     /// Returns a table with known keys.
-    pub(super) fn table(&self, known: &'static KnownTable) -> Result<Table<'t>, DescriptionError> {
+    pub(super) fn table(&self, known: &KnownTable) -> Result<Table<'t>, DescriptionError> {
         self.free_table(&format!(
             "a table {} with the keys {}",
             known.header,
-            known.keys.join(", ")
+            known.listed()
         ))?
         .checked(known)
     }
@@ -384,57 +443,89 @@ fn integer(number: &DeInteger<'_>) -> Option<i64> {
     i64::from_str_radix(number.as_str(), number.radix()).ok()
 }
 
+/// Returns the words in quotation marks.
+pub(super) fn quoted(words: &[&str]) -> String {
+    format!("\"{}\"", words.join("\", \""))
+}
+
+/// Returns the question for the known word that is most similar to `word`; nothing if none is.
+pub(super) fn did_you_mean(word: &str, known: &[&str]) -> String {
+    let nearest = keys::nearest(word, known.iter().copied());
+    nearest.map_or_else(String::new, |word| format!("; did you mean \"{word}\"?"))
+}
+
+/// Returns a number with at most ten significant digits, which hides the rounding of unit conversions.
+/// Very small and very large numbers have an exponent.
+pub(super) fn number(value: f64) -> String {
+    let rounded = format!("{value:.9e}").parse().unwrap_or(value);
+    let size = f64::abs(rounded);
+    if size == 0.0 || (1e-3..1e6).contains(&size) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+/// Returns a number with its unit.
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
+    format!("{} {unit}", number(value)).trim_end().to_owned()
+}
+
 /// Limits of a quantity, and the remedy for a value beyond them.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
-    pub(super) low: Bound<f64>,
-    pub(super) high: Bound<f64>,
-    pub(super) remedy: &'static str,
+    low: f64,
+    pub(super) high: f64,
+    /// True for the lower or the upper limit where it is not itself allowed.
+    open: [bool; 2],
+    remedy: &'static str,
 }
 
 impl Limits {
+    const fn new(low: f64, high: f64, open: [bool; 2], remedy: &'static str) -> Self {
+        Self {
+            low,
+            high,
+            open,
+            remedy,
+        }
+    }
+
     /// From `low` to `high`, both included.
     pub(super) const fn between(low: f64, high: f64, remedy: &'static str) -> Self {
-        Self {
-            low: Bound::Included(low),
-            high: Bound::Included(high),
-            remedy,
-        }
+        Self::new(low, high, [false, false], remedy)
     }
 
-    /// Greater than zero, up to `high`.
-    pub(super) const fn positive(high: f64, remedy: &'static str) -> Self {
-        Self {
-            low: Bound::Excluded(0.0),
-            high: Bound::Included(high),
-            remedy,
-        }
+    /// More than `low`, up to `high`.
+    pub(super) const fn above(low: f64, high: f64, remedy: &'static str) -> Self {
+        Self::new(low, high, [true, false], remedy)
     }
 
-    /// Returns true if a value is within the limits.
-    pub(super) fn contain(&self, value: f64) -> bool {
-        (self.low, self.high).contains(&value)
+    /// More than `low`, less than `high`.
+    pub(super) const fn inside(low: f64, high: f64, remedy: &'static str) -> Self {
+        Self::new(low, high, [true, true], remedy)
+    }
+
+    /// From `low`, less than `high`.
+    pub(super) const fn below(low: f64, high: f64, remedy: &'static str) -> Self {
+        Self::new(low, high, [false, true], remedy)
+    }
+
+    fn contain(&self, value: f64) -> bool {
+        let [low_open, high_open] = self.open;
+        let above = value > self.low || value == self.low && !low_open;
+        above && (value < self.high || value == self.high && !high_open)
     }
 
     /// Returns the range for a message.
-    pub(super) fn in_words(&self, unit: &str) -> String {
-        if let (Bound::Included(low), Bound::Included(high)) = (self.low, self.high) {
-            return format!("{} to {}", number(low), with_unit(high, unit));
+    fn in_words(&self, unit: &str) -> String {
+        let high = with_unit(self.high, unit);
+        if self.open == [false, false] {
+            return format!("{} to {high}", number(self.low));
         }
-        let low = match self.low {
-            Bound::Included(low) => format!("from {}", with_unit(low, unit)),
-            Bound::Excluded(low) => format!("more than {}", with_unit(low, unit)),
-            Bound::Unbounded => String::new(),
-        };
-        let high = match self.high {
-            Bound::Included(high) => format!("up to {}", with_unit(high, unit)),
-            Bound::Excluded(high) => format!("less than {}", with_unit(high, unit)),
-            Bound::Unbounded => String::new(),
-        };
-        [low, high]
-            .into_iter()
-            .filter(|part| !part.is_empty())
-            .collect::<Vec<_>>()
-            .join(", ")
+        let low = with_unit(self.low, unit);
+        let from = if self.open[0] { "more than" } else { "from" };
+        let to = if self.open[1] { "less than" } else { "up to" };
+        format!("{from} {low}, {to} {high}")
     }
 }

@@ -1,17 +1,223 @@
-//! `[[recording]]`: files of the test, each with its own settings.
-//!
-//! `[measured]`: natural frequencies that were read elsewhere.
+//! `[hammer]` and `[[sensor]]`: channels of the recordings and their scales. `[[recording]]`: files of the test, each
+//! with its own settings. `[measured]`: natural frequencies that were read elsewhere.
 
-use super::error::{DescriptionError, DescriptionProblem, Doubt, with_unit};
-use super::reader::{Entry, Limits, Table};
+use super::reader::{
+    DescriptionError, Entry, Limits, Table, did_you_mean, number, quoted, with_unit,
+};
 use super::structure::along;
 use super::{
-    BeamDescription, MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm,
-    SensorDescription, keys,
+    BeamDescription, ChannelPlace, ChannelRef, HammerDescription, MeasuredFrequencies, PointMass,
+    RecordingDescription, ResponseForm, Scale, SensorDescription, SensorKind, keys,
 };
 use std::collections::BTreeMap;
-use std::ops::Bound;
 use tapjoint_numerics::quantity::Dimension;
+
+/// Words of `kind` in `[[sensor]]`.
+pub const SENSOR_KINDS: [(&str, SensorKind); 4] = [
+    ("acceleration", SensorKind::Acceleration),
+    ("velocity", SensorKind::Velocity),
+    ("displacement", SensorKind::Displacement),
+    ("sound", SensorKind::Sound),
+];
+/// No recorder writes more channels into one file.
+const CHANNELS: Limits = Limits::between(
+    1.0,
+    4096.0,
+    "channels count from 1, a time column does not count",
+);
+const SCALE: Limits = Limits::between(
+    -1e15,
+    1e15,
+    "give SI units per unit of the file; a negative scale turns the direction",
+);
+const SENSOR_MASS: Limits = Limits::between(
+    0.0,
+    1e3,
+    "give the data sheet's mass in kg, or with its unit: \"24 g\"",
+);
+
+/// Reads `[hammer]`.
+pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, DescriptionError> {
+    let channel = table.need("channel", "the hammer's channel", "channel = 1")?;
+    Ok(HammerDescription {
+        channel: read_channel(&channel)?,
+        place: place_of(&channel),
+        scale: read_scale(table, Dimension::Force, Dimension::ForceSensitivity)?,
+    })
+}
+
+/// Adds a name or a channel to those that are `taken`, each with its line, unless it is one of them. `words` name it in
+/// a message.
+fn take<T: PartialEq>(
+    taken: &mut Vec<(T, usize)>,
+    value: T,
+    words: &str,
+    entry: &Entry<'_>,
+    remedy: &str,
+) -> Result<(), DescriptionError> {
+    if let Some((_, first_line)) = taken.iter().find(|(other, _)| *other == value) {
+        return Err(entry.taken(words, *first_line, remedy));
+    }
+    taken.push((value, entry.line));
+    Ok(())
+}
+
+/// Reads all `[[sensor]]` tables. `hammer` is the entry of the hammer's channel.
+pub(super) fn read_sensors(
+    entries: &[Entry<'_>],
+    hammer: Option<&Entry<'_>>,
+    beam: &BeamDescription,
+) -> Result<Vec<SensorDescription>, DescriptionError> {
+    let mut sensors: Vec<SensorDescription> = Vec::new();
+    let (mut names, mut channels) = (Vec::new(), Vec::new());
+    if let Some(entry) = hammer {
+        channels.push((read_channel(entry)?, entry.line));
+    }
+    for entry in entries {
+        let table = entry.table(&keys::SENSOR)?;
+        let sensor = read_sensor(&table, beam)?;
+        let name = table.get("name");
+        let name = name.as_ref().unwrap_or(entry);
+        let words = format!("the name \"{}\"", sensor.name);
+        let remedy = "give each sensor a name of its own";
+        take(&mut names, sensor.name.clone(), &words, name, remedy)?;
+        let channel = table.get("channel");
+        let channel = channel.as_ref().unwrap_or(name);
+        let words = format!("channel {}", sensor.channel);
+        let remedy = "give each sensor, and the hammer, a channel of its own";
+        take(
+            &mut channels,
+            sensor.channel.clone(),
+            &words,
+            channel,
+            remedy,
+        )?;
+        sensors.push(sensor);
+    }
+    Ok(sensors)
+}
+
+fn read_sensor(
+    table: &Table<'_>,
+    beam: &BeamDescription,
+) -> Result<SensorDescription, DescriptionError> {
+    let named = table.need("name", "a name", "name = \"A\"")?;
+    let name = named.text("a name such as \"A\"")?;
+    let kind = table.choice("kind", &SENSOR_KINDS)?;
+    let kind = kind.unwrap_or(SensorKind::Acceleration);
+    let channel = table.optional("channel", read_channel)?;
+    let (signal, sensitivity) = match kind {
+        SensorKind::Acceleration => (Dimension::Acceleration, Dimension::AccelerationSensitivity),
+        SensorKind::Velocity => (Dimension::Velocity, Dimension::VelocitySensitivity),
+        SensorKind::Displacement => (Dimension::Length, Dimension::DisplacementSensitivity),
+        SensorKind::Sound => (Dimension::Pressure, Dimension::PressureSensitivity),
+    };
+    let sensor = SensorDescription {
+        channel: channel.unwrap_or_else(|| ChannelRef::Name(name.clone())),
+        place: place_of(&table.get("channel").unwrap_or(named)),
+        name,
+        scale: read_scale(table, signal, sensitivity)?,
+        position: table.optional("position", |entry| match kind {
+            // A microphone stands beside the beam, perhaps beyond its end.
+            SensorKind::Sound => entry.quantity(Dimension::Length),
+            _ => entry.within(Dimension::Length, &along(beam.length)),
+        })?,
+        mass: table.within("mass", Dimension::Mass, &SENSOR_MASS)?,
+        kind,
+    };
+    if let Some((entry, mass)) = table.get("mass").zip(sensor.mass) {
+        if kind == SensorKind::Sound {
+            entry.warn("has no effect; a microphone does not sit on the beam; remove `mass`");
+        } else {
+            check_weight(&entry, mass, beam, "did you mean g? Write \"24 g\"");
+        }
+    }
+    Ok(sensor)
+}
+
+/// Warns of what weighs (kg) more than the beam itself.
+fn check_weight(entry: &Entry<'_>, mass: f64, beam: &BeamDescription, question: &str) {
+    let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
+    if mass > beam_mass {
+        let usual = format!("less than the beam's {}", with_unit(beam_mass, "kg"));
+        entry.unusual(mass, "kg", &usual, question);
+    }
+}
+
+/// Warns of each mass without a place in some recording, or in the description if there is no recording.
+///
+/// A mass acts on the beam where it sits. Without a place only the diagnosis can use it.
+pub(super) fn check_places(
+    entries: &[Entry<'_>],
+    sensors: &[SensorDescription],
+    recordings: &[RecordingDescription],
+) -> Result<(), DescriptionError> {
+    for (entry, sensor) in entries.iter().zip(sensors) {
+        let is_placed = match recordings {
+            [] => sensor.position.is_some(),
+            all => all.iter().all(|one| one.place_of(sensor).is_some()),
+        };
+        let mass = entry.table(&keys::SENSOR)?.get("mass");
+        if let Some(mass) = mass.filter(|_| !is_placed && sensor.kind != SensorKind::Sound) {
+            mass.warn(
+                "has no `position`: the diagnosis tries places along the beam, prediction and estimate leave the mass \
+                 out; add `position` (m along the beam) if it is known",
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Returns the place that names a channel.
+fn place_of(entry: &Entry<'_>) -> ChannelPlace {
+    ChannelPlace {
+        line: entry.line,
+        key: entry.path.clone(),
+    }
+}
+
+fn read_channel(entry: &Entry<'_>) -> Result<ChannelRef, DescriptionError> {
+    match entry.as_text() {
+        Some(_) => Ok(ChannelRef::Name(
+            entry.text("a channel number or a column's name")?,
+        )),
+        None => Ok(ChannelRef::Number(entry.count(&CHANNELS)?)),
+    }
+}
+
+/// Reads the scale, or the scale that follows from a sensitivity: SI = volts / sensitivity.
+fn read_scale(
+    table: &Table<'_>,
+    signal: Dimension,
+    sensitivity: Dimension,
+) -> Result<Option<Scale>, DescriptionError> {
+    match (table.get("scale"), table.get("sensitivity")) {
+        (Some(_), Some(entry)) => Err(entry.error(
+            "`scale` and `sensitivity` say the same thing twice; keep `scale` (SI units per unit of the file) or \
+             `sensitivity` (files in volts)",
+        )),
+        (Some(entry), None) => Ok(Some(Scale::PerUnit(nonzero(&entry, signal)?))),
+        (None, Some(entry)) => {
+            let volts = nonzero(&entry, sensitivity)?;
+            let scale = volts.recip();
+            if scale.abs() > 1e15 {
+                let allowed = Limits::between(-1e15, 1e15, "check the sensitivity's exponent");
+                return Err(entry.out_of_range(volts, sensitivity.si_unit(), &allowed));
+            }
+            Ok(Some(Scale::PerVolt(scale)))
+        }
+        (None, None) => Ok(None),
+    }
+}
+
+fn nonzero(entry: &Entry<'_>, dimension: Dimension) -> Result<f64, DescriptionError> {
+    let value = entry.within(dimension, &SCALE)?;
+    if value != 0.0 {
+        return Ok(value);
+    }
+    let remedy = "remove the key for a scale of 1";
+    Err(entry.impossible(value, dimension.si_unit(), "any number but zero", remedy))
+}
 
 /// Words of `form` in `[[recording]]`.
 pub const FORMS: [(&str, ResponseForm); 3] = [
@@ -32,7 +238,11 @@ const SAMPLE_RATE: Limits = Limits::between(
 );
 const BAND_EDGE: Limits =
     Limits::between(0.0, 1e8, "write two frequencies in Hz: `band = [0, 200]`");
-const LEVEL: Limits = Limits::positive(1e3, "give how many times as hard as level 1 it is struck");
+const LEVEL: Limits = Limits::above(
+    0.0,
+    1e3,
+    "give how many times as hard as level 1 it is struck",
+);
 const TORQUE: Limits = Limits::between(0.0, 1e9, "give the tightening torque in N m");
 const TEMPERATURE: Limits = Limits::between(
     -273.15,
@@ -41,53 +251,71 @@ const TEMPERATURE: Limits = Limits::between(
 );
 
 /// Largest mass that is fastened to a beam for a test; the heaviest beams take more than a kilogram.
-const FASTENED_MASS: Limits = Limits::positive(
+const FASTENED_MASS: Limits = Limits::above(
+    0.0,
     1e3,
     "give what it weighs in kg, or with its unit: \"50 g\"; leave the table out where nothing is fastened",
 );
 
-/// Beam and sensors that the recordings refer to.
-pub(super) struct Surroundings<'s> {
-    pub(super) beam: &'s BeamDescription,
-    pub(super) sensors: &'s [SensorDescription],
-}
-
 /// Reads one `[[recording]]`.
 pub(super) fn read_recording(
     entry: &Entry<'_>,
-    surroundings: &Surroundings<'_>,
+    beam: &BeamDescription,
+    sensors: &[SensorDescription],
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
     let file = table.need("file", "a file", "file = \"taps.wav\"")?;
-    let position = along(surroundings.beam.length);
-    let at = table.optional("at", |entry| read_moves(entry, surroundings))?;
+    let position = along(beam.length);
+    let mut at = BTreeMap::new();
+    if let Some(entry) = table.get("at") {
+        let moves = entry.free_table("a table of sensors and positions such as { A = 0.20 }")?;
+        for (name, entry) in moves.all() {
+            check_sensor(name, &entry, sensors)?;
+            at.insert(name.to_owned(), entry.within(Dimension::Length, &position)?);
+        }
+    }
     let masses: Option<Vec<_>> = table.optional("mass", |entry| {
         let wanted = "a list of tables, each under its own header [[recording.mass]],";
         let entries = entry.list(wanted)?;
         entries
             .iter()
-            .map(|entry| read_fastened(entry, surroundings.beam))
+            .map(|entry| read_fastened(entry, beam))
             .collect()
     })?;
-    let (form, sensor) = read_form(&table, surroundings)?;
+    let form = table.choice("form", &FORMS)?;
+    let sensor = table.optional("sensor", |entry| {
+        let name = entry.text("a sensor's name such as \"A\"")?;
+        check_sensor(&name, entry, sensors)?;
+        Ok(name)
+    })?;
+    match (table.get("form"), table.get("sensor")) {
+        (Some(entry), None) if sensors.len() > 1 => {
+            return Err(entry.error(
+                "a response function belongs to one sensor, and several are declared; add `sensor = \"A\"`",
+            ));
+        }
+        (None, Some(entry)) => {
+            return Err(entry.error(
+                "`sensor` names the sensor of a response function, and `form` is missing; add `form = \
+                 \"accelerance\"`, or remove `sensor`: a time recording finds its sensors by channel",
+            ));
+        }
+        _ => {}
+    }
     Ok(RecordingDescription {
         file: file.text("a file such as \"taps.wav\"")?.into(),
         line: file.line,
-        tap: table.optional("tap", |entry| entry.within(Dimension::Length, &position))?,
-        level: table.optional("level", |entry| entry.within(Dimension::Ratio, &LEVEL))?,
+        tap: table.within("tap", Dimension::Length, &position)?,
+        level: table.within("level", Dimension::Ratio, &LEVEL)?,
         band: table.optional("band", read_band)?,
         block: table.optional("block", |entry| entry.count(&BLOCK))?,
-        at: at.unwrap_or_default(),
+        at,
         masses: masses.unwrap_or_default(),
-        sample_rate: table.optional("sample_rate", |entry| {
-            entry.within(Dimension::Rate, &SAMPLE_RATE)
-        })?,
+        sample_rate: table.within("sample_rate", Dimension::Rate, &SAMPLE_RATE)?,
         form,
         sensor,
-        torque: table.optional("torque", |entry| entry.within(Dimension::Torque, &TORQUE))?,
-        temperature: table.optional("temperature", |entry| {
-            entry.within(Dimension::Temperature, &TEMPERATURE)
-        })?,
+        torque: table.within("torque", Dimension::Torque, &TORQUE)?,
+        temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
     })
 }
@@ -95,37 +323,16 @@ pub(super) fn read_recording(
 fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {
     let edges = entry.list("two frequencies such as [0, 200] (Hz)")?;
     let [low, high] = edges.as_slice() else {
-        return Err(entry.error(DescriptionProblem::Count {
-            found: edges.len(),
-            allowed: "2, the lower and the upper edge in Hz".to_owned(),
-            remedy: "write `band = [0, 200]`",
-        }));
+        let allowed = "2, the lower and the upper edge in Hz";
+        return Err(entry.wrong_count(edges.len(), allowed, "write `band = [0, 200]`"));
     };
     let low = low.within(Dimension::Frequency, &BAND_EDGE)?;
     let upper = high.within(Dimension::Frequency, &BAND_EDGE)?;
     if upper > low {
         return Ok((low, upper));
     }
-    let above = Limits {
-        low: Bound::Excluded(low),
-        high: BAND_EDGE.high,
-        remedy: "write the lower edge first: `band = [0, 200]`",
-    };
-    Err(high.out_of_range(upper, "Hz", &above))
-}
-
-fn read_moves(
-    entry: &Entry<'_>,
-    surroundings: &Surroundings<'_>,
-) -> Result<BTreeMap<String, f64>, DescriptionError> {
-    let table = entry.free_table("a table of sensors and positions such as { A = 0.20 }")?;
-    let position = along(surroundings.beam.length);
-    let mut moves = BTreeMap::new();
-    for (name, entry) in table.all() {
-        check_sensor(name, &entry, surroundings.sensors)?;
-        moves.insert(name.to_owned(), entry.within(Dimension::Length, &position)?);
-    }
-    Ok(moves)
+    let remedy = "write the lower edge first: `band = [0, 200]`";
+    Err(high.out_of_range(upper, "Hz", &Limits::above(low, BAND_EDGE.high, remedy)))
 }
 
 fn read_fastened(entry: &Entry<'_>, beam: &BeamDescription) -> Result<PointMass, DescriptionError> {
@@ -134,20 +341,8 @@ fn read_fastened(entry: &Entry<'_>, beam: &BeamDescription) -> Result<PointMass,
     let weight = table.need("mass", "what it weighs (kg)", "mass = \"50 g\"")?;
     let position = position.within(Dimension::Length, &along(beam.length))?;
     let mass = weight.within(Dimension::Mass, &FASTENED_MASS)?;
-    let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
-    if mass > beam_mass {
-        weight.warn(Doubt::Implausible {
-            value: mass,
-            unit: "kg",
-            usual: format!("less than the beam's {}", with_unit(beam_mass, "kg")),
-            question: "did you mean g? Write \"50 g\"",
-        });
-    }
-    Ok(PointMass {
-        position,
-        mass,
-        inertia: 0.0,
-    })
+    check_weight(&weight, mass, beam, "did you mean g? Write \"50 g\"");
+    Ok(PointMass::new(position, mass))
 }
 
 fn check_sensor(
@@ -155,54 +350,36 @@ fn check_sensor(
     entry: &Entry<'_>,
     sensors: &[SensorDescription],
 ) -> Result<(), DescriptionError> {
-    let known: Vec<String> = sensors.iter().map(|sensor| sensor.name.clone()).collect();
-    if known.iter().any(|sensor| sensor == name) {
+    let known: Vec<&str> = sensors.iter().map(|sensor| sensor.name.as_str()).collect();
+    if known.contains(&name) {
         return Ok(());
     }
-    let nearest = keys::nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
-    Err(entry.error(DescriptionProblem::UnknownSensor {
-        name: name.to_owned(),
-        known,
-        nearest,
-    }))
+    let listed = match known[..] {
+        [] => "none is declared; add a [[sensor]] of that name".to_owned(),
+        _ => quoted(&known),
+    };
+    let meant = did_you_mean(name, &known);
+    Err(entry.error(format!(
+        "no sensor is called \"{name}\"; sensors: {listed}{meant}"
+    )))
 }
 
-/// Reads form and sensor of a file that holds a frequency response function.
-fn read_form(
-    table: &Table<'_>,
-    surroundings: &Surroundings<'_>,
-) -> Result<(Option<ResponseForm>, Option<String>), DescriptionError> {
-    let form = table.optional("form", |entry| entry.choice(&FORMS))?;
-    let sensor = table.optional("sensor", |entry| {
-        let name = entry.text("a sensor's name such as \"A\"")?;
-        check_sensor(&name, entry, surroundings.sensors)?;
-        Ok(name)
-    })?;
-    match (table.get("form"), table.get("sensor")) {
-        (Some(entry), None) if surroundings.sensors.len() > 1 => Err(entry.conflict(
-            "a response function belongs to one sensor, and several are declared",
-            "add `sensor = \"A\"`",
-        )),
-        (None, Some(entry)) => Err(entry.conflict(
-            "`sensor` names the sensor of a response function, and `form` is missing",
-            "add `form = \"accelerance\"`, or remove `sensor`: a time recording finds its sensors by channel",
-        )),
-        _ => Ok((form, sensor)),
-    }
-}
-
-const FREQUENCY: Limits =
-    Limits::positive(1e9, "natural frequencies in Hz, rigid-body modes left out");
-const HALF_LINE: Limits = Limits::positive(
+const FREQUENCY: Limits = Limits::above(
+    0.0,
+    1e9,
+    "natural frequencies in Hz, rigid-body modes left out",
+);
+const HALF_LINE: Limits = Limits::above(
+    0.0,
     1e9,
     "half the line spacing in Hz; leave it out when the resolution is unknown",
 );
-const STD: Limits = Limits::positive(1e9, "one standard deviation in Hz");
-const SCATTER: Limits = Limits {
-    low: Bound::Excluded(0.0),
-    high: Bound::Excluded(1.0),
-    remedy: "give the repeatability as a share of the frequency: \"0.3 %\"",
-};
+const STD: Limits = Limits::above(0.0, 1e9, "one standard deviation in Hz");
+const SCATTER: Limits = Limits::inside(
+    0.0,
+    1.0,
+    "give the repeatability as a share of the frequency: \"0.3 %\"",
+);
 /// Beam theory does not describe higher modes.
 const MODE: Limits = Limits::between(
     1.0,
@@ -218,11 +395,8 @@ pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, De
     let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
     if items.is_empty() {
-        return Err(entry.error(DescriptionProblem::Count {
-            found: 0,
-            allowed: "at least 1".to_owned(),
-            remedy: "list the natural frequencies in Hz, lowest first",
-        }));
+        let remedy = "list the natural frequencies in Hz, lowest first";
+        return Err(entry.wrong_count(0, "at least 1", remedy));
     }
     let frequencies = items
         .iter()
@@ -231,31 +405,37 @@ pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, De
     check_ascending(&items, &frequencies)?;
     let count = frequencies.len();
     if let (Some(entry), Some(_)) = (table.get("std"), table.get("half_line")) {
-        return Err(entry.conflict(
-            "`half_line` and `std` both state the reading's uncertainty",
-            "keep the one you know; a repeatability beside it goes into `scatter`",
+        return Err(entry.error(
+            "`half_line` and `std` both state the reading's uncertainty; keep the one you know; a repeatability \
+             beside it goes into `scatter`",
         ));
     }
-    let modes = table.optional("modes", |entry| read_modes(entry, count))?;
+    let modes = table.optional("modes", |entry| {
+        let items = one_for_each(entry, "a list of mode numbers such as [1, 2, 4]", count)?;
+        let modes = items
+            .iter()
+            .map(|item| item.count(&MODE))
+            .collect::<Result<Vec<_>, _>>()?;
+        let values: Vec<f64> = modes.iter().map(|mode| *mode as f64).collect();
+        check_ascending(&items, &values)?;
+        Ok(modes)
+    })?;
+    let half_line = table.optional("half_line", |entry| read_bounds(entry, &HALF_LINE, count))?;
+    let std = table.optional("std", |entry| read_bounds(entry, &STD, count))?;
+    let scatter = table.within("scatter", Dimension::Ratio, &SCATTER)?;
+    if let Some((entry, large)) = table.get("scatter").zip(scatter)
+        && large > LARGE_SCATTER
+    {
+        let question = "did you mean percent? Write \"0.3 %\"";
+        entry.unusual(large, "", "0.0001 to 0.03", question);
+    }
     Ok(MeasuredFrequencies {
         frequencies,
         modes: modes.unwrap_or_else(|| (1..=count).collect()),
-        half_line: table.optional("half_line", |entry| read_bounds(entry, &HALF_LINE, count))?,
-        std: table.optional("std", |entry| read_bounds(entry, &STD, count))?,
-        scatter: table.optional("scatter", read_scatter)?,
+        half_line,
+        std,
+        scatter,
     })
-}
-
-fn read_modes(entry: &Entry<'_>, count: usize) -> Result<Vec<usize>, DescriptionError> {
-    let items = entry.list("a list of mode numbers such as [1, 2, 4]")?;
-    check_count(entry, items.len(), count)?;
-    let modes = items
-        .iter()
-        .map(|item| item.count(&MODE))
-        .collect::<Result<Vec<_>, _>>()?;
-    let values: Vec<f64> = modes.iter().map(|mode| *mode as f64).collect();
-    check_ascending(&items, &values)?;
-    Ok(modes)
 }
 
 /// Reads one number for all frequencies, or a list with one for each.
@@ -267,50 +447,36 @@ fn read_bounds(
     if !entry.is_list() {
         return Ok(vec![entry.within(Dimension::Frequency, limits)?; count]);
     }
-    let items = entry.list("a number or a list of numbers (Hz)")?;
-    check_count(entry, items.len(), count)?;
-    items
+    one_for_each(entry, "a number or a list of numbers (Hz)", count)?
         .iter()
         .map(|item| item.within(Dimension::Frequency, limits))
         .collect()
 }
 
-fn read_scatter(entry: &Entry<'_>) -> Result<f64, DescriptionError> {
-    let value = entry.within(Dimension::Ratio, &SCATTER)?;
-    if value > LARGE_SCATTER {
-        entry.warn(Doubt::Implausible {
-            value,
-            unit: "",
-            usual: "0.0001 to 0.03".to_owned(),
-            question: "did you mean percent? Write \"0.3 %\"",
-        });
-    }
-    Ok(value)
-}
-
-fn check_count(
-    entry: &Entry<'_>,
-    found: usize,
+/// Returns the items of a list that has one for each of the `frequencies`.
+fn one_for_each<'t>(
+    entry: &Entry<'t>,
+    wanted: &str,
     frequencies: usize,
-) -> Result<(), DescriptionError> {
-    if found == frequencies {
-        return Ok(());
+) -> Result<Vec<Entry<'t>>, DescriptionError> {
+    let items = entry.list(wanted)?;
+    if items.len() == frequencies {
+        return Ok(items);
     }
-    Err(entry.error(DescriptionProblem::Count {
-        found,
-        allowed: format!("{frequencies}, one for each frequency"),
-        remedy: "make both lists equally long",
-    }))
+    let allowed = format!("{frequencies}, one for each frequency");
+    Err(entry.wrong_count(items.len(), &allowed, "make both lists equally long"))
 }
 
 fn check_ascending(items: &[Entry<'_>], values: &[f64]) -> Result<(), DescriptionError> {
     for (index, (pair, item)) in values.windows(2).zip(items.iter().skip(1)).enumerate() {
         if pair[1] <= pair[0] {
-            return Err(item.error(DescriptionProblem::NotAscending {
-                position: index + 2,
-                value: pair[1],
-                previous: pair[0],
-            }));
+            return Err(item.error(format!(
+                "value {} is {} and follows {}; allowed: ascending values, each once; sort them or remove the repeated \
+                 one",
+                index + 2,
+                number(pair[1]),
+                number(pair[0])
+            )));
         }
     }
     Ok(())

@@ -1,13 +1,14 @@
-//! Beam, joint and effects of the model.
+//! Beam, joint and effects of the model, and the structure that they describe.
 
-use super::error::{DescriptionError, Doubt, with_unit};
-use super::reader::{Entry, Limits, Table};
+use super::reader::{DescriptionError, Entry, Limits, Table, number, with_unit};
 use super::{
     Assembly, BeamDescription, BeamTheory, BeamTolerance, EffectDescription, JointDescription,
-    JointModel, LapOverlap, RightHalf, keys,
+    JointModel, LapOverlap, RightHalf, TestDescription, keys,
 };
 use std::collections::BTreeMap;
-use std::ops::Bound;
+use tapjoint_beam::Beam;
+use tapjoint_beam::beam::DEFAULT_POISSON;
+use tapjoint_beam::specimen::{Joint, LapLayout, Specimen};
 use tapjoint_numerics::quantity::Dimension;
 
 /// A property of a beam with its limits and its usual range.
@@ -31,7 +32,8 @@ const LENGTH: Property = Property {
     wanted: "a length (m)",
     example: "length = \"423 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::positive(
+    limits: Limits::above(
+        0.0,
         1e4,
         "give the free length in m, or with its unit: \"423 mm\"",
     ),
@@ -43,7 +45,7 @@ const WIDTH: Property = Property {
     wanted: "a width (m)",
     example: "width = \"50 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::positive(1e3, "give the width in m, or with its unit: \"50 mm\""),
+    limits: Limits::above(0.0, 1e3, "give the width in m, or with its unit: \"50 mm\""),
     usual: [1e-4, 2.0],
     question: "did you mean mm? Write \"50 mm\"",
 };
@@ -52,7 +54,11 @@ const THICKNESS: Property = Property {
     wanted: "a thickness (m)",
     example: "thickness = \"5 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::positive(1e3, "give the thickness in m, or with its unit: \"5 mm\""),
+    limits: Limits::above(
+        0.0,
+        1e3,
+        "give the thickness in m, or with its unit: \"5 mm\"",
+    ),
     usual: [1e-5, 0.5],
     question: "did you mean mm? Write \"5 mm\"",
 };
@@ -61,7 +67,8 @@ const MODULUS: Property = Property {
     wanted: "Young's modulus (Pa)",
     example: "modulus = \"207 GPa\"",
     dimension: Dimension::Pressure,
-    limits: Limits::positive(
+    limits: Limits::above(
+        0.0,
         1e13,
         "give Young's modulus in Pa, or with its unit: \"207 GPa\"",
     ),
@@ -73,7 +80,8 @@ const DENSITY: Property = Property {
     wanted: "a density (kg/m3)",
     example: "density = 7850",
     dimension: Dimension::Density,
-    limits: Limits::positive(
+    limits: Limits::above(
+        0.0,
         1e5,
         "give the density in kg/m3, or with its unit: \"7.85 g/cm3\"",
     ),
@@ -81,11 +89,7 @@ const DENSITY: Property = Property {
     question: "did you mean g/cm3? Write \"7.85 g/cm3\"",
 };
 /// An isotropic solid is stable only within these limits.
-const POISSON: Limits = Limits {
-    low: Bound::Excluded(-1.0),
-    high: Bound::Included(0.5),
-    remedy: "metals have 0.25 to 0.35; leave it out for 0.3",
-};
+const POISSON: Limits = Limits::above(-1.0, 0.5, "metals have 0.25 to 0.35; leave it out for 0.3");
 /// Smallest length of a slender beam, in thicknesses.
 const STOCKY: f64 = 3.0;
 /// No property of a beam is known better than this (relative).
@@ -99,20 +103,15 @@ pub(super) fn read_beam(table: &Table<'_>) -> Result<BeamDescription, Descriptio
         thickness: needed(table, &THICKNESS)?,
         modulus: needed(table, &MODULUS)?,
         density: needed(table, &DENSITY)?,
-        poisson: read_poisson(table)?,
+        poisson: table.within("poisson", Dimension::Ratio, &POISSON)?,
         tolerance: BeamTolerance::default(),
     };
     let stocky = beam.length < STOCKY * beam.thickness;
     if let Some(entry) = table.get("thickness").filter(|_| stocky) {
-        entry.warn(Doubt::Implausible {
-            value: beam.thickness,
-            unit: "m",
-            usual: format!(
-                "less than a third of the length, {}",
-                with_unit(beam.length, "m")
-            ),
-            question: "did you swap thickness and length, or mix units?",
-        });
+        let length = with_unit(beam.length, "m");
+        let usual = format!("less than a third of the length, {length}");
+        let question = "did you swap thickness and length, or mix units?";
+        entry.unusual(beam.thickness, "m", &usual, question);
     }
     if let Some(entry) = table.get("tolerance") {
         let table = entry.table(&keys::TOLERANCE)?;
@@ -141,18 +140,10 @@ fn read_property(entry: &Entry<'_>, property: &Property) -> Result<f64, Descript
     let [low, high] = property.usual;
     if !(low..=high).contains(&value) {
         let unit = property.dimension.si_unit();
-        entry.warn(Doubt::Implausible {
-            value,
-            unit,
-            usual: format!("{} to {}", with_unit(low, ""), with_unit(high, unit)),
-            question: property.question,
-        });
+        let usual = format!("{} to {}", number(low), with_unit(high, unit));
+        entry.unusual(value, unit, &usual, property.question);
     }
     Ok(value)
-}
-
-fn read_poisson(table: &Table<'_>) -> Result<Option<f64>, DescriptionError> {
-    table.optional("poisson", |entry| entry.within(Dimension::Ratio, &POISSON))
 }
 
 /// Reads the standard uncertainty of a property: absolute ("1 mm") or a share of its `value` ("2 %").
@@ -168,23 +159,16 @@ fn tolerance(
         let text = text.trim_end();
         text.ends_with('%') || text.ends_with("ppm")
     });
-    let limits = Limits {
-        low: Bound::Excluded(0.0),
-        high: Bound::Excluded(if relative { 1.0 } else { value }),
-        remedy: "give one standard deviation, absolute (\"1 mm\") or relative (\"2 %\")",
-    };
+    let remedy = "give one standard deviation, absolute (\"1 mm\") or relative (\"2 %\")";
     let std = if relative {
-        value * entry.within(Dimension::Ratio, &limits)?
+        value * entry.within(Dimension::Ratio, &Limits::inside(0.0, 1.0, remedy))?
     } else {
-        entry.within(property.dimension, &limits)?
+        entry.within(property.dimension, &Limits::inside(0.0, value, remedy))?
     };
     if std < INCREDIBLY_EXACT * value {
-        entry.warn(Doubt::Implausible {
-            value: std,
-            unit: property.dimension.si_unit(),
-            usual: "0.01 % to 10 % of the value".to_owned(),
-            question: "did you mean percent? Write \"2 %\"",
-        });
+        let usual = "0.01 % to 10 % of the value";
+        let question = "did you mean percent? Write \"2 %\"";
+        entry.unusual(std, property.dimension.si_unit(), usual, question);
     }
     Ok(Some(std))
 }
@@ -232,7 +216,7 @@ const OVERLAP_MASS: Limits = Limits::between(
 /// Reads `[joint]`. `right` is the entry `[beam.right]`, `length` that of the whole beam.
 pub(super) fn read_joint(
     table: &Table<'_>,
-    right: Option<&Entry<'_>>,
+    right: Option<Entry<'_>>,
     length: f64,
 ) -> Result<JointDescription, DescriptionError> {
     let kind = table
@@ -240,43 +224,45 @@ pub(super) fn read_joint(
         .choice(&ASSEMBLIES)?;
     let stiffness = ["kt", "kr", "ktr"].iter().find_map(|key| table.get(key));
     if let Some(entry) = stiffness.filter(|_| kind == Assembly::Free) {
-        return Err(entry.conflict(
-            "a free beam has no joint and so no joint stiffness",
-            "remove it, or set `kind` to \"cantilever\" or \"lap\"",
+        return Err(entry.error(
+            "a free beam has no joint and so no joint stiffness; remove it, or set `kind` to \"cantilever\" or \"lap\"",
         ));
     }
     let model = read_model(table, kind)?;
-    let beam = table.optional("beam", |entry| entry.choice(&THEORIES))?;
+    let beam = table.choice("beam", &THEORIES)?;
+    let (mut position, mut overlap) = (None, None);
+    if kind == Assembly::Lap {
+        (position, overlap) = read_lap(table, length)?;
+    } else if let Some(entry) = table.get("position").or_else(|| table.get("overlap")) {
+        return Err(
+            entry.error("only a lap joint sits along the beam; remove it, or set `kind = \"lap\"`")
+        );
+    }
     let mut joint = JointDescription {
         kind,
         model,
-        kt: None,
-        kr: None,
-        ktr: None,
+        kt: read_stiffness(table, "kt", Dimension::TranslationalStiffness, &STIFFNESS)?,
+        kr: read_stiffness(table, "kr", Dimension::RotationalStiffness, &STIFFNESS)?,
+        ktr: read_stiffness(table, "ktr", Dimension::CouplingStiffness, &COUPLING)?,
         beam: beam.unwrap_or(BeamTheory::Timoshenko),
-        position: None,
-        overlap: None,
+        position,
+        overlap,
         right: None,
     };
-    match kind {
-        Assembly::Lap => read_lap(table, &mut joint, length)?,
-        Assembly::Cantilever | Assembly::Free => {
-            let stray = ["position", "overlap"]
-                .iter()
-                .find_map(|key| table.get(key));
-            if let Some(entry) = stray {
-                return Err(entry.conflict(
-                    "only a lap joint sits along the beam",
-                    "remove it, or set `kind = \"lap\"`",
-                ));
-            }
-        }
-    }
-    joint.kt = read_stiffness(table, "kt", Dimension::TranslationalStiffness, &STIFFNESS)?;
-    joint.kr = read_stiffness(table, "kr", Dimension::RotationalStiffness, &STIFFNESS)?;
-    joint.ktr = read_stiffness(table, "ktr", Dimension::CouplingStiffness, &COUPLING)?;
     if let Some(entry) = right {
-        joint.right = Some(read_right(entry, kind)?);
+        if kind != Assembly::Lap {
+            return Err(entry.error(
+                "only a lap joint has a right half; remove [beam.right], or set `kind = \"lap\"` in [joint]",
+            ));
+        }
+        let table = entry.table(&keys::RIGHT)?;
+        joint.right = Some(RightHalf {
+            width: optional(&table, &WIDTH)?,
+            thickness: optional(&table, &THICKNESS)?,
+            modulus: optional(&table, &MODULUS)?,
+            density: optional(&table, &DENSITY)?,
+            poisson: table.within("poisson", Dimension::Ratio, &POISSON)?,
+        });
     }
     if let Some((entry, ktr)) = table.get("ktr").zip(joint.ktr) {
         check_coupling(&entry, ktr, &joint)?;
@@ -289,86 +275,52 @@ fn read_model(table: &Table<'_>, kind: Assembly) -> Result<JointModel, Descripti
         return Ok(JointModel::TwoParameter);
     };
     match (entry.choice(&MODELS)?, kind) {
-        (Some(JointModel::ThreeParameter), Assembly::Lap) => Err(entry.conflict(
-            "a lap joint has two stiffnesses, \"2p\" is allowed; the third cancels by symmetry",
-            "write `model = \"2p\"`, or leave it out",
+        (Some(JointModel::ThreeParameter), Assembly::Lap) => Err(entry.error(
+            "a lap joint has two stiffnesses, \"2p\" is allowed; the third cancels by symmetry; write `model = \"2p\"`, \
+             or leave it out",
         )),
         (Some(JointModel::ThreeParameter), Assembly::Free) => {
-            Err(entry.conflict("a free beam has no joint to model", "remove `model`"))
+            Err(entry.error("a free beam has no joint to model; remove `model`"))
         }
-        (None, Assembly::Cantilever | Assembly::Lap) => Err(entry.conflict(
-            "only a free beam has no joint model",
-            "write `model = \"2p\"` or \"3p\"",
+        (None, Assembly::Cantilever | Assembly::Lap) => Err(entry.error(
+            "only a free beam has no joint model; write `model = \"2p\"` or \"3p\"",
         )),
         (Some(JointModel::TwoParameter), Assembly::Free) => {
-            let reason = "a free beam has no joint to model; remove `model`";
-            entry.warn(Doubt::NoMeaning { reason });
+            entry.warn("has no effect; a free beam has no joint to model; remove `model`");
             Ok(JointModel::TwoParameter)
         }
         (model, _) => Ok(model.unwrap_or(JointModel::TwoParameter)),
     }
 }
 
-/// Reads place and overlap of a lap joint.
+/// Reads place (m) and overlap of a lap joint.
 fn read_lap(
     table: &Table<'_>,
-    joint: &mut JointDescription,
     length: f64,
-) -> Result<(), DescriptionError> {
-    let inside = Limits {
-        low: Bound::Excluded(0.0),
-        high: Bound::Excluded(length),
-        remedy: "measure from the left end of the whole beam; half the length is the default",
-    };
-    joint.position =
-        table.optional("position", |entry| entry.within(Dimension::Length, &inside))?;
+) -> Result<(Option<f64>, Option<LapOverlap>), DescriptionError> {
+    let remedy = "measure from the left end of the whole beam; half the length is the default";
+    let inside = Limits::inside(0.0, length, remedy);
+    let position = table.within("position", Dimension::Length, &inside)?;
     let Some(entry) = table.get("overlap") else {
-        return Ok(());
+        return Ok((position, None));
     };
-    let overlap = read_overlap(&entry, length)?;
-    let place = joint.position.unwrap_or(0.5 * length);
-    if 0.5 * overlap.length > place.min(length - place) {
-        return Err(entry.conflict(
-            "half of the overlap reaches beyond an end of the beam",
-            "the overlap lies about the joint's `position`: shorten it, or move the joint",
-        ));
-    }
-    joint.overlap = Some(overlap);
-    Ok(())
-}
-
-fn read_overlap(entry: &Entry<'_>, length: f64) -> Result<LapOverlap, DescriptionError> {
     let table = entry.table(&keys::OVERLAP)?;
-    let shorter = Limits {
-        low: Bound::Included(0.0),
-        high: Bound::Excluded(length),
-        remedy: "the overlap is a part of the beam's length",
-    };
     let example = "overlap = { length = \"40 mm\", mass = \"50 g\" }";
-    let length = table.need("length", "the length of the overlap (m)", example)?;
+    let long = table.need("length", "the length of the overlap (m)", example)?;
     let mass = table.need("mass", "the mass added by overlap and bolts (kg)", example)?;
-    Ok(LapOverlap {
-        length: length.within(Dimension::Length, &shorter)?,
+    let shorter = Limits::below(0.0, length, "the overlap is a part of the beam's length");
+    let overlap = LapOverlap {
+        length: long.within(Dimension::Length, &shorter)?,
         mass: mass.within(Dimension::Mass, &OVERLAP_MASS)?,
-    })
-}
-
-/// Reads `[beam.right]`: the properties that differ in a lap joint's right half.
-fn read_right(entry: &Entry<'_>, kind: Assembly) -> Result<RightHalf, DescriptionError> {
-    if kind != Assembly::Lap {
-        return Err(entry.conflict(
-            "only a lap joint has a right half",
-            "remove [beam.right], or set `kind = \"lap\"` in [joint]",
+    };
+    let place = position.unwrap_or(0.5 * length);
+    if 0.5 * overlap.length > place.min(length - place) {
+        return Err(entry.error(
+            "half of the overlap reaches beyond an end of the beam; the overlap lies about the joint's `position`: \
+             shorten it, or move the joint",
         ));
     }
-    let table = entry.table(&keys::RIGHT)?;
-    Ok(RightHalf {
-        width: optional(&table, &WIDTH)?,
-        thickness: optional(&table, &THICKNESS)?,
-        modulus: optional(&table, &MODULUS)?,
-        density: optional(&table, &DENSITY)?,
-        poisson: read_poisson(&table)?,
-    })
+    Ok((position, Some(overlap)))
 }
 
 fn read_stiffness(
@@ -393,34 +345,30 @@ fn check_coupling(
     joint: &JointDescription,
 ) -> Result<(), DescriptionError> {
     if joint.model == JointModel::TwoParameter {
-        return Err(entry.conflict(
-            "the two-parameter model has no coupling stiffness",
-            "write `model = \"3p\"` (cantilever), or remove `ktr`",
+        return Err(entry.error(
+            "the two-parameter model has no coupling stiffness; write `model = \"3p\"` (cantilever), or remove `ktr`",
         ));
     }
     if ktr == 0.0 {
-        return Err(entry.conflict(
-            "a coupling stiffness of 0 N/rad would be an infinite compliance",
-            "write \"rigid\" for no coupling",
+        return Err(entry.error(
+            "a coupling stiffness of 0 N/rad would be an infinite compliance; write \"rigid\" for no coupling",
         ));
     }
     if ktr.is_infinite() {
         return Ok(());
     }
     if joint.kt == Some(f64::INFINITY) || joint.kr == Some(f64::INFINITY) {
-        return Err(entry.conflict(
-            "a direction without give cannot be coupled to the other",
-            "write `ktr = \"rigid\"`, or a finite `kt` and `kr`",
+        return Err(entry.error(
+            "a direction without give cannot be coupled to the other; write `ktr = \"rigid\"`, or a finite `kt` and \
+             `kr`",
         ));
     }
     match joint.kt.zip(joint.kr) {
-        Some((kt, kr)) if ktr * ktr <= kt * kr => {
-            let limit = with_unit((kt * kr).sqrt(), "N/rad");
-            Err(entry.conflict(
-                format!("a passive joint needs ktr^2 > kt kr, here a size of more than {limit}"),
-                "check the three stiffnesses and their units",
-            ))
-        }
+        Some((kt, kr)) if ktr * ktr <= kt * kr => Err(entry.error(format!(
+            "a passive joint needs ktr^2 > kt kr, here a size of more than {}; check the three stiffnesses and their \
+             units",
+            with_unit((kt * kr).sqrt(), "N/rad")
+        ))),
         _ => Ok(()),
     }
 }
@@ -431,11 +379,7 @@ pub(super) fn read_effect(entry: &Entry<'_>) -> Result<EffectDescription, Descri
     let id = table
         .need("id", "the effect's name", "id = \"sensor-mass\"")?
         .text("an effect such as \"sensor-mass\"")?;
-    let mut effect = EffectDescription {
-        id,
-        values: BTreeMap::new(),
-        line: entry.line,
-    };
+    let mut values = BTreeMap::new();
     for (key, entry) in table.all().filter(|(key, _)| *key != "id") {
         let dimension = match key {
             "mass" => Dimension::Mass,
@@ -446,8 +390,62 @@ pub(super) fn read_effect(entry: &Entry<'_>) -> Result<EffectDescription, Descri
             // Inertias too are plain numbers (kg m2).
             _ => Dimension::Ratio,
         };
-        let value = entry.quantity(dimension)?;
-        effect.values.insert(key.to_owned(), value);
+        values.insert(key.to_owned(), entry.quantity(dimension)?);
     }
-    Ok(effect)
+    Ok(EffectDescription {
+        id,
+        values,
+        line: entry.line,
+    })
+}
+
+/// Returns the beam; for a lap joint the left half's properties and the total length.
+pub fn described_beam(test: &TestDescription) -> Beam {
+    Beam {
+        length: test.beam.length,
+        width: test.beam.width,
+        thickness: test.beam.thickness,
+        modulus: test.beam.modulus,
+        density: test.beam.density,
+        poisson: test.beam.poisson.unwrap_or(DEFAULT_POISSON),
+    }
+}
+
+/// Returns the coupling of a joint (1), sqrt(Kt Kr)/Ktr, from stiffnesses and 1/Ktr in one system of units.
+/// A rigid Ktr gives 0.
+pub fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
+    if cross_compliance == 0.0 {
+        0.0
+    } else {
+        kt.sqrt() * kr.sqrt() * cross_compliance
+    }
+}
+
+/// Returns the differences of a lap joint's halves from two equal pieces; of other structures the default.
+pub fn lap_layout(test: &TestDescription) -> LapLayout {
+    let joint = &test.joint;
+    let left = described_beam(test);
+    LapLayout {
+        position: joint.position,
+        right: joint.right.as_ref().map(|right| Beam {
+            length: left.length,
+            width: right.width.unwrap_or(left.width),
+            thickness: right.thickness.unwrap_or(left.thickness),
+            modulus: right.modulus.unwrap_or(left.modulus),
+            density: right.density.unwrap_or(left.density),
+            poisson: right.poisson.unwrap_or(left.poisson),
+        }),
+        overlap: joint.overlap,
+    }
+}
+
+/// Returns the specimen on this joint, without sensors and without masses of single recordings.
+pub fn described_specimen(test: &TestDescription, joint: Option<Joint>) -> Specimen {
+    Specimen::jointed(
+        test.joint.beam,
+        &described_beam(test),
+        test.joint.kind,
+        &lap_layout(test),
+        joint,
+    )
 }

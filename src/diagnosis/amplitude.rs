@@ -1,13 +1,13 @@
 //! Joints whose stiffness depends on the amplitude: the law that explains how frequencies change along the decays
 //! (the backbone of each mode), and the uncertainty that the changes add to the data.
 
-use crate::dataset::{Dataset, Datum, Observable, chi_square_tail};
+use crate::dataset::{Dataset, Datum, chi_square_tail};
 use crate::evidence::Fit;
 use crate::forward::{Forward, slope_along_decay};
 use crate::joint_motion::JointMotion;
 use crate::result::{AmplitudeDependence, FrequencyChange, LARGEST_STIFFNESS_CHANGE};
+use crate::settings::{CHANGE_BY_CHANCE, LAW_DETECTED};
 use crate::structure::{ModalModel, ROTATION, joint_amplitude};
-use crate::thresholds::{CHANGE_BY_CHANCE, LAW_DETECTED};
 use tapjoint_beam::effects::{JointLaw, JointLawKind};
 use tapjoint_identify::observation::Observations;
 
@@ -122,18 +122,6 @@ impl LawRegression<'_> {
     }
 }
 
-/// Returns the change along a decay that a law predicts.
-fn predicted_slope(
-    dataset: &Dataset,
-    observable: &Observable,
-    models: &[ModalModel],
-    law: &JointLaw,
-) -> f64 {
-    let configuration = observable.configuration;
-    let arrangement = &dataset.arrangements[configuration];
-    slope_along_decay(arrangement, observable.mode, &models[configuration], law)
-}
-
 /// Returns the law that explains the changes along the decays best, with the joint of a fitted model.
 pub fn best_law(dataset: &Dataset, nominal: &Fit) -> Option<LawFit> {
     let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
@@ -151,9 +139,8 @@ fn best_law_of(dataset: &Dataset, models: &[ModalModel], data: &[Datum]) -> Opti
         data,
         predicted: &|law| {
             let slopes = dataset.slopes().map(|row| &dataset.observables[row]);
-            slopes
-                .map(|slope| predicted_slope(dataset, slope, models, law))
-                .collect()
+            let slopes = slopes.map(|slope| slope_along_decay(dataset, slope, models, law));
+            slopes.collect()
         },
     };
     regression.best_law()
@@ -177,7 +164,7 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
     let mut chi_square = 0.0;
     for row in slopes {
         let (observable, datum) = (&dataset.observables[row], dataset.data[row]);
-        let explained = predicted_slope(dataset, observable, &models, &found.law);
+        let explained = slope_along_decay(dataset, observable, &models, &found.law);
         chi_square += datum.gaussian_square(datum.residual(explained));
         let arrangement = &dataset.arrangements[observable.configuration];
         changes.push(FrequencyChange {
@@ -190,56 +177,43 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
         });
     }
     // Size and exponent were fitted.
-    let goodness_of_fit = chi_square_tail(chi_square, count - 2.0);
+    let goodness = chi_square_tail(chi_square, count - 2.0);
+    let (law, std) = (found.law, found.std);
     Some(AmplitudeDependence::new(
-        found.law,
-        found.std,
-        chance,
-        goodness_of_fit,
-        changes,
+        law, std, chance, goodness, changes,
     ))
 }
 
-/// Sets the relative amplitude of the joint's rotation in each configuration. If a tap has no
-/// position, that of the force stays.
-pub fn set_levels(dataset: &mut Dataset, nominal: &Fit) {
-    let Some(models) = Forward::new(dataset, &[]).solve(nominal.parameters()) else {
-        return;
-    };
-    let all: Option<Vec<f64>> = (dataset.arrangements.iter().zip(&models))
-        .map(|(arrangement, one)| {
-            let numbers = (1..=dataset.fitted_modes).filter_map(|mode| one.index(mode));
-            let (tap, level) = (arrangement.tap?, arrangement.level);
-            Some(joint_amplitude(one.modes(), tap, level, numbers))
-        })
-        .collect();
-    let Some(all) = all else { return };
-    let most = all.iter().copied().fold(0.0, f64::max);
-    if most > 0.0 {
-        for (arrangement, amplitude) in dataset.arrangements.iter_mut().zip(&all) {
-            arrangement.level = amplitude / most;
-        }
-    }
-}
-
-/// Sets the motion of the joint in each configuration, over the largest rotation of all, where the
-/// amplitudes of all of them are known; and adds the uncertainty that a changing stiffness makes.
+/// Sets the relative amplitude of the joint's rotation in each configuration; if a tap has no position, that of the
+/// force stays. Sets the motion of the joint, over the largest rotation of all, where the amplitudes of all
+/// configurations are known; and adds the uncertainty that a changing stiffness makes.
 pub fn set_joint_motions(dataset: &mut Dataset, observations: &Observations, nominal: &Fit) {
     let Some(models) = Forward::new(dataset, &[]).solve(nominal.parameters()) else {
         return;
     };
-    let configurations = observations.configurations.iter();
-    let motions: Option<Vec<JointMotion>> = configurations
-        .zip(&dataset.arrangements)
-        .zip(&models)
-        .map(|((observed, arrangement), one)| one.joint_motion(observed, arrangement))
-        .collect();
-    if let Some(motions) = motions {
-        let most = motions.iter().map(JointMotion::peak).fold(0.0, f64::max);
+    let solved = dataset.arrangements.iter().zip(&models);
+    let amplitudes = solved.clone().map(|(arrangement, one)| {
+        let numbers = (1..=dataset.fitted_modes).filter_map(|mode| one.index(mode));
+        let (tap, level) = (arrangement.tap?, arrangement.level);
+        Some(joint_amplitude(one.modes(), tap, level, numbers))
+    });
+    let amplitudes: Option<Vec<f64>> = amplitudes.collect();
+    let motions = observations.configurations.iter().zip(solved);
+    let motions =
+        motions.map(|(observed, (arrangement, one))| one.joint_motion(observed, arrangement));
+    let motions: Option<Vec<JointMotion>> = motions.collect();
+    let amplitudes = amplitudes.unwrap_or_default();
+    let most = amplitudes.iter().copied().fold(0.0, f64::max);
+    for (arrangement, amplitude) in dataset.arrangements.iter_mut().zip(amplitudes) {
         if most > 0.0 {
-            for (arrangement, motion) in dataset.arrangements.iter_mut().zip(motions) {
-                arrangement.joint_motion = Some(motion.over(most));
-            }
+            arrangement.level = amplitude / most;
+        }
+    }
+    let motions = motions.unwrap_or_default();
+    let most = motions.iter().map(JointMotion::peak).fold(0.0, f64::max);
+    for (arrangement, motion) in dataset.arrangements.iter_mut().zip(motions) {
+        if most > 0.0 {
+            arrangement.joint_motion = Some(motion.over(most));
         }
     }
     inflate_changes(dataset, &models);
@@ -268,7 +242,7 @@ fn inflate_changes(dataset: &mut Dataset, models: &[ModalModel]) {
         for (k, &row) in rows.iter().enumerate() {
             let observable = &dataset.observables[row];
             let change = found.map_or(0.0, |one| {
-                predicted_slope(dataset, observable, models, &one.law)
+                slope_along_decay(dataset, observable, models, &one.law)
             });
             data[k] = own[k];
             data[k].inflate_std(CHANGE_MODEL * change.abs().max(own[k].value.abs()));
@@ -301,10 +275,8 @@ fn inflate_shared(dataset: &mut Dataset, models: &[ModalModel], law: &JointLaw) 
         *largest = f64::max(*largest, change);
     }
     let fitted = dataset.observables.iter().zip(&mut dataset.data);
-    let held_out = dataset
-        .holdout
-        .iter_mut()
-        .map(|(one, datum)| (&*one, datum));
+    let held_out = dataset.holdout.iter_mut();
+    let held_out = held_out.map(|(one, datum)| (&*one, datum));
     for (observable, datum) in fitted.chain(held_out) {
         let (configuration, mode) = (observable.configuration, observable.mode);
         let felt = sensitivity(&models[configuration], mode) * changes[configuration];

@@ -1,21 +1,20 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
-use crate::amplitude::{set_joint_motions, set_levels};
+use crate::amplitude::set_joint_motions;
 use crate::dataset::{Dataset, ObservableKind};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
-use crate::fit::{Search, fit_nominal};
+use crate::fit::{Search, add_by_multi_start, fit_nominal};
 use crate::forward::Forward;
-use crate::multi_start::add_by_multi_start;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
-use crate::posterior::{Candidate, set_probabilities};
 use crate::result::{Hypothesis, UnlocatedSensors};
 use crate::settings::{GapError, GapSettings};
-use crate::structure::{Nominal, NominalSensor};
+use crate::structure::Nominal;
 use crate::validate::Residuals;
+use crate::verdict::{Candidate, set_probabilities};
 use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
-use tapjoint_identify::observation::Observations;
+use tapjoint_identify::observation::{Observations, ObservedSensor};
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits of all hypotheses.
@@ -51,7 +50,35 @@ pub struct Test<'a> {
 /// [`GapError::NoFit`] where the nominal model has no fit.
 pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
     let all = at_locations(test, compare_singles);
-    let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
+    // The evidence is averaged over the locations of sensors; fits and residuals are those of the location that
+    // explains most.
+    let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
+    for candidate in &all.first().ok_or(GapError::NoFit)?.candidates {
+        let hypothesis = &candidate.hypothesis;
+        let same = all.iter().filter_map(|one| {
+            let mut candidates = one.candidates.iter();
+            candidates.find(|one| one.hypothesis == *hypothesis)
+        });
+        let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
+        // A fit that failed has no evidence.
+        logs.resize(all.len(), f64::NEG_INFINITY);
+        averages.push((hypothesis.clone(), log_mean(&logs)));
+    }
+    let mut best: Option<(f64, ModelComparison)> = None;
+    for one in all {
+        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
+        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
+        if best.as_ref().is_none_or(|(most, _)| own > *most) {
+            best = Some((own, one));
+        }
+    }
+    let (_, mut comparison) = best.ok_or(GapError::NoFit)?;
+    for candidate in &mut comparison.candidates {
+        let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
+        if let Some((_, log)) = average {
+            candidate.fit.log_evidence = *log;
+        }
+    }
     set_probabilities(&mut comparison.candidates, 0);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
@@ -61,10 +88,13 @@ pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
 /// read with all of them somewhere.
 fn with_sensors(observations: &Observations, nominal: &Nominal) -> Observations {
     let mut filled = observations.clone();
+    let sensors = nominal.sensors.iter().map(|sensor| ObservedSensor {
+        name: sensor.name.clone(),
+        position: sensor.position,
+    });
     for configuration in &mut filled.configurations {
         if configuration.sensors.is_empty() && configuration.recording.is_none() {
-            let sensors = nominal.sensors.iter();
-            configuration.sensors = sensors.map(NominalSensor::observed).collect();
+            configuration.sensors = sensors.clone().collect();
         }
     }
     filled
@@ -97,43 +127,6 @@ fn at_locations<T>(test: Test<'_>, fit: impl Fn(Test<'_>) -> Option<T>) -> Vec<T
     all
 }
 
-/// Averages the evidence over the locations of sensors; fits and residuals are those of the location that explains most.
-fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
-    let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
-    for candidate in &all.first()?.candidates {
-        let hypothesis = &candidate.hypothesis;
-        let same = all.iter().filter_map(|one| {
-            let mut candidates = one.candidates.iter();
-            candidates.find(|one| one.hypothesis == *hypothesis)
-        });
-        let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
-        // A fit that failed has no evidence.
-        logs.resize(all.len(), f64::NEG_INFINITY);
-        let log = if all.len() > 1 {
-            log_mean(&logs)
-        } else {
-            logs[0]
-        };
-        averages.push((hypothesis.clone(), log));
-    }
-    let mut best: Option<(f64, ModelComparison)> = None;
-    for one in all {
-        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
-        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
-        if best.as_ref().is_none_or(|(most, _)| own > *most) {
-            best = Some((own, one));
-        }
-    }
-    let (_, mut best) = best?;
-    for candidate in &mut best.candidates {
-        let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
-        if let Some((_, log)) = average {
-            candidate.fit.log_evidence = *log;
-        }
-    }
-    Some(best)
-}
-
 /// Returns the least chi square of the nominal model over the unknown positions of sensors.
 pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
     let fits = at_locations(test, |test| Some(prepared(test)?.1));
@@ -146,7 +139,6 @@ pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
 fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);
     let first = fit_nominal(&dataset)?;
-    set_levels(&mut dataset, &first);
     set_joint_motions(&mut dataset, test.observations, &first);
     set_shear_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
@@ -187,19 +179,29 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     if !one_stands && !stands(&dataset, &none) {
         add_large_effects(&search, &effects, &mut candidates);
     }
-    if let Some((fit, drift)) = fit_drift(&dataset, &none) {
+    if dataset.first_drift().is_some() {
+        // A joint that differs from set-up to set-up.
+        let (layout, best) = (dataset.layout(&[]), &none.best);
+        let found = LARGE_DRIFTS
+            .map(|drift| over_drifts(&dataset, &layout, &best.priors, &best.optimum, &[drift]));
+        let fit = Fit::of_variants(found.into())?;
+        let drift = fit.best.drifts.first().map(|drift| drift.0);
         let mut candidate = single(EffectId::JointDrift, fit);
-        candidate.drift = Some(drift);
+        candidate.drift = drift;
         candidates.push(candidate);
     }
     if let Some(fit) = fit_unknown(&dataset, &none) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
-    let baseline = fit_exact(&dataset, is_geometry);
-    let baseline = baseline.unwrap_or_else(|| none.clone());
-    let drifting = fit_exact(&dataset, is_described);
-    let drifting = drifting.unwrap_or_else(|| baseline.clone());
-    let described = fit_described(&dataset).unwrap_or_else(|| drifting.clone());
+    let baseline = fit_exact(&dataset, is_geometry).unwrap_or_else(|| none.clone());
+    let drifting = fit_exact(&dataset, is_described).unwrap_or_else(|| baseline.clone());
+    // A joint and a temperature that are the same in all set-ups.
+    let mut alike = dataset.clone();
+    alike.settings.drift_stds = vec![EXACT];
+    let described = fit_exact(&alike, |nuisance| {
+        is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
+    });
+    let described = described.unwrap_or_else(|| drifting.clone());
     candidates.push(Candidate::new(Hypothesis::None, none));
     Some(ModelComparison {
         dataset,
@@ -255,30 +257,19 @@ fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) ->
     fit_nominal(&exact)
 }
 
-/// Fits the described model with a joint and a temperature that are the same in all set-ups.
-fn fit_described(dataset: &Dataset) -> Option<Fit> {
-    let mut dataset = dataset.clone();
-    dataset.settings.drift_stds = vec![EXACT];
-    fit_exact(&dataset, |nuisance| {
-        is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
-    })
-}
-
 /// Returns whether a description states a nuisance parameter.
 fn is_described(nuisance: NuisanceParameter) -> bool {
     use NuisanceParameter::{FastenedMass, SensorInertia, SensorMass};
-    is_geometry(nuisance)
-        || matches!(
-            nuisance,
-            SensorMass { .. } | SensorInertia { .. } | FastenedMass { .. }
-        )
+    let is_mass = matches!(
+        nuisance,
+        SensorMass { .. } | SensorInertia { .. } | FastenedMass { .. }
+    );
+    is_mass || is_geometry(nuisance)
 }
 
 fn is_geometry(nuisance: NuisanceParameter) -> bool {
-    matches!(
-        nuisance,
-        NuisanceParameter::Scale | NuisanceParameter::Shear
-    )
+    use NuisanceParameter::{Scale, Shear};
+    matches!(nuisance, Scale | Shear)
 }
 
 /// Spreads of a discrepancy that no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
@@ -287,9 +278,28 @@ const DISCREPANCIES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
 /// Fits a discrepancy outside the catalogue: every mode's frequency off by an amount of its own,
 /// the same in all configurations, with a tenth of it for each datum and twice of it in the shapes.
 fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
+    let pairs = dataset.observables.iter().zip(&dataset.data);
+    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
+    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
+    let size = root_mean_square(&values);
     let mut found: Vec<LocalOptimum> = Vec::new();
     for spread in DISCREPANCIES {
-        let loose = with_discrepancy(dataset, spread);
+        // No prediction is better than the spread.
+        let mut loose = dataset.clone();
+        for mode in 1..=dataset.fitted_modes {
+            loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
+        }
+        for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
+            let extra = match observable.kind {
+                ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
+                    2.0 * spread * size
+                }
+                // Damping may be anything if the cause is not known.
+                ObservableKind::Damping => 50.0 * spread,
+                ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
+            };
+            datum.std = datum.std.hypot(extra);
+        }
         let forward = Forward::new(&loose, &[]);
         let priors = forward.priors();
         let mut start = nominal.parameters().to_vec();
@@ -299,43 +309,8 @@ fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     Fit::of_variants(found)
 }
 
-/// Returns the data if no prediction is better than `spread`.
-fn with_discrepancy(dataset: &Dataset, spread: f64) -> Dataset {
-    let mut loose = dataset.clone();
-    for mode in 1..=dataset.fitted_modes {
-        loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
-    }
-    let pairs = dataset.observables.iter().zip(&dataset.data);
-    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
-    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
-    let size = root_mean_square(&values);
-    for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
-        let extra = match observable.kind {
-            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => 2.0 * spread * size,
-            // Damping may be anything if the cause is not known.
-            ObservableKind::Damping => 50.0 * spread,
-            ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
-        };
-        datum.std = datum.std.hypot(extra);
-    }
-    loose
-}
-
 /// Spreads of the joint between set-ups that are no longer a nuisance (1).
 const LARGE_DRIFTS: [f64; 3] = [0.04, 0.07, 0.12];
-
-/// Fits the nominal model with a joint that differs from set-up to set-up; returns the spread too.
-fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
-    dataset.first_drift()?;
-    let layout = dataset.layout(&[]);
-    let (priors, optimum) = (&nominal.best.priors, &nominal.best.optimum);
-    let found = LARGE_DRIFTS
-        .into_iter()
-        .map(|drift| over_drifts(dataset, &layout, priors, optimum, &[drift]));
-    let fit = Fit::of_variants(found.collect())?;
-    let (drift, _) = *fit.best.drifts.first()?;
-    Some((fit, drift))
-}
 
 /// Fits the nominal model without the masses that have no position in any recording; `None` where there are none.
 pub fn without_unlocated(test: Test<'_>) -> Option<UnlocatedSensors> {

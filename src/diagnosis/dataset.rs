@@ -11,15 +11,14 @@ use crate::observations::{
     UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
 };
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
-use crate::settings::GapSettings;
+use crate::settings::{DISTINCT_AMPLITUDES, GapSettings};
 use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
-use crate::thresholds::DISTINCT_AMPLITUDES;
 use nalgebra::DMatrix;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
-use tapjoint_numerics::stats::root_mean_square;
+use tapjoint_numerics::stats::{self, root_mean_square};
 
 /// Quantity that is observed and predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,11 +54,6 @@ impl Observable {
             configuration,
             mode,
         }
-    }
-
-    /// Returns another quantity of the same mode.
-    fn with_kind(self, kind: ObservableKind) -> Self {
-        Observable { kind, ..self }
     }
 
     /// Returns whether it is a natural frequency.
@@ -132,7 +126,7 @@ impl Datum {
         if self.freedom >= NORMAL_FREEDOM {
             return -0.5 * residual * residual;
         }
-        -0.5 * (self.freedom + 1.0) * (residual * residual / self.freedom).ln_1p()
+        -0.5 * stats::student::loss(residual, self.freedom)
     }
 
     /// Returns the logarithm of the density at residual 0.
@@ -152,7 +146,7 @@ impl Datum {
         if self.freedom >= NORMAL_FREEDOM {
             return 1.0;
         }
-        (self.freedom + 1.0) / (self.freedom + residual * residual)
+        stats::student::weight(residual, self.freedom)
     }
 
     /// Returns the square of the normal deviate that is as improbable as this residual under Student's t.
@@ -194,7 +188,17 @@ fn moderate(data: &mut [Datum]) {
     let by_chance = estimated.iter().map(|r| trigamma(0.5 * r.freedom));
     let chance = by_chance.sum::<f64>() / count;
     let common_freedom = if scatter > chance {
-        2.0 * inverse_trigamma(scatter - chance)
+        // The x > 0 with psi'(x) = scatter - chance, by bisection in ln x: psi' falls from infinity to 0.
+        let (mut low, mut high) = (1e-4_f64.ln(), 1e4_f64.ln());
+        for _ in 0..80 {
+            let middle: f64 = 0.5 * (low + high);
+            if trigamma(middle.exp()) > scatter - chance {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        2.0 * (0.5 * (low + high)).exp()
     } else {
         // No more scatter than chance: one variance for all, known as well as all together know it.
         estimated.iter().map(|r| r.freedom).sum::<f64>()
@@ -212,11 +216,8 @@ fn moderate(data: &mut [Datum]) {
 
 /// Returns the probability that chi square exceeds a value; `None` without a degree of freedom.
 pub fn chi_square_tail(value: f64, freedom: f64) -> Option<f64> {
-    if freedom < 0.5 || !value.is_finite() {
-        return None;
-    }
-    let chi = ChiSquared::new(freedom).ok()?;
-    Some(chi.sf(value.max(0.0)))
+    let is_known = freedom >= 0.5 && value.is_finite();
+    is_known.then(|| stats::chi_square_tail(value.max(0.0), freedom))
 }
 
 /// Returns psi'(x) by recurrence to x > 6 and the asymptotic series (Abramowitz & Stegun 6.4.12).
@@ -228,20 +229,6 @@ fn trigamma(mut x: f64) -> f64 {
     }
     let y = 1.0 / (x * x);
     sum + 0.5 * y + (1.0 + y * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))) / x
-}
-
-/// Returns the x > 0 with psi'(x) = value, by bisection in ln x: psi' falls from infinity to 0.
-fn inverse_trigamma(value: f64) -> f64 {
-    let (mut low, mut high) = (1e-4_f64.ln(), 1e4_f64.ln());
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if trigamma(middle.exp()) > value {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    (0.5 * (low + high)).exp()
 }
 
 /// Data of a test, with its arrangements and nuisance parameters.
@@ -306,10 +293,10 @@ impl Dataset {
             0
         };
         let mut inventory = Inventory::default();
-        let mut arrangements = Vec::new();
-        for (index, one) in observations.configurations.iter().enumerate() {
-            arrangements.push(Arrangement::new(index, one, nominal, &mut inventory));
-        }
+        let configurations = observations.configurations.iter().enumerate();
+        let arrangements = configurations
+            .map(|(index, one)| Arrangement::new(index, one, nominal, &mut inventory))
+            .collect();
         let mut dataset = Dataset {
             nominal: nominal.clone(),
             arrangements,
@@ -397,14 +384,14 @@ impl Dataset {
                     let mut datum = Datum::new(constant.value, constant.std, constant.freedom);
                     datum.inflate_std(constant.value * constant_model_std(observed));
                     let kind = ObservableKind::Constant { sensor: reference };
-                    constants.push((own.with_kind(kind), datum));
+                    constants.push((Observable { kind, ..own }, datum));
                 }
                 for value in &observed.shape {
                     let sensor = value.sensor;
                     if sensor != reference && is_placed(one, sensor) && value.std > 0.0 {
                         let kind = ObservableKind::Ratio { sensor, reference };
                         let datum = Datum::new(value.value, value.std, observed.freedom);
-                        ratios.push((own.with_kind(kind), datum));
+                        ratios.push((Observable { kind, ..own }, datum));
                     }
                 }
             }
@@ -437,8 +424,9 @@ impl Dataset {
             if weights > 0.0 {
                 let std = weights.powf(-0.5).hypot(self.settings.damping_scatter);
                 let datum = Datum::new(sum / weights, std, None);
+                let kind = ObservableKind::Damping;
                 let own = Observable::frequency(0, mode);
-                self.push(own.with_kind(ObservableKind::Damping), datum);
+                self.push(Observable { kind, ..own }, datum);
                 self.tilts.insert(mode, observed[0].frequency.ln());
             }
         }
@@ -452,12 +440,26 @@ impl Dataset {
     fn add_slopes(&mut self, observations: &Observations) {
         for (configuration, one) in observations.configurations.iter().enumerate() {
             for mode in &one.modes {
-                if let Some(mut datum) = slope_of(mode)
-                    && mode.mode <= self.fitted_modes
-                {
+                let decay = mode.decay.filter(|_| mode.mode <= self.fitted_modes);
+                let decay = decay.filter(|decay| decay.verdict != DecayVerdict::Doubtful);
+                let Some(decay) = decay else { continue };
+                // Between the ends of the followed decay, where their amplitudes are known.
+                let ends = decay.early.amplitude.zip(decay.late.amplitude);
+                let ends =
+                    ends.filter(|(early, late)| *early > DISTINCT_AMPLITUDES * late && *late > 0.0);
+                let followed = decay.frequency_change.zip(ends);
+                let (seen, folds) = followed
+                    .map_or((decay.frequency_slope, 1.0), |(change, (early, late))| {
+                        (change, (early / late).ln())
+                    });
+                let [value, std] = [seen.value, seen.std].map(|part| part / mode.frequency / folds);
+                if std.is_finite() && std > 0.0 {
+                    let mut datum = Datum::new(value, std, seen.freedom);
+                    datum.freedom = datum.freedom.max(3.0);
                     datum.inflate_std(SLOPE_FLOOR);
+                    let kind = ObservableKind::Slope;
                     let own = Observable::frequency(configuration, mode.mode);
-                    self.push(own.with_kind(ObservableKind::Slope), datum);
+                    self.push(Observable { kind, ..own }, datum);
                 }
             }
         }
@@ -474,14 +476,24 @@ impl Dataset {
 
     fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
-            AddedInertia, Amplitude, Scale, Scatter, SensorInertia, SensorMass, Shear,
+            AddedInertia, Amplitude, Damping, DampingTilt, Drift, Gain, Scale, Scatter,
+            SensorInertia, SensorMass, SensorPosition, Shear, TapPosition, Temperature,
         };
+        let setups = self.setups();
+        let position_std = self.settings.position_std;
         let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
         self.add_nuisance(Scale, 0.0, scale);
         if self.nominal.specimen.shear_rotary > 0.0 {
             self.add_nuisance(Shear, 0.0, self.settings.shear_std);
         }
-        self.add_drifts();
+        // The joint's stiffness and the temperature differ between set-ups.
+        for &setup in setups.iter().filter(|_| setups.len() > 1) {
+            for direction in self.nominal.fitted_springs() {
+                let drift = self.settings.drift_stds[0];
+                self.add_nuisance(Drift { setup, direction }, 0.0, drift);
+            }
+            self.add_nuisance(Temperature { setup }, 0.0, self.settings.temperature_std);
+        }
         for configuration in 0..self.arrangements.len() {
             if !self.arrangements[configuration].scatter.is_empty() {
                 self.add_nuisance(Scatter { configuration }, 0.0, 1.0);
@@ -494,8 +506,32 @@ impl Dataset {
             self.add_nuisance(SensorInertia { name }, 0.0, 1.0);
         }
         self.add_nuisance(AddedInertia, 0.0, 1.0);
-        self.add_positions_and_gains(inventory);
-        self.add_damping_level();
+        // Shapes and modal constants depend on positions of sensors and of the taps, and on calibrations.
+        for position in 0..inventory.positions.len() {
+            self.add_nuisance(SensorPosition { position }, 0.0, position_std);
+        }
+        let mut shapes = self.observables.iter().filter(|one| one.is_shape());
+        let has_shapes = shapes.clone().next().is_some();
+        if shapes.any(|one| matches!(one.kind, ObservableKind::Constant { .. })) {
+            for &setup in &setups {
+                self.add_nuisance(TapPosition { setup }, 0.0, position_std);
+            }
+        }
+        for &setup in setups.iter().filter(|_| has_shapes) {
+            for name in 0..inventory.names.len() {
+                self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
+            }
+        }
+        // Level and tilt of the nominal damping ratios, where any was observed.
+        let data = self.observables.iter().zip(&self.data);
+        let data = data.filter(|(observable, _)| observable.is_damping());
+        let logs: Vec<f64> = data.map(|(_, datum)| datum.value).collect();
+        if !logs.is_empty() {
+            // Wide: the damping of a beam is not known beforehand.
+            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+            self.add_nuisance(Damping, mean, 2.0);
+            self.add_nuisance(DampingTilt, 0.0, self.settings.damping_tilt);
+        }
         self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
         for fastened in 0..inventory.fastened.len() {
             self.add_fastened(fastened);
@@ -512,65 +548,8 @@ impl Dataset {
 
     /// Numbers of the set-ups, ascending.
     pub fn setups(&self) -> Vec<usize> {
-        let mut setups: Vec<usize> = self.arrangements.iter().map(|one| one.setup).collect();
-        setups.sort_unstable();
-        setups.dedup();
-        setups
-    }
-
-    /// Adds the joint's stiffness and the temperature, which differ between set-ups.
-    fn add_drifts(&mut self) {
-        let setups = self.setups();
-        if setups.len() > 1 {
-            for setup in setups {
-                for direction in self.nominal.fitted_springs() {
-                    let drift = NuisanceParameter::Drift { setup, direction };
-                    self.add_nuisance(drift, 0.0, self.settings.drift_stds[0]);
-                }
-                let temperature = NuisanceParameter::Temperature { setup };
-                self.add_nuisance(temperature, 0.0, self.settings.temperature_std);
-            }
-        }
-    }
-
-    /// Adds positions of sensors and of the taps, and calibrations, on which shapes and modal constants depend.
-    fn add_positions_and_gains(&mut self, inventory: &Inventory) {
-        use NuisanceParameter::{Gain, SensorPosition, TapPosition};
-        let mut observables = self.observables.iter();
-        let constants = observables.any(|one| matches!(one.kind, ObservableKind::Constant { .. }));
-        let shapes = self.observables.iter().any(Observable::is_shape);
-        for position in 0..inventory.positions.len() {
-            self.add_nuisance(SensorPosition { position }, 0.0, self.settings.position_std);
-        }
-        if constants {
-            for setup in self.setups() {
-                self.add_nuisance(TapPosition { setup }, 0.0, self.settings.position_std);
-            }
-        }
-        if shapes {
-            for setup in self.setups() {
-                for name in 0..inventory.names.len() {
-                    self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
-                }
-            }
-        }
-    }
-
-    /// Adds level and tilt of the nominal damping ratios, where any was observed.
-    fn add_damping_level(&mut self) {
-        let (mut count, mut sum) = (0.0, 0.0);
-        for (observable, datum) in self.observables.iter().zip(&self.data) {
-            if observable.is_damping() {
-                count += 1.0;
-                sum += datum.value;
-            }
-        }
-        if count > 0.0 {
-            // Wide: the damping of a beam is not known beforehand.
-            self.add_nuisance(NuisanceParameter::Damping, sum / count, 2.0);
-            let tilt = self.settings.damping_tilt;
-            self.add_nuisance(NuisanceParameter::DampingTilt, 0.0, tilt);
-        }
+        let setups = self.arrangements.iter().map(|one| one.setup);
+        setups.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     /// Returns the derivative of a frequency with respect to shear and rotary inertia; 0 before it is known.
@@ -675,27 +654,4 @@ impl Dataset {
 fn is_placed(configuration: &Configuration, sensor: usize) -> bool {
     let sensor = configuration.sensors.get(sensor);
     sensor.is_some_and(|sensor| sensor.position.is_some())
-}
-
-/// Returns the change of the logarithm of a frequency per e-fold of the amplitude, between the ends of the followed
-/// decay where their amplitudes are known.
-fn slope_of(mode: &ObservedMode) -> Option<Datum> {
-    let decay = mode.decay?;
-    if decay.verdict == DecayVerdict::Doubtful {
-        return None;
-    }
-    let ends = (decay.early.amplitude, decay.late.amplitude);
-    let (seen, log_amplitude_span) = match (decay.frequency_change, ends) {
-        (Some(change), (Some(early), Some(late)))
-            if early > DISTINCT_AMPLITUDES * late && late > 0.0 =>
-        {
-            (change, (early / late).ln())
-        }
-        _ => (decay.frequency_slope, 1.0),
-    };
-    let [value, std] =
-        [seen.value, seen.std].map(|part| part / mode.frequency / log_amplitude_span);
-    let mut datum = Datum::new(value, std, seen.freedom);
-    datum.freedom = datum.freedom.max(3.0);
-    (std.is_finite() && std > 0.0).then_some(datum)
 }

@@ -8,7 +8,7 @@ use crate::optimum::{
     objective_at,
 };
 use crate::parameters::{CandidateEffect, Layout, Prior, Size};
-use crate::thresholds::POORLY_KNOWN_SIZE;
+use crate::settings::POORLY_KNOWN_SIZE;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -120,21 +120,30 @@ pub fn over_drifts(
         log_evidence: f64::NEG_INFINITY,
         drifts: Vec::new(),
     };
-    let mut all = Vec::new();
     for (k, &drift) in drifts.iter().enumerate() {
         let own = dataset.with_drift(layout, priors, drift);
-        let moved = moved_optimum(&dataset.data, layout, &own, optimum);
+        // The linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
+        // another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
+        let mut held = own.clone();
+        let effects = layout.joint.len()..layout.first_nuisance();
+        let values = &optimum.parameters[effects.clone()];
+        for (prior, value) in held[effects].iter_mut().zip(values) {
+            *prior = Prior::held(*value);
+        }
+        let moved = linear_optimum(&dataset.data, &held, optimum).map_or_else(
+            || optimum.clone(),
+            |moved| Optimum::new(&dataset.data, &own, moved.parameters, moved.model),
+        );
         let log_evidence = log_evidence(&dataset.data, layout, &own, &moved);
-        all.push((drift, log_evidence));
+        best.drifts.push((drift, log_evidence));
         if k == 0 || log_evidence > best.log_evidence {
             best.optimum = moved;
             best.priors = own;
             best.log_evidence = log_evidence;
         }
     }
-    let logs: Vec<f64> = all.iter().map(|one| one.1).collect();
+    let logs: Vec<f64> = best.drifts.iter().map(|one| one.1).collect();
     best.log_evidence = log_mean(&logs);
-    best.drifts = all;
     best
 }
 
@@ -146,23 +155,6 @@ pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<
         slopes: &at.model.slopes,
     };
     maximise(data, priors, &at.parameters, &model)
-}
-
-/// Returns the linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
-/// another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
-fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum) -> Optimum {
-    let mut held = priors.to_vec();
-    let of_effects = layout.joint.len()..layout.first_nuisance();
-    for (prior, value) in held[of_effects.clone()]
-        .iter_mut()
-        .zip(&at.parameters[of_effects])
-    {
-        *prior = Prior::held(*value);
-    }
-    match linear_optimum(data, &held, at) {
-        Some(moved) => Optimum::new(data, priors, moved.parameters, moved.model),
-        None => at.clone(),
-    }
 }
 
 /// Returns the parameters without the last effect, and that effect with a size and a location.
@@ -219,11 +211,17 @@ pub fn log_sum(logs: &[f64]) -> f64 {
 /// effects, accepted only if both stand out, are Gaussian too.
 fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Optimum) -> f64 {
     let free = free_parameters(priors);
-    let locations = free_locations(layout, priors);
     // A tiny effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
     let mut curvature = optimum.curvature.clone();
-    for &(location, range) in &locations {
-        curvature[(location, location)] += 2.0 * PI / (range * range);
+    let mut ranges = Vec::new();
+    for (effect, candidate) in layout.effects.iter().enumerate() {
+        if let (Some(at), Some(range)) = (layout.location(effect), candidate.location)
+            && !priors[at].is_held()
+        {
+            let (low, high) = range.searched_bounds();
+            ranges.push(high - low);
+            curvature[(at, at)] += 2.0 * PI / ((high - low) * (high - low));
+        }
     }
     let Some(factor) = factor_of(&curvature, &free) else {
         return f64::NEG_INFINITY;
@@ -231,15 +229,14 @@ fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Opt
     let mut log = -optimum.objective;
     log += data.iter().map(Datum::log_density_peak).sum::<f64>();
     log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * log_determinant(&factor);
-    let sizes: Vec<usize> = (0..layout.effects.len())
-        .map(|effect| layout.size(effect))
-        .collect();
+    let sizes = 0..layout.effects.len();
+    let sizes: Vec<usize> = sizes.map(|effect| layout.size(effect)).collect();
     for &k in free.iter().filter(|k| !sizes.contains(k)) {
         if priors[k].std.is_finite() {
             log -= 0.5 * (2.0 * PI).ln() + priors[k].std.ln();
         }
     }
-    log -= locations.iter().map(|(_, range)| range.ln()).sum::<f64>();
+    log -= ranges.into_iter().map(f64::ln).sum::<f64>();
     for (effect, &size) in layout.effects.iter().zip(&sizes) {
         let Some(position) = free.iter().position(|&k| k == size) else {
             continue;
@@ -252,20 +249,6 @@ fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Opt
         log += over_size(&effect.size, &priors[size], optimum, size, 1.0 / variance);
     }
     log.min(log_likelihood(data, optimum))
-}
-
-/// Returns the free locations among the parameters, each with the length of its range.
-fn free_locations(layout: &Layout, priors: &[Prior]) -> Vec<(usize, f64)> {
-    let mut all = Vec::new();
-    for (effect, candidate) in layout.effects.iter().enumerate() {
-        if let (Some(at), Some(range)) = (layout.location(effect), candidate.location)
-            && !priors[at].is_held()
-        {
-            let (low, high) = range.searched_bounds();
-            all.push((at, high - low));
-        }
-    }
-    all
 }
 
 /// Returns the logarithm of the likelihood alone. No average of a likelihood over a prior exceeds its largest value.
@@ -307,12 +290,7 @@ fn over_size(prior: &Size, normal: &Prior, optimum: &Optimum, size: usize, curva
 
 /// Returns ln of the integral of prior times likelihood over a range within the size's bounds, by Simpson's
 /// rule on points that crowd at the prior's own peak as well as at the likelihood's.
-fn log_integral(
-    size: &Size,
-    from: f64,
-    to: f64,
-    log_likelihood: impl Fn(f64) -> f64 + Copy,
-) -> f64 {
+fn log_integral(size: &Size, from: f64, to: f64, log_likelihood: impl Fn(f64) -> f64) -> f64 {
     let (from, to) = (from.max(size.low), to.min(size.high));
     if from >= to {
         return f64::NEG_INFINITY;
@@ -326,27 +304,20 @@ fn log_integral(
         }
     }
     cuts.push(to);
-    let pieces: Vec<f64> = cuts
-        .windows(2)
-        .map(|piece| simpson(size, piece[0], piece[1], log_likelihood))
-        .collect();
-    log_sum(&pieces)
-}
-
-fn simpson(size: &Size, from: f64, to: f64, log_likelihood: impl Fn(f64) -> f64) -> f64 {
-    let step = (to - from) / POINTS as f64;
-    let logs: Vec<f64> = (0..=POINTS)
-        .map(|k| {
-            let t = from + step * k as f64;
+    let pieces = cuts.windows(2).map(|piece| {
+        let step = (piece[1] - piece[0]) / POINTS as f64;
+        let logs = (0..=POINTS).map(|k| {
+            let t = piece[0] + step * k as f64;
             let weight: f64 = match k {
                 0 | POINTS => 1.0,
                 k if k % 2 == 1 => 4.0,
                 _ => 2.0,
             };
             weight.ln() + log_likelihood(t) + size.log_density(t.clamp(size.low, size.high))
-        })
-        .collect();
-    log_sum(&logs) + (step / 3.0).ln()
+        });
+        log_sum(&logs.collect::<Vec<_>>()) + (step / 3.0).ln()
+    });
+    log_sum(&pieces.collect::<Vec<_>>())
 }
 
 /// Returns what the profile of the likelihood over the size of a single effect adds to the evidence of its parabola.
@@ -398,7 +369,17 @@ fn profile_gain(
         logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
     }
     let slope = found.optimum.gradient[at];
-    let profile = log_integral(size, from, to, |t| interpolate(&logs, t));
+    // On straight lines between the nodes.
+    let profile = log_integral(size, from, to, |t| {
+        let above = logs
+            .partition_point(|point| point.0 < t)
+            .clamp(1, NODES - 1);
+        let ((t0, y0), (t1, y1)) = (logs[above - 1], logs[above]);
+        if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
+            return f64::NEG_INFINITY;
+        }
+        y0 + (y1 - y0) * (t - t0) / (t1 - t0)
+    });
     let parabola = log_integral(size, from, to, |t| {
         let away = t - here;
         -slope * away - 0.5 * away * away / variance + regularisation(prior, t)
@@ -413,18 +394,6 @@ fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64>
     free.retain(|&k| k != size);
     let factor = factor_of(&optimum.curvature, &free)?;
     Some(-optimum.objective - 0.5 * log_determinant(&factor))
-}
-
-/// Returns the value on straight lines between points.
-fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
-    let above = points
-        .partition_point(|point| point.0 < t)
-        .clamp(1, points.len() - 1);
-    let ((t0, y0), (t1, y1)) = (points[above - 1], points[above]);
-    if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
-        return f64::NEG_INFINITY;
-    }
-    y0 + (y1 - y0) * (t - t0) / (t1 - t0)
 }
 
 #[cfg(test)]

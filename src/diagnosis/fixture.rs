@@ -23,8 +23,8 @@ use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
 use crate::forward::Forward;
 use crate::observations::{DECIBEL, FIXTURE_FREQUENCY_STD, UnpairedPeak};
 use crate::parameters::{LocationKind, Prior};
-use crate::structure::{ModalModel, fixture_strength};
-use crate::thresholds::{FIXTURE_LEVEL, SPLIT_POLE};
+use crate::settings::{FIXTURE_LEVEL, SPLIT_POLE};
+use crate::structure::fixture_strength;
 use std::f64::consts::TAU;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
@@ -80,10 +80,8 @@ impl FixtureMode {
             own.log += frequency.ln() / count;
             own.share += one.modes().base_participation(fixture) / count;
             let sensors: Vec<f64> = arrangement.sensors.iter().map(|s| s.position).collect();
-            let numbers: Vec<usize> = (1..=dataset.fitted_modes)
-                .filter_map(|mode| one.index(mode))
-                .collect();
-            let tap = arrangement.tap;
+            let numbers = (1..=dataset.fitted_modes).filter_map(|mode| one.index(mode));
+            let (numbers, tap) = (numbers.collect::<Vec<_>>(), arrangement.tap);
             let strength = fixture_strength(one.modes(), fixture, &numbers, &sensors, tap);
             own.constants.push(strength.map(|strength| strength.own));
             if let (Some(strength), Some(read)) = (strength, peaks.searched.get(&index)) {
@@ -93,7 +91,12 @@ impl FixtureMode {
             }
         }
         let is_determined = peaks.contains(own.log) && !peaks.is_doubtful(own.log);
-        if !over.is_empty() && is_determined && is_apart(&models, own.log) {
+        // No mode of the beam is so near that both are read as one.
+        let is_apart = models.iter().all(|one| {
+            let mut frequencies = (1..).map_while(|mode| one.frequency(mode));
+            frequencies.all(|frequency| (frequency.ln() - own.log).abs() >= SPLIT_POLE)
+        });
+        if !over.is_empty() && is_determined && is_apart {
             own.over = Some(median(&mut over));
         }
         Some(own)
@@ -146,14 +149,6 @@ fn size_std(found: &LocalOptimum, at: usize) -> f64 {
     let size = found.optimum.parameters[at - 1].abs();
     found.covariance().map_or(f64::INFINITY, |covariance| {
         covariance[(at - 1, at - 1)].max(0.0).sqrt() / size
-    })
-}
-
-/// Returns whether no mode of the beam is so near that both are read as one.
-fn is_apart(models: &[ModalModel], log: f64) -> bool {
-    models.iter().all(|one| {
-        let mut frequencies = (1..).map_while(|mode| one.frequency(mode));
-        frequencies.all(|frequency| (frequency.ln() - log).abs() >= SPLIT_POLE)
     })
 }
 
@@ -253,24 +248,20 @@ impl PeakSearch<'_> {
             let linear = linear_fit(forward, without, &held, Some(self.peak.log));
             starts.extend(linear.map(|optimum| optimum.parameters));
         }
-        let found = starts
-            .into_iter()
-            .filter_map(|start| self.from(start, &other.priors));
+        let priors = &other.priors;
+        // From each start first with the frequency held, then as well known as the peak states it.
+        let found = starts.into_iter().filter_map(|start| {
+            let start = self.tuned(start)?;
+            let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
+            let start = self.tuned(held.optimum.parameters)?;
+            let stated = Prior {
+                low: priors[self.at].low,
+                high: priors[self.at].high,
+                ..Prior::normal(start[self.at], self.peak.std / own.share)
+            };
+            self.with_frequency(&start, priors, stated)
+        });
         found.max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
-    }
-
-    /// Returns the fit from one start: first with the frequency held, then as well known as the peak states it.
-    fn from(&self, start: Vec<f64>, priors: &[Prior]) -> Option<(LocalOptimum, FixtureMode)> {
-        let start = self.tuned(start)?;
-        let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
-        let start = self.tuned(held.optimum.parameters)?;
-        let bounds = priors[self.at];
-        let stated = Prior {
-            low: bounds.low,
-            high: bounds.high,
-            ..Prior::normal(start[self.at], self.peak.std / own.share)
-        };
-        self.with_frequency(&start, priors, stated)
     }
 
     /// Returns the fit with this prior of the fixture's frequency.

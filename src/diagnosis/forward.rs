@@ -75,11 +75,11 @@ impl Model for Forward<'_> {
             base,
             mut slopes,
         } = solution;
+        let near = Some(&models[..]);
         self.set_joint_slopes(&models, &mut slopes);
         for index in 0..self.layout.effects.len() {
             for (column, step) in self.steps(index, parameters) {
                 if !priors[column].is_held() {
-                    let near = Some(&models[..]);
                     let change = self.difference(parameters, column, step, near, &base)?;
                     slopes.set_column(column, &change.into());
                 }
@@ -88,7 +88,6 @@ impl Model for Forward<'_> {
         let nuisance = self.dataset.nuisance_index(NuisanceParameter::Amplitude);
         if let Some(k) = nuisance.filter(|_| self.amplitude_effect(parameters).is_some()) {
             let column = self.layout.first_nuisance() + k;
-            let near = Some(&models[..]);
             if let Some(change) = self.difference(parameters, column, WIDE_STEP, near, &base) {
                 slopes.set_column(column, &change.into());
             }
@@ -237,43 +236,34 @@ impl<'a> Forward<'a> {
 
     /// Returns all predictions without the nuisance parameters.
     fn predictions_of(&self, models: &[ModalModel], parameters: &[f64]) -> Option<Vec<f64>> {
-        let observables = self.observables.iter();
-        observables
-            .map(|one| self.prediction_of(one, models, parameters))
-            .collect()
-    }
-
-    fn prediction_of(
-        &self,
-        observable: &Observable,
-        models: &[ModalModel],
-        parameters: &[f64],
-    ) -> Option<f64> {
-        let one = &models[observable.configuration];
-        if observable.is_damping() {
-            let damping = self.damping(observable.mode, models, parameters)?;
-            return Some(damping.total.ln());
-        }
-        let place = ModeInPlace::new(self, observable, models)?;
-        match observable.kind {
-            ObservableKind::Frequency => {
-                let frequency = one.frequency(observable.mode)?;
-                let own = one.own_change(observable.mode);
-                (frequency > 0.0).then(|| frequency.ln() + own)
+        let predictions = self.observables.iter().map(|observable| {
+            let one = &models[observable.configuration];
+            if observable.is_damping() {
+                let damping = self.damping(observable.mode, models, parameters)?;
+                return Some(damping.total.ln());
             }
-            ObservableKind::Constant { sensor } => {
-                Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
+            let place = ModeInPlace::new(self, observable, models)?;
+            match observable.kind {
+                ObservableKind::Frequency => {
+                    let frequency = one.frequency(observable.mode)?;
+                    let own = one.own_change(observable.mode);
+                    (frequency > 0.0).then(|| frequency.ln() + own)
+                }
+                ObservableKind::Constant { sensor } => {
+                    Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
+                }
+                ObservableKind::Ratio { sensor, reference } => {
+                    Some(place.at_sensor(sensor) / place.at_sensor(reference))
+                }
+                ObservableKind::Slope | ObservableKind::Damping => {
+                    let law = self.law(parameters);
+                    Some(law.map_or(0.0, |law| {
+                        slope_along_decay(self.dataset, observable, models, &law)
+                    }))
+                }
             }
-            ObservableKind::Ratio { sensor, reference } => {
-                Some(place.at_sensor(sensor) / place.at_sensor(reference))
-            }
-            ObservableKind::Slope | ObservableKind::Damping => {
-                let law = self.law(parameters);
-                Some(law.map_or(0.0, |law| {
-                    slope_along_decay(place.arrangement, observable.mode, one, &law)
-                }))
-            }
-        }
+        });
+        predictions.collect()
     }
 
     /// Sets the slopes with respect to the joint: see [`ModalModel::joint_slopes`]; those of shapes are taken
@@ -354,20 +344,6 @@ impl<'a> Forward<'a> {
         }
     }
 
-    /// Returns the masses that the hypothesis adds (kg), and their positions (m).
-    fn added_masses(&self, parameters: &[f64]) -> Vec<(f64, f64)> {
-        let mut all = Vec::new();
-        for (k, one) in self.layout.effects.iter().enumerate() {
-            if let (EffectId::AddedMass, Some(range), Some(location)) =
-                (one.effect, one.location, self.layout.location(k))
-            {
-                let position = range.value_at(parameters[location]);
-                all.push((parameters[self.layout.size(k)], position));
-            }
-        }
-        all
-    }
-
     /// Returns the damping ratio of a mode: the nominal one, a level times a power of the frequency, and eta/2 times the
     /// joint's share of the strain energy.
     fn damping(&self, mode: usize, all: &[ModalModel], parameters: &[f64]) -> Option<DampingRatio> {
@@ -380,24 +356,20 @@ impl<'a> Forward<'a> {
         let nominal = (parameters[first + level] + rise).exp();
         let one = all.first()?;
         let shares = one.joint_shares(one.index(mode)?);
-        let slip = self.slip_loss(mode, all, parameters) * shares[1];
-        let lost = one.seen.joint_loss_factor * (shares[0] + shares[1]) + slip;
-        Some(DampingRatio {
-            total: nominal + 0.5 * lost.max(0.0),
-            nominal,
-        })
-    }
-
-    /// Returns the loss factor of a joint that slips, as one mode feels it on average over the configurations: in the
-    /// share of the strain energy of the spring that has softened, 1 + change.
-    fn slip_loss(&self, mode: usize, all: &[ModalModel], parameters: &[f64]) -> f64 {
+        // The loss factor of a joint that slips, as the mode feels it on average over the configurations: in the
+        // share of the strain energy of the spring that has softened, 1 + change.
         let law = self.law(parameters);
         let share = law.map_or(0.0, |law| law.loss_over_change());
         let changes = all.iter().map(|one| one.stiffness_changes.as_ref());
         let changes = changes.filter_map(|changes| changes?.of(mode));
         let (sum, count) = changes.fold((0.0, 0), |(sum, n), one| (sum + one, n + 1));
         let change = sum / f64::from(count.max(1));
-        -share * change / (1.0 + change).max(LEAST_STIFFNESS)
+        let slip = -share * change / (1.0 + change).max(LEAST_STIFFNESS) * shares[1];
+        let lost = one.seen.joint_loss_factor * (shares[0] + shares[1]) + slip;
+        Some(DampingRatio {
+            total: nominal + 0.5 * lost.max(0.0),
+            nominal,
+        })
     }
 
     /// Returns the joint's law at the amplitudes that the parameters give it, where that is a hypothesis.
@@ -528,11 +500,17 @@ impl<'a> ModeInPlace<'a> {
                     self.inertia_slope(mass, sensor.position)
                 })
                 .sum(),
-            NuisanceParameter::AddedInertia => forward
-                .added_masses(parameters)
-                .into_iter()
-                .map(|(mass, position)| self.inertia_slope(mass, position))
-                .sum(),
+            NuisanceParameter::AddedInertia => {
+                let effects = forward.layout.effects.iter().enumerate();
+                let masses = effects.filter(|(_, one)| one.effect == EffectId::AddedMass);
+                masses
+                    .filter_map(|(k, one)| {
+                        let mass = parameters[forward.layout.size(k)];
+                        let location = parameters[forward.layout.location(k)?];
+                        Some(self.inertia_slope(mass, one.location?.value_at(location)))
+                    })
+                    .sum()
+            }
             // d ln f = (k/omega^2 - m) phi phi' dx, of the mass there and of the spring that holds it.
             NuisanceParameter::SensorPosition { position } => self
                 .sensors(&arrangement.positions, position)
@@ -613,15 +591,17 @@ impl<'a> ModeInPlace<'a> {
     }
 }
 
-/// Returns d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged over the
-/// followed part of the decay.
+/// Returns d ln f/d ln a = S_i d ln kr/d ln a of an observable's mode, with its sensitivity S_i = d ln f_i/d ln kr,
+/// averaged over the followed part of the decay.
 pub fn slope_along_decay(
-    arrangement: &Arrangement,
-    mode: usize,
-    model: &ModalModel,
+    dataset: &Dataset,
+    observable: &Observable,
+    models: &[ModalModel],
     law: &JointLaw,
 ) -> f64 {
-    model.index(mode).map_or(0.0, |index| {
-        model.rotation_sensitivity(index) * arrangement.stiffness_slope(mode, law)
+    let arrangement = &dataset.arrangements[observable.configuration];
+    let model = &models[observable.configuration];
+    model.index(observable.mode).map_or(0.0, |index| {
+        model.rotation_sensitivity(index) * arrangement.stiffness_slope(observable.mode, law)
     })
 }

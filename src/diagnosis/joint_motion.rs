@@ -135,29 +135,6 @@ impl JointMotion {
         law.change_among(self.modes[index].at(time), others.map(|(_, m)| m.at(time)))
     }
 
-    /// Returns the change that the frequency fitted to a whole decay stands for.
-    ///
-    /// Least squares weigh the phase with e^{-bt}, b = 2 rate; a change g(t) of the angular frequency then
-    /// fits as cov(t, integral of g)/var(t), which is the integral of K g with
-    /// K(t) ~ integral of e^{-bs} (s - mean) from t to T.
-    fn whole(&self, index: usize, law: &JointLaw) -> f64 {
-        let b = 2.0 * self.modes[index].rate;
-        let last = self.seconds.min(2.0 * DECAY_TIMES / b);
-        let tail = (-b * last).exp();
-        let mean = 1.0 / b - last * tail / (1.0 - tail);
-        let upper = tail * ((last - mean) / b + 1.0 / (b * b));
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for k in 0..TIMES {
-            // t = T u^2, dt ~ u du.
-            let u = (k as f64 + 0.5) / TIMES as f64;
-            let t = last * u * u;
-            let weight = u * ((-b * t).exp() * ((t - mean) / b + 1.0 / (b * b)) - upper);
-            sum += weight * self.change_at(index, t, law);
-            weights += weight;
-        }
-        sum / weights
-    }
-
     /// Returns the changes when the amplitude of the mode has fallen to each of two shares of its first one.
     pub fn changes_at_shares(
         &self,
@@ -170,11 +147,30 @@ impl JointMotion {
         Some(shares.map(|share| self.change_at(index, (-share.ln() / rate).max(0.0), law)))
     }
 
-    /// Returns the change that the frequency of each mode stands for, and their mean.
+    /// Returns the change that the frequency of each mode stands for, which is fitted to a whole decay, and their mean.
+    ///
+    /// Least squares weigh the phase with e^{-bt}, b = 2 rate; a change g(t) of the angular frequency then
+    /// fits as cov(t, integral of g)/var(t), which is the integral of K g with
+    /// K(t) ~ integral of e^{-bs} (s - mean) from t to T.
     pub fn stiffness_changes(&self, law: &JointLaw) -> StiffnessChanges {
-        let changes: Vec<f64> = (0..self.modes.len())
-            .map(|index| self.whole(index, law))
-            .collect();
+        let mut changes = Vec::with_capacity(self.modes.len());
+        for (index, mode) in self.modes.iter().enumerate() {
+            let b = 2.0 * mode.rate;
+            let last = self.seconds.min(2.0 * DECAY_TIMES / b);
+            let tail = (-b * last).exp();
+            let mean = 1.0 / b - last * tail / (1.0 - tail);
+            let upper = tail * ((last - mean) / b + 1.0 / (b * b));
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for k in 0..TIMES {
+                // t = T u^2, dt ~ u du.
+                let u = (k as f64 + 0.5) / TIMES as f64;
+                let t = last * u * u;
+                let weight = u * ((-b * t).exp() * ((t - mean) / b + 1.0 / (b * b)) - upper);
+                sum += weight * self.change_at(index, t, law);
+                weights += weight;
+            }
+            changes.push(sum / weights);
+        }
         let mean = changes.iter().sum::<f64>() / changes.len().max(1) as f64;
         let modes = self.modes.iter().map(|one| one.mode).zip(changes);
         StiffnessChanges {

@@ -10,16 +10,13 @@
 //!                          evidence       evidence of a hypothesis (with optimum)
 //!                          amplitude      joints whose stiffness depends on the amplitude (with joint_motion)
 //!                          fixture        the fixture's own resonance
-//!                          fit            local optima of one hypothesis (with multi_start)
+//!                          fit            local optima of one hypothesis
 //!                          validate       residuals, hold-out data, leave-one-recording-out
-//!                          goodness_of_fit  tests of one explanation
-//!                          posterior      probabilities and inseparable hypotheses
+//!                          verdict        tests of one explanation, probabilities of all, an answer
 //!                          effect_pairs   two effects at once
 //!                          compare        all hypotheses
-//!                          verdict        an answer, or the reason why there is none
-//!                          location_map   changes along the beam
 //!                          next_test      the most informative next test
-//!                          summary        the result
+//!                          summary        the result, with changes along the beam
 //! ```
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
@@ -36,15 +33,11 @@ mod evidence;
 mod fit;
 mod fixture;
 mod forward;
-mod goodness_of_fit;
 mod joint_motion;
-mod location_map;
-mod multi_start;
 mod next_test;
 mod observations;
 mod optimum;
 mod parameters;
-mod posterior;
 mod result;
 mod settings;
 mod structure;
@@ -52,7 +45,6 @@ mod summary;
 mod synthetic;
 #[cfg(test)]
 mod tests;
-mod thresholds;
 mod validate;
 mod verdict;
 
@@ -61,10 +53,9 @@ pub use result::{
     Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
     Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
-pub use settings::{GapError, GapSettings};
+pub use settings::{DETECTED, GapError, GapSettings, MISFIT};
 pub use structure::{Nominal, NominalSensor};
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
-pub use thresholds::{DETECTED, MISFIT};
 
 use tapjoint_identify::observation::Observations;
 
@@ -94,7 +85,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, GapError> {
     let test = checked(observations, nominal, settings)?;
     let mut comparison = compare::compare(test)?;
-    posterior::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
+    verdict::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
     let unlocated = compare::without_unlocated(test);
     Ok(summary::diagnosis(&comparison, unlocated))
 }

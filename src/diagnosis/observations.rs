@@ -1,15 +1,15 @@
 //! What the observations of a test show before any model is fitted: up to which mode, which peaks belong to no
 //! mode, and whether they show one structure at all.
 
-use crate::settings::GapError;
-use crate::structure::Nominal;
-use crate::thresholds::{
-    CHANGED_FREQUENCY, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
+use crate::settings::{
+    CHANGED_FREQUENCY, GapError, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
     NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
 };
-use std::collections::BTreeMap;
+use crate::structure::Nominal;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use tapjoint_identify::observation::{
-    Configuration, DecayVerdict, Observations, ObservedMode, UNCLEAR, UNPAIRED,
+    Configuration, DecayVerdict, ExtraPeak, Observations, ObservedMode, UNCLEAR, UNPAIRED,
 };
 
 /// Returns the highest mode that is shown by at least half of the recordings whose band reaches it; 0 without
@@ -34,10 +34,7 @@ pub fn highest_mode(observations: &Observations) -> usize {
 fn count_recordings<'a>(configurations: impl Iterator<Item = &'a Configuration>) -> usize {
     let all: Vec<Option<usize>> = configurations.map(|one| one.recording).collect();
     let given = all.iter().filter(|recording| recording.is_none()).count();
-    let mut recorded: Vec<usize> = all.into_iter().flatten().collect();
-    recorded.sort_unstable();
-    recorded.dedup();
-    recorded.len() + given
+    given + all.iter().flatten().collect::<BTreeSet<_>>().len()
 }
 
 /// Returns the observations without modes above this one.
@@ -94,32 +91,24 @@ fn change_along_decay(mode: &ObservedMode) -> Option<f64> {
 pub fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
     nominal.specimen.check()?;
     let tested = up_to(highest_mode(observations), observations);
-    check_number_of_modes(&tested, nominal)?;
-    let mut modes = tested.configurations.iter().flat_map(|one| &one.modes);
-    if !modes.any(|mode| mode.std.is_some_and(|std| std > 0.0)) {
+    let mut tested = tested.configurations.iter().flat_map(|one| &one.modes);
+    let modes = tested.clone().map(|mode| mode.mode);
+    let modes = modes.collect::<BTreeSet<_>>().len();
+    let needed = nominal.joint_parameters().len();
+    let least = (needed + 1).max(2);
+    if modes < least {
+        return Err(GapError::TooFewModes {
+            modes,
+            needed,
+            least,
+        });
+    }
+    if !tested.any(|mode| mode.std.is_some_and(|std| std > 0.0)) {
         return Err(GapError::NoUncertainty);
     }
     check_same_modes(observations)?;
     check_same_peaks(observations)?;
     check_sensors(observations, nominal)
-}
-
-fn check_number_of_modes(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
-    let configurations = observations.configurations.iter();
-    let modes = configurations.flat_map(|one| &one.modes);
-    let mut modes: Vec<usize> = modes.map(|mode| mode.mode).collect();
-    modes.sort_unstable();
-    modes.dedup();
-    let needed = nominal.joint_parameters().len();
-    let least = (needed + 1).max(2);
-    if modes.len() < least {
-        return Err(GapError::TooFewModes {
-            modes: modes.len(),
-            needed,
-            least,
-        });
-    }
-    Ok(())
 }
 
 /// Returns the name of a configuration.
@@ -134,19 +123,16 @@ fn check_same_modes(observations: &Observations) -> Result<(), GapError> {
     for (second, configuration) in all.iter().enumerate() {
         for mode in &configuration.modes {
             for (first, other) in all[..second].iter().enumerate() {
-                let Some(other) = other
-                    .mode(mode.mode)
-                    .filter(|_| other.masses == configuration.masses)
-                else {
-                    continue;
-                };
-                let ratio = mode.frequency / other.frequency;
-                if !(1.0 / SAME_MODE_RATIO..SAME_MODE_RATIO).contains(&ratio) {
+                if let Some(known) = other.mode(mode.mode)
+                    && other.masses == configuration.masses
+                    && !(1.0 / SAME_MODE_RATIO..SAME_MODE_RATIO)
+                        .contains(&(mode.frequency / known.frequency))
+                {
                     return Err(GapError::Contradictory {
                         first: name_of(observations, first),
                         second: name_of(observations, second),
                         mode: mode.mode,
-                        low: other.frequency,
+                        low: known.frequency,
                         high: mode.frequency,
                     });
                 }
@@ -163,20 +149,41 @@ fn check_same_modes(observations: &Observations) -> Result<(), GapError> {
 /// are left to the diagnosis.
 fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
     let all = &observations.configurations;
-    let peaks: Vec<Vec<f64>> = all.iter().map(resonances).collect();
     for second in 0..all.len() {
         for first in (0..second).filter(|&first| all[first].masses == all[second].masses) {
-            let band = common_band(&all[second], &all[first]);
-            let one = SharedPeaks::new(&peaks[second], &peaks[first], band);
-            let other = SharedPeaks::new(&peaks[first], &peaks[second], band);
-            let known = are_in_order(&other.frequencies, &one.frequencies)
-                || share_modes(&all[first], &all[second], band);
-            if !known && one.are_mostly_new() && other.are_mostly_new() {
+            // The frequencies that both bands reach, less the shift of a peak across an end.
+            let [(a, b), (c, d)] =
+                [second, first].map(|k| all[k].band.unwrap_or((0.0, f64::INFINITY)));
+            let band = a.max(c) * (1.0 + MOVED_FREQUENCY)..=b.min(d) * (1.0 - MOVED_FREQUENCY);
+            let one = resonances(&all[second], &band);
+            let other = resonances(&all[first], &band);
+            // Most frequencies of both lie in pairs beside each other.
+            let pairs = other.iter().zip(&one);
+            let near = pairs.filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED_FREQUENCY);
+            let are_in_order = 2 * near.count() > one.len().min(other.len());
+            // Most modes with a number of either lie where the other has them.
+            let counts = [first, second].map(|k| {
+                let modes = all[k].modes.iter();
+                modes.filter(|mode| band.contains(&mode.frequency)).count()
+            });
+            let alike = all[first].modes.iter().filter(|mode| {
+                let known = all[second].mode(mode.mode);
+                let is_alike = known.is_some_and(|known| is_near(mode.frequency, known.frequency));
+                band.contains(&mode.frequency) && is_alike
+            });
+            let alike = alike.count();
+            let share_modes = alike >= LEAST_SHARED_MODES && 2 * alike > counts[0].max(counts[1]);
+            let known = are_in_order || share_modes;
+            let strangers = count_new(&one, &all[first]);
+            if !known
+                && are_most(strangers, one.len())
+                && are_most(count_new(&other, &all[second]), other.len())
+            {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
                     second: name_of(observations, second),
-                    strangers: one.new,
-                    peaks: one.frequencies.len(),
+                    strangers,
+                    peaks: one.len(),
                     percent: 100.0 * MOVED_FREQUENCY,
                 });
             }
@@ -186,89 +193,34 @@ fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
 }
 
 /// Band of frequencies (Hz).
-#[derive(Clone, Copy)]
-struct Band {
-    low: f64,
-    high: f64,
-}
-
-impl Band {
-    fn contains(self, frequency: f64) -> bool {
-        self.low <= frequency && frequency <= self.high
-    }
-
-    /// Counts the modes with a number in this band.
-    fn count_modes(self, configuration: &Configuration) -> usize {
-        let modes = configuration.modes.iter();
-        modes.filter(|mode| self.contains(mode.frequency)).count()
-    }
-}
-
-/// Returns the frequencies that both bands reach, less the shift of a peak across an end.
-fn common_band(one: &Configuration, other: &Configuration) -> Band {
-    let bands = [one, other].map(|one| one.band.unwrap_or((0.0, f64::INFINITY)));
-    Band {
-        low: bands[0].0.max(bands[1].0) * (1.0 + MOVED_FREQUENCY),
-        high: bands[0].1.min(bands[1].1) * (1.0 - MOVED_FREQUENCY),
-    }
-}
-
-/// Returns whether most modes with a number of either configuration lie where the other has them.
-fn share_modes(one: &Configuration, other: &Configuration, band: Band) -> bool {
-    let modes = one
-        .modes
-        .iter()
-        .filter(|mode| band.contains(mode.frequency));
-    let pairs = modes.filter_map(|mode| Some((mode.frequency, other.mode(mode.mode)?.frequency)));
-    let alike = pairs.filter(|&(a, b)| is_near(a, b)).count();
-    alike >= LEAST_SHARED_MODES && 2 * alike > band.count_modes(one).max(band.count_modes(other))
-}
+type Band = RangeInclusive<f64>;
 
 /// Returns whether a frequency may be another one that has moved (both in Hz).
 fn is_near(frequency: f64, other: f64) -> bool {
     (frequency / other - 1.0).abs() <= MOVED_FREQUENCY
 }
 
-/// Peaks of one configuration in the band of another.
-struct SharedPeaks {
-    /// Frequencies (Hz), ascending.
-    frequencies: Vec<f64>,
-    /// Number of peaks that the other does not have.
-    new: usize,
+/// Counts the resonances (Hz) that a configuration does not have.
+fn count_new(frequencies: &[f64], other: &Configuration) -> usize {
+    let known = resonances(other, &(f64::NEG_INFINITY..=f64::INFINITY));
+    let new = frequencies
+        .iter()
+        .filter(|own| known.iter().all(|other| !is_near(**own, *other)));
+    new.count()
 }
 
-impl SharedPeaks {
-    fn new(own: &[f64], other: &[f64], band: Band) -> Self {
-        let own = own.iter().copied();
-        let frequencies: Vec<f64> = own.filter(|own| band.contains(*own)).collect();
-        let known = frequencies
-            .iter()
-            .filter(|own| other.iter().any(|other| is_near(**own, *other)))
-            .count();
-        SharedPeaks {
-            new: frequencies.len() - known,
-            frequencies,
-        }
-    }
-
-    fn are_mostly_new(&self) -> bool {
-        self.frequencies.len() >= LEAST_PEAKS && 2 * self.new > self.frequencies.len()
-    }
+/// Returns whether most of these many peaks are new.
+fn are_most(new: usize, peaks: usize) -> bool {
+    peaks >= LEAST_PEAKS && 2 * new > peaks
 }
 
-/// Returns whether most frequencies of two ascending lists lie in pairs beside each other.
-fn are_in_order(one: &[f64], other: &[f64]) -> bool {
-    let pairs = one.iter().zip(other);
-    let near = pairs.filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED_FREQUENCY);
-    2 * near.count() > one.len().min(other.len())
-}
-
-/// Returns the frequencies of all resonances (Hz), with a mode number or without, ascending.
-fn resonances(configuration: &Configuration) -> Vec<f64> {
+/// Returns the frequencies of all resonances in a band (Hz), with a mode number or without, ascending.
+fn resonances(configuration: &Configuration, band: &Band) -> Vec<f64> {
     let peaks = configuration.extra_peaks.iter();
     let unpaired = peaks.filter(|peak| peak.label == UNPAIRED);
     let modes = configuration.modes.iter().map(|mode| mode.frequency);
-    let mut all: Vec<f64> = modes.chain(unpaired.map(|peak| peak.frequency)).collect();
+    let all = modes.chain(unpaired.map(|peak| peak.frequency));
+    let mut all: Vec<f64> = all.filter(|frequency| band.contains(frequency)).collect();
     all.sort_by(f64::total_cmp);
     all
 }
@@ -328,16 +280,6 @@ pub struct UnpairedPeak {
     pub constants: Vec<(usize, f64)>,
 }
 
-/// Peak of no mode in one recording.
-struct ObservedPeak {
-    configuration: usize,
-    log: f64,
-    /// Relative standard uncertainty of its frequency (1).
-    std: f64,
-    /// Logarithm of its modal constant (1/kg).
-    constant: Option<f64>,
-}
-
 /// Least relative uncertainty of a fixture's frequency from its peak: a rocking fixture has more
 /// than one way to move, and its open size adds as much.
 pub const FIXTURE_FREQUENCY_STD: f64 = 0.001;
@@ -349,10 +291,8 @@ impl UnpairedPeaks {
     pub fn new(observations: &Observations) -> Self {
         let mut searched: Vec<(usize, &Configuration)> = Vec::new();
         for (index, one) in observations.configurations.iter().enumerate() {
-            let is_new = searched
-                .iter()
-                .all(|known| known.1.recording != one.recording);
-            if one.recording.is_some() && is_new {
+            let mut known = searched.iter();
+            if one.recording.is_some() && known.all(|known| known.1.recording != one.recording) {
                 searched.push((index, one));
             }
         }
@@ -362,14 +302,27 @@ impl UnpairedPeaks {
             (low, high) = (low.min(log), high.max(log));
         }
         let all = common_peaks(&searched);
+        // What a recording shows beside its modes and the common peaks, without mains and the like.
+        let peaks = searched.iter().flat_map(|(_, one)| &one.extra_peaks);
+        let peaks = peaks.filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()));
+        let doubtful = peaks
+            .map(|peak| peak.frequency.ln())
+            .filter(|log| all.iter().all(|one| (one.log - log).abs() >= SAME_PEAK));
+        // A peak far over the noise would still be read if it were weaker by its distance to the readable level.
+        let least = searched.iter().map(|(index, one)| {
+            let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
+            let logs = peaks.filter_map(|peak| {
+                let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
+                Some(peak.constant?.abs().ln() - spare / DECIBEL)
+            });
+            let logs = logs.filter(|log| log.is_finite());
+            (*index, logs.min_by(f64::total_cmp))
+        });
         UnpairedPeaks {
-            doubtful: doubtful_peaks(&searched, &all),
+            doubtful: doubtful.collect(),
+            searched: least.collect(),
             all,
             band: (low < high).then_some((low, high)),
-            searched: searched
-                .iter()
-                .map(|(index, one)| (*index, least_log_constant(one)))
-                .collect(),
         }
     }
 
@@ -386,87 +339,50 @@ impl UnpairedPeaks {
     }
 }
 
-/// Returns the peaks that a recording shows beside its modes and the common peaks, without mains and the like.
-fn doubtful_peaks(searched: &[(usize, &Configuration)], common: &[UnpairedPeak]) -> Vec<f64> {
-    let peaks = searched.iter().flat_map(|(_, one)| &one.extra_peaks);
-    peaks
-        .filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()))
-        .map(|peak| peak.frequency.ln())
-        .filter(|log| common.iter().all(|one| (one.log - log).abs() >= SAME_PEAK))
-        .collect()
-}
-
-/// Returns the logarithm of the least modal constant that is read: a peak far over the noise
-/// would still be read if it were weaker by its distance to the readable level.
-fn least_log_constant(one: &Configuration) -> Option<f64> {
-    let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
-    peaks
-        .filter_map(|peak| {
-            let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
-            Some(peak.constant?.abs().ln() - spare / DECIBEL)
-        })
-        .filter(|log| log.is_finite())
-        .min_by(f64::total_cmp)
-}
-
-/// Returns the peaks that at least half of the recordings show whose band reaches them.
+/// Returns the peaks that at least half of the recordings show whose band reaches them. They belong to no mode and are
+/// no halves of a split decay.
 fn common_peaks(searched: &[(usize, &Configuration)]) -> Vec<UnpairedPeak> {
-    let mut all = Vec::new();
+    let mut all: Vec<(f64, usize, &ExtraPeak)> = Vec::new();
     for (index, one) in searched {
-        all.extend(peaks_of_no_mode(*index, one));
+        for peak in one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED) {
+            let mut modes = one.modes.iter();
+            if modes.all(|mode| (peak.frequency / mode.frequency - 1.0).abs() > SPLIT_POLE) {
+                all.push((peak.frequency.ln(), *index, peak));
+            }
+        }
     }
-    all.sort_by(|a, b| a.log.total_cmp(&b.log));
-    let groups = all.chunk_by(|a, b| b.log - a.log < SAME_PEAK);
-    let common = groups.filter(|group| {
-        let showing: Vec<bool> = searched
-            .iter()
-            .map(|one| group.iter().any(|peak| peak.configuration == one.0))
-            .collect();
-        let able = searched.iter().zip(&showing);
-        let able = able.filter(|(one, shows)| **shows || one.1.reaches(group[0].log.exp()));
-        2 * showing.iter().filter(|shows| **shows).count() >= able.count()
-    });
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut means = Vec::new();
-    for group in common {
+    for group in all.chunk_by(|a, b| b.0 - a.0 < SAME_PEAK) {
+        let shows = searched
+            .iter()
+            .map(|one| group.iter().any(|peak| peak.1 == one.0));
+        let able = searched.iter().zip(shows.clone());
+        let able = able.filter(|(one, shows)| *shows || one.1.reaches(group[0].0.exp()));
+        if 2 * shows.filter(|shows| *shows).count() < able.count() {
+            continue;
+        }
         let count = group.len() as f64;
-        let log = group.iter().map(|one| one.log).sum::<f64>() / count;
-        let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
-        let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
+        let log = group.iter().map(|one| one.0).sum::<f64>() / count;
+        let scatter = group.iter().map(|one| (one.0 - log).powi(2)).sum::<f64>() / count;
+        let stds = group
+            .iter()
+            .map(|(_, _, peak)| peak.std.unwrap_or(0.0) / peak.frequency);
+        let read = stds.fold(0.0, f64::max);
         let constants = group.iter();
+        let constants = constants.filter_map(|one| Some((one.1, one.2.constant?.abs().ln())));
         means.push(UnpairedPeak {
             log,
             std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
-            constants: constants
-                .filter_map(|one| Some((one.configuration, one.constant?)))
-                .collect(),
+            constants: constants.filter(|one| one.1.is_finite()).collect(),
         });
     }
     means
 }
 
-/// Returns the peaks of a recording that belong to no mode and are no halves of a split decay.
-fn peaks_of_no_mode(configuration: usize, one: &Configuration) -> Vec<ObservedPeak> {
-    let mut all = Vec::new();
-    for peak in one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED) {
-        let mut modes = one.modes.iter();
-        if modes.all(|mode| (peak.frequency / mode.frequency - 1.0).abs() > SPLIT_POLE) {
-            let constant = peak.constant.map(|constant| constant.abs().ln());
-            all.push(ObservedPeak {
-                configuration,
-                log: peak.frequency.ln(),
-                std: peak.std.unwrap_or(0.0) / peak.frequency,
-                constant: constant.filter(|constant| constant.is_finite()),
-            });
-        }
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tapjoint_identify::observation::{ExtraPeak, ObservedMode};
-
     fn recording(index: usize, peaks: &[(f64, &str)]) -> Configuration {
         let peak = |(frequency, label): &(f64, &str)| ExtraPeak {
             frequency: *frequency,

@@ -283,66 +283,52 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<Candidate
         EffectId::Resolution => Size::signed("offset", 0.125, 2.0),
         EffectId::JointDrift => return None,
     };
+    let range = match effect {
+        EffectId::JointMass => Some((LocationKind::Gyration, 0.003, 0.03, 2)),
+        EffectId::JointNonlinearity => Some((LocationKind::Exponent, 0.5, 2.0, 3)),
+        EffectId::Fixture => Some((LocationKind::FixtureFrequency, 30.0, 2000.0, 14)),
+        EffectId::AddedMass => Some((LocationKind::Position, 0.01 * length, length, 12)),
+        EffectId::LocalCrack => Some((LocationKind::Position, 0.01 * length, length, 18)),
+        _ => None,
+    };
     Some(CandidateEffect {
         effect,
         size,
-        location: location_of(effect, length),
+        location: range.map(|(kind, low, high, nodes)| LocationRange {
+            kind,
+            low,
+            high,
+            nodes,
+        }),
     })
 }
 
-/// Returns the range of an effect's second parameter, for a structure of this length (m).
-fn location_of(effect: EffectId, length: f64) -> Option<LocationRange> {
-    use LocationKind::{Exponent, FixtureFrequency, Gyration, Position};
-    let (kind, low, high, nodes) = match effect {
-        EffectId::JointMass => (Gyration, 0.003, 0.03, 2),
-        EffectId::JointNonlinearity => (Exponent, 0.5, 2.0, 3),
-        EffectId::Fixture => (FixtureFrequency, 30.0, 2000.0, 14),
-        EffectId::AddedMass => (Position, 0.01 * length, length, 12),
-        EffectId::LocalCrack => (Position, 0.01 * length, length, 18),
-        _ => return None,
-    };
-    Some(LocationRange {
-        kind,
-        low,
-        high,
-        nodes,
-    })
-}
-
-/// Returns the effects that can be hypotheses for a test.
+/// Returns the effects that can be hypotheses for a test: those whose object it has.
 pub fn candidate_effects(nominal: &Nominal, arrangements: &[Arrangement]) -> Vec<CandidateEffect> {
-    let mut all = Vec::new();
-    for effect in EffectId::ALL {
-        if !is_possible(effect, nominal, arrangements) {
-            continue;
+    let has_joint = nominal.has_joint();
+    let has_clamp = has_joint && nominal.is_one_beam();
+    let possible = EffectId::ALL.into_iter().filter(|effect| {
+        let mut sensors = arrangements.iter().flat_map(|one| &one.carried);
+        match effect {
+            EffectId::SensorMass => sensors.any(|sensor| sensor.mass == 0.0),
+            EffectId::SensorCable => sensors.next().is_some(),
+            EffectId::CrossCoupling => has_clamp && !nominal.fits(COUPLING),
+            // No force pulls on a free end, nor on beams that overlap.
+            EffectId::Fixture | EffectId::AxialLoad => has_clamp,
+            EffectId::JointMass | EffectId::JointDamping => has_joint,
+            EffectId::JointNonlinearity => nominal.fits(ROTATION),
+            EffectId::Resolution => nominal.reading_bias.is_some(),
+            _ => true,
         }
-        let Some(mut candidate) = candidate_effect(effect, nominal) else {
-            continue;
-        };
+    });
+    let candidates = possible.filter_map(|effect| {
+        let mut candidate = candidate_effect(effect, nominal)?;
         if let (EffectId::Resolution, Some(bias)) = (effect, nominal.reading_bias) {
             candidate.size.scale = bias;
         }
-        all.push(candidate);
-    }
-    all
-}
-
-/// Returns whether the test has the object of an effect.
-fn is_possible(effect: EffectId, nominal: &Nominal, arrangements: &[Arrangement]) -> bool {
-    let mut sensors = arrangements.iter().flat_map(|one| &one.carried);
-    match effect {
-        EffectId::SensorMass => sensors.any(|sensor| sensor.mass == 0.0),
-        EffectId::SensorCable => sensors.next().is_some(),
-        EffectId::CrossCoupling => {
-            nominal.has_joint() && nominal.is_one_beam() && !nominal.fits(COUPLING)
-        }
-        // No force pulls on a free end, nor on beams that overlap.
-        EffectId::Fixture | EffectId::AxialLoad => nominal.has_joint() && nominal.is_one_beam(),
-        EffectId::JointMass | EffectId::JointDamping => nominal.has_joint(),
-        EffectId::JointNonlinearity => nominal.fits(ROTATION),
-        EffectId::Resolution => nominal.reading_bias.is_some(),
-        _ => true,
-    }
+        Some(candidate)
+    });
+    candidates.collect()
 }
 
 /// Order of the parameters of a hypothesis: joint, effects (size and location of each), nuisance parameters.

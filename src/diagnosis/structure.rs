@@ -5,7 +5,7 @@
 use crate::joint_motion::{
     JointMotion, ModeAmplitude, StiffnessChanges, initial_amplitude, log_stiffness,
 };
-use crate::thresholds::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
+use crate::settings::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -15,9 +15,7 @@ use tapjoint_beam::effects::{JointLaw, Seen};
 use tapjoint_beam::specimen::{
     BeamModes, Body, Joint, Mesh, PointInertia, PointMass, Specimen, SpecimenModes,
 };
-use tapjoint_identify::observation::{
-    Configuration, ObservedMode, ObservedSensor, effective_share,
-};
+use tapjoint_identify::observation::{Configuration, ObservedMode, effective_share};
 use tapjoint_numerics::stats::median;
 
 /// Number of elements of a structure.
@@ -97,11 +95,8 @@ impl Nominal {
 
     /// Returns the directions of the fitted stiffnesses.
     pub(crate) fn fitted_springs(&self) -> Vec<usize> {
-        let parameters = self.joint_parameters().into_iter();
-        let directions = parameters.map(|(direction, _)| direction);
-        directions
-            .filter(|direction| *direction != COUPLING)
-            .collect()
+        let directions = self.joint_parameters().into_iter().map(|one| one.0);
+        directions.filter(|one| *one != COUPLING).collect()
     }
 
     /// Returns whether a parameter of the joint is fitted.
@@ -321,10 +316,8 @@ impl Arrangement {
 fn span(mode: &ObservedMode) -> Option<(usize, [f64; 2])> {
     let decay = mode.decay?;
     let first = initial_amplitude(mode)?.0;
-    let (early, late) = (
-        decay.early.amplitude? / first,
-        decay.late.amplitude? / first,
-    );
+    let early = decay.early.amplitude? / first;
+    let late = decay.late.amplitude? / first;
     (late > 0.0 && early > DISTINCT_AMPLITUDES * late).then_some((mode.mode, [early, late]))
 }
 
@@ -364,15 +357,6 @@ pub struct ModalModel {
     pub frequencies: Option<Vec<f64>>,
     /// Stiffnesses that its modes feel of a joint whose stiffness depends on the amplitude.
     pub stiffness_changes: Option<StiffnessChanges>,
-}
-
-/// Property of a piece of the beam that changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Property {
-    /// Bending stiffness.
-    Stiffness,
-    /// Mass per length.
-    Mass,
 }
 
 impl ModalModel {
@@ -500,41 +484,6 @@ impl ModalModel {
         )
     }
 
-    /// Returns d ln f = (1/2) int EI w''^2 dx / omega^2 for the stiffness of the beam between two positions (m),
-    /// -(1/2) int rho A w^2 dx for its mass, with w of unit modal mass, by the midpoint rule.
-    pub fn local_slope(
-        &self,
-        index: usize,
-        property: Property,
-        first_step: usize,
-        steps: usize,
-        step: f64,
-    ) -> f64 {
-        let (body, modes) = (&self.seen.specimen.body, self.modes());
-        let omega = self.omega(index);
-        (0..steps)
-            .map(|point| {
-                let from = step * (first_step + point) as f64;
-                let x = from + 0.5 * step;
-                let beam = match body {
-                    Body::One(beam) => beam,
-                    Body::Joined([left, _]) if x < left.length => left,
-                    Body::Joined([_, right]) => right,
-                };
-                match property {
-                    Property::Stiffness => {
-                        let bend =
-                            (modes.slope(index, from + step) - modes.slope(index, from)) / step;
-                        0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega)
-                    }
-                    Property::Mass => {
-                        -0.5 * beam.mass_per_length() * modes.displacement(index, x).powi(2) * step
-                    }
-                }
-            })
-            .sum()
-    }
-
     /// Returns the motion of the joint from the amplitudes that were observed at the sensors; `None`
     /// where no amplitude is known. Taps without a position count as if they were at the sensor: the sign of a mode shape
     /// by itself means nothing.
@@ -619,16 +568,6 @@ pub fn fixture_strength(
     }
     let median = median(&mut all);
     (own.is_finite() && median.is_finite()).then_some(FixtureStrength { own, median })
-}
-
-impl NominalSensor {
-    /// Returns the sensor as a configuration has it.
-    pub(crate) fn observed(&self) -> ObservedSensor {
-        ObservedSensor {
-            name: self.name.clone(),
-            position: self.position,
-        }
-    }
 }
 
 /// Returns a structure with the joint that the parameters of these directions give it: logarithms of the stiffnesses,

@@ -3,25 +3,29 @@
 use crate::amplitude::amplitude_dependence;
 use crate::compare::ModelComparison;
 use crate::dataset::Dataset;
-use crate::evidence::log_likelihood;
-use crate::goodness_of_fit::{DegreesOfFreedom, GoodnessOfFit};
-use crate::location_map::location_map;
+use crate::evidence::{Fit, log_likelihood};
+use crate::forward::Forward;
 use crate::next_test::next_tests;
-use crate::parameters::{LocationKind, NuisanceParameter};
-use crate::posterior::{
-    Candidate, best_known, confounded, delta_chi_square, location_probabilities, none_of,
-};
+use crate::optimum::{LinearModel, Optimum, maximise};
+use crate::parameters::{LocationKind, NuisanceParameter, Prior};
 use crate::result::{
-    CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
+    CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LocationMap,
     ParameterValue, UnlocatedSensors, Verdict,
 };
-use crate::structure::COUPLING;
-use crate::thresholds::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
+use crate::settings::{
+    CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, LEAST_MAP_DATA, MISFIT, SEPARATE,
+};
+use crate::structure::{COUPLING, ModalModel};
 use crate::validate::{
     HoldoutErrors, LeftOutErrors, Residuals, closure, frequency_residuals, noise_floor,
 };
-use crate::verdict::verdict;
+use crate::verdict::{
+    Candidate, DegreesOfFreedom, GoodnessOfFit, best_known, confounded, delta_chi_square,
+    location_probabilities, none_of, verdict,
+};
+use nalgebra::DMatrix;
 use tapjoint_beam::effects::EffectId;
+use tapjoint_beam::specimen::Body;
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Returns the result of a comparison.
@@ -38,25 +42,19 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
     if let Some(tested) = &mut tested {
         tested.freedom = Some(DegreesOfFreedom::of(dataset, fit));
         tested.closure = hypotheses[best].closure;
-        let after = HoldoutErrors::new(dataset, fit);
-        tested.is_decisive = (after.zip(reference.holdout_before.as_ref()))
-            .is_some_and(|(after, before)| after.are_decisive(before));
+        let errors = HoldoutErrors::new(dataset, fit).zip(reference.holdout_before.as_ref());
+        tested.is_decisive = errors.is_some_and(|(after, before)| after.are_decisive(before));
     }
     let none = none_of(candidates).and_then(|none| GoodnessOfFit::new(dataset, &none.fit));
-    let verdict = match verdict(candidates, tested.as_ref(), none.as_ref()) {
-        // Masses at locations of their choice explain much that has other causes.
-        Verdict::NoGap
-            if unlocated
-                .as_ref()
-                .is_some_and(|without| without.goodness_of_fit < MISFIT) =>
-        {
-            Verdict::NotEnoughData(
-                "sensors of unknown position explain them, and so would other causes; state their positions"
-                    .to_owned(),
-            )
-        }
-        answer => answer,
-    };
+    let mut verdict = verdict(candidates, tested.as_ref(), none.as_ref());
+    // Masses at locations of their choice explain much that has other causes.
+    let misses = (unlocated.as_ref()).is_some_and(|without| without.goodness_of_fit < MISFIT);
+    if verdict == Verdict::NoGap && misses {
+        verdict = Verdict::NotEnoughData(
+            "sensors of unknown position explain them, and so would other causes; state their positions"
+                .to_owned(),
+        );
+    }
     let residuals = reference.before.as_ref().zip(after.as_ref());
     Diagnosis {
         next_tests: next_tests(comparison, &verdict),
@@ -136,7 +134,7 @@ impl<'a> Reference<'a> {
         let scale = dataset.nuisance_index(NuisanceParameter::Scale);
         let mut joint_parameters = dataset.nominal.joint_parameters().into_iter();
         let coupling = joint_parameters.position(|(direction, _)| direction == COUPLING);
-        HypothesisResult {
+        let mut result = HypothesisResult {
             hypothesis: candidate.hypothesis.clone(),
             groups: candidate.groups(),
             probability: candidate.probability,
@@ -154,13 +152,15 @@ impl<'a> Reference<'a> {
             cross_validation: self.cross_validation(candidate),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             misfit: residuals.as_ref().map(Residuals::misfit),
-            joint_shift: fit.map_or_else(JointShift::default, |_| self.joint_shift(candidate)),
             effects: layout.effects_at(parameters).unwrap_or_default(),
-            joint: fit.and_then(|_| self.joint(candidate)),
-            joint_intervals: fit.map_or([None; 2], |_| self.joint_intervals(candidate)),
             coupling: coupling.map_or(0.0, |k| parameters[k]),
             scale: scale.map_or(0.0, |k| parameters[layout.first_nuisance() + k]),
+            ..HypothesisResult::default()
+        };
+        if !candidate.is_unknown() {
+            self.add_joint(candidate, &mut result);
         }
+        result
     }
 
     /// Predicts each recording from the others, for probable hypotheses and for `none`.
@@ -174,47 +174,28 @@ impl<'a> Reference<'a> {
         after.against(self.left_out_before.as_ref()?, dataset.settings.seed)
     }
 
-    /// Returns the joint's stiffnesses (N/m, N m/rad); `None` without a joint.
-    fn joint(&self, candidate: &Candidate) -> Option<[f64; 2]> {
+    /// Adds what the fit of a candidate makes of the joint's stiffnesses, whose logarithms are fitted: their values
+    /// (none without a joint), 95 % intervals and changes.
+    fn add_joint(&self, candidate: &Candidate, result: &mut HypothesisResult) {
         let nominal = &self.comparison.dataset.nominal;
-        let mut joint = nominal.specimen.joint_stiffnesses();
-        if joint == [0.0; 2] {
-            return None;
-        }
-        for (k, direction) in nominal.fitted_springs().into_iter().enumerate() {
-            joint[direction] = candidate.fit.parameters()[k].exp();
-        }
-        Some(joint)
-    }
-
-    /// Returns the 95 % intervals of the stiffnesses, whose logarithms are fitted.
-    fn joint_intervals(&self, candidate: &Candidate) -> [Option<[f64; 2]>; 2] {
-        let mut intervals = [None; 2];
         let (values, stds) = (candidate.fit.parameters(), candidate.stds());
-        let springs = self.comparison.dataset.nominal.fitted_springs();
-        for (k, direction) in springs.into_iter().enumerate() {
-            let ends = [-1.0, 1.0].map(|sign| (values[k] + sign * NORMAL_95 * stds[k]).exp());
-            intervals[direction] = Some(ends).filter(|ends| ends.iter().all(|end| end.is_finite()));
-        }
-        intervals
-    }
-
-    fn joint_shift(&self, candidate: &Candidate) -> JointShift {
-        let mut shift = JointShift::default();
-        let nominal = &self.comparison.dataset.nominal;
+        let mut joint = nominal.specimen.joint_stiffnesses();
         for (k, direction) in nominal.fitted_springs().into_iter().enumerate() {
+            joint[direction] = values[k].exp();
+            let ends = [-1.0, 1.0].map(|sign| (values[k] + sign * NORMAL_95 * stds[k]).exp());
+            let is_bounded = ends.iter().all(|end| end.is_finite());
+            result.joint_intervals[direction] = is_bounded.then_some(ends);
             let before = match nominal.joint_before {
                 Some(estimated) => f64::ln(estimated[direction]),
                 None => self.comparison.described.parameters()[k],
             };
-            let after = candidate.fit.parameters()[k];
-            let percent = Some(100.0 * ((after - before).exp() - 1.0));
+            let percent = Some(100.0 * ((values[k] - before).exp() - 1.0));
             match direction {
-                0 => shift.kx_percent = percent,
-                _ => shift.ky_percent = percent,
+                0 => result.joint_shift.kx_percent = percent,
+                _ => result.joint_shift.ky_percent = percent,
             }
         }
-        shift
+        result.joint = (joint != [0.0; 2]).then_some(joint);
     }
 
     fn parameter_values(&self, candidate: &Candidate) -> Vec<ParameterValue> {
@@ -235,11 +216,8 @@ impl<'a> Reference<'a> {
             });
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
                 let value = range.value_at(values[location]);
-                let std = if range.is_logarithmic() {
-                    value * stds[location]
-                } else {
-                    stds[location]
-                };
+                let scale = if range.is_logarithmic() { value } else { 1.0 };
+                let std = scale * stds[location];
                 let is_known = std < 0.5 * (range.high - range.low);
                 let own_std = match range.kind {
                     LocationKind::Gyration => 2.0 * size * value * std,
@@ -280,4 +258,131 @@ fn value_of(effect: EffectId, name: &'static str, value: f64, std: Option<f64>) 
         smallest_detectable: None,
         smallest_separable: None,
     }
+}
+
+// Map along the beam: stiffness or mass that the residual calls for, whatever the cause.
+//
+// The beam is cut into pieces. A relative change e_j of the bending stiffness of piece j moves ln f of
+// a mode by half of that piece's share of its bending energy, a change of its mass by minus half of its
+// share of the kinetic energy. The changes that explain the residual of the nominal model are found by
+// regularised least squares, beside the joint and all nuisance parameters.
+
+/// Pieces of the beam: twice as many as half waves of the sixth mode.
+const PIECES: usize = 12;
+/// Points in each piece for its share of the energies.
+const PIECE_POINTS: usize = 8;
+/// Standard deviation of a piece's change before the data, if all pieces change (1).
+const CHANGE_STD: f64 = 0.1;
+/// Standard deviation of the change of a single piece (1): wide, since its place counts and not its size.
+const SINGLE_CHANGE_STD: f64 = 3.0;
+
+/// Returns the map of the nominal fit's residual; `None` with fewer than four frequencies.
+fn location_map(dataset: &Dataset, nominal: &Fit) -> Option<LocationMap> {
+    if dataset.frequencies().count() < LEAST_MAP_DATA {
+        return None;
+    }
+    let length = dataset.nominal.length();
+    let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
+    let mut slopes = [0, 1].map(|_| DMatrix::zeros(dataset.observables.len(), PIECES));
+    for row in dataset.frequencies() {
+        let observable = &dataset.observables[row];
+        let model = &models[observable.configuration];
+        if let Some(index) = model.index(observable.mode) {
+            for piece in 0..PIECES {
+                let own = local_slopes(model, index, piece, length);
+                for (slopes, own) in slopes.iter_mut().zip(own) {
+                    slopes[(row, piece)] = own;
+                }
+            }
+        }
+    }
+    let (stiffness, stiffness_std) = changes(dataset, nominal, &slopes[0])?;
+    let (mass, mass_std) = changes(dataset, nominal, &slopes[1])?;
+    let piece = length / PIECES as f64;
+    Some(LocationMap {
+        positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
+        stiffness,
+        stiffness_std,
+        mass,
+        mass_std,
+        stiffness_explains: explained(dataset, nominal, &slopes[0])?,
+        mass_explains: explained(dataset, nominal, &slopes[1])?,
+        // The energy of the highest mode resolves half its wave.
+        resolution: length / dataset.fitted_modes as f64,
+    })
+}
+
+/// Returns d ln f = (1/2) int EI w''^2 dx / omega^2 for the stiffness of a piece of the beam, and
+/// -(1/2) int rho A w^2 dx for its mass, with w of unit modal mass, by the midpoint rule. `length` is that of the
+/// structure (m).
+fn local_slopes(model: &ModalModel, index: usize, piece: usize, length: f64) -> [f64; 2] {
+    let (body, modes) = (&model.seen.specimen.body, model.modes());
+    let (step, omega) = (length / (PIECES * PIECE_POINTS) as f64, model.omega(index));
+    let (mut by_stiffness, mut by_mass) = (0.0, 0.0);
+    for point in 0..PIECE_POINTS {
+        let from = step * (piece * PIECE_POINTS + point) as f64;
+        let x = from + 0.5 * step;
+        let beam = match body {
+            Body::One(beam) => beam,
+            Body::Joined([left, _]) if x < left.length => left,
+            Body::Joined([_, right]) => right,
+        };
+        let bend = (modes.slope(index, from + step) - modes.slope(index, from)) / step;
+        by_stiffness += 0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega);
+        by_mass += -0.5 * beam.mass_per_length() * modes.displacement(index, x).powi(2) * step;
+    }
+    [by_stiffness, by_mass]
+}
+
+/// Returns the changes of all pieces together and their standard uncertainties.
+fn changes(
+    dataset: &Dataset,
+    nominal: &Fit,
+    slopes: &DMatrix<f64>,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let first = nominal.parameters().len();
+    let (priors, found) = with_pieces(dataset, nominal, slopes, CHANGE_STD)?;
+    let variances = found.covariance(&priors)?.diagonal();
+    let stds = variances.iter().skip(first).map(|v| v.max(0.0).sqrt());
+    Some((found.parameters[first..].to_vec(), stds.collect()))
+}
+
+/// Returns the share of the misfit by which chi square falls if one piece alone changes, for each piece.
+fn explained(dataset: &Dataset, nominal: &Fit, slopes: &DMatrix<f64>) -> Option<Vec<f64>> {
+    // All that the described model leaves.
+    let objective = nominal.best.optimum.objective;
+    let misfit = 2.0 * objective;
+    (0..PIECES)
+        .map(|piece| {
+            let own = slopes.columns(piece, 1).into_owned();
+            let (_, found) = with_pieces(dataset, nominal, &own, SINGLE_CHANGE_STD)?;
+            let decrease = 2.0 * (objective - found.objective).max(0.0);
+            Some(if misfit > 0.0 { decrease / misfit } else { 0.0 })
+        })
+        .collect()
+}
+
+/// Returns the optimum of the nominal fit, linearised, with changes of pieces after its parameters; and the priors.
+fn with_pieces(
+    dataset: &Dataset,
+    nominal: &Fit,
+    slopes: &DMatrix<f64>,
+    std: f64,
+) -> Option<(Vec<Prior>, Optimum)> {
+    let optimum = &nominal.best.optimum;
+    let first = optimum.parameters.len();
+    let count = first + slopes.ncols();
+    let mut all = optimum.model.slopes.clone().resize_horizontally(count, 0.0);
+    all.columns_mut(first, slopes.ncols()).copy_from(slopes);
+    let mut start = optimum.parameters.clone();
+    start.resize(count, 0.0);
+    let mut priors = nominal.best.priors.clone();
+    priors.resize(count, Prior::normal(0.0, std));
+    let model = LinearModel {
+        origin: &start,
+        there: &optimum.model.predicted,
+        slopes: &all,
+    };
+    let found = maximise(&dataset.data, &priors, &start, &model)?;
+    Some((priors, found))
 }

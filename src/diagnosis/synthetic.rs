@@ -4,9 +4,8 @@
 //! a fixture's peak is read follows the diagnosis's own rule: the simulator, which makes signals, tests that rule.
 
 use crate::observations::DECIBEL;
-use crate::settings::GapError;
+use crate::settings::{FIXTURE_LEVEL, GapError};
 use crate::structure::{Nominal, fixture_strength, joint_amplitude};
-use crate::thresholds::FIXTURE_LEVEL;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

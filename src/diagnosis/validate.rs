@@ -8,9 +8,7 @@ use crate::forward::Forward;
 use crate::optimum::{Model, maximise};
 use crate::parameters::NuisanceParameter;
 use crate::result::{Block, Closure, CrossValidation, LeftOutRecording, Misfit, Residual};
-use crate::thresholds::{
-    GAP_OVER_FLOOR, GAP_OVER_PREDICTION, LEAST_BLOCK_FREEDOM, LEAST_RECORDINGS,
-};
+use crate::settings::{GAP_OVER_FLOOR, GAP_OVER_PREDICTION, LEAST_BLOCK_FREEDOM, LEAST_RECORDINGS};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -87,8 +85,27 @@ impl Residuals {
     /// block is taken as g chi2_n with the mean tr B and the variance 2 tr B^2 that the covariance B of its data gives
     /// it (Satterthwaite).
     pub fn blocks(&self, dataset: &Dataset) -> Vec<Block> {
+        // The data by mode, by configuration, and by kind.
+        let mut named: Vec<(String, Vec<usize>)> = Vec::new();
+        for (row, observable) in dataset.observables.iter().enumerate() {
+            let mut names = vec![match observable.kind {
+                ObservableKind::Frequency => format!("mode {}", observable.mode),
+                ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => "shapes".into(),
+                ObservableKind::Damping => "damping".into(),
+                ObservableKind::Slope => "along the decays".into(),
+            }];
+            if observable.is_frequency() && dataset.arrangements.len() > 1 {
+                names.push(dataset.arrangements[observable.configuration].label());
+            }
+            for name in names {
+                match named.iter_mut().find(|block| block.0 == name) {
+                    Some(block) => block.1.push(row),
+                    None => named.push((name, vec![row])),
+                }
+            }
+        }
         let mut blocks = Vec::new();
-        for (name, rows) in block_rows(dataset) {
+        for (name, rows) in named {
             let spread = self.spread.select_rows(&rows).select_columns(&rows);
             let (mean, square) = (spread.trace(), (&spread * &spread).trace());
             if mean < LEAST_BLOCK_FREEDOM {
@@ -171,34 +188,6 @@ pub fn noise_floor(dataset: &Dataset) -> f64 {
     let rows = dataset.frequencies();
     let stds: Vec<f64> = rows.map(|row| 100.0 * dataset.data[row].std).collect();
     root_mean_square(&stds)
-}
-
-/// Returns the data by mode, by configuration, and by kind.
-fn block_rows(dataset: &Dataset) -> Vec<(String, Vec<usize>)> {
-    let mut blocks: Vec<(String, Vec<usize>)> = Vec::new();
-    for (row, observable) in dataset.observables.iter().enumerate() {
-        let mut names = Vec::new();
-        match observable.kind {
-            ObservableKind::Frequency => {
-                names.push(format!("mode {}", observable.mode));
-                if dataset.arrangements.len() > 1 {
-                    names.push(dataset.arrangements[observable.configuration].label());
-                }
-            }
-            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
-                names.push("shapes".to_string());
-            }
-            ObservableKind::Damping => names.push("damping".to_string()),
-            ObservableKind::Slope => names.push("along the decays".to_string()),
-        }
-        for name in names {
-            match blocks.iter_mut().find(|block| block.0 == name) {
-                Some(block) => block.1.push(row),
-                None => blocks.push((name, vec![row])),
-            }
-        }
-    }
-    blocks
 }
 
 /// Returns 100 (predicted - measured)/measured (%) from the residual of a frequency's logarithm.
@@ -431,29 +420,36 @@ impl LeftOutErrors {
         let residuals = Residuals::new(dataset, fit)?;
         let mut recordings = Vec::new();
         let mut all_rows: Vec<usize> = Vec::new();
-        let mut all: Vec<DMatrix<f64>> = Vec::new();
+        let mut all = DMatrix::zeros(0, residuals.raw.len());
         for setup in setups {
             let mut arrangements = dataset.arrangements.iter();
             let file = &arrangements.find(|one| one.setup == setup)?.file;
-            if let Some((rows, predictor)) = predict_setup(dataset, &residuals, setup) {
-                let errors = residuals.errors_of(dataset, &rows, predictor.clone());
+            let rows = (0..dataset.observables.len()).filter(|&row| {
+                let one = &dataset.observables[row];
+                !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
+            });
+            let rows: Vec<usize> = rows.collect();
+            let frequencies = 0..rows.len();
+            let frequencies = frequencies.filter(|&k| dataset.observables[rows[k]].is_frequency());
+            let frequencies: Vec<usize> = frequencies.collect();
+            // The set-up's frequencies are predicted from all residuals without any of that set-up.
+            if let Some(predictor) = residuals
+                .predictor(&rows)
+                .filter(|_| !frequencies.is_empty())
+            {
+                let predictor = predictor.select_rows(&frequencies);
+                let rows: Vec<usize> = frequencies.into_iter().map(|k| rows[k]).collect();
+                let known = all.nrows();
+                all = all.resize_vertically(known + rows.len(), 0.0);
+                all.rows_mut(known, rows.len()).copy_from(&predictor);
+                let errors = residuals.errors_of(dataset, &rows, predictor);
                 recordings.push((file.clone(), errors));
                 all_rows.extend(rows);
-                all.push(predictor);
             }
         }
-        if all.is_empty() {
-            return None;
-        }
-        let mut predictor = DMatrix::zeros(all_rows.len(), residuals.raw.len());
-        let mut at = 0;
-        for one in &all {
-            predictor.rows_mut(at, one.nrows()).copy_from(one);
-            at += one.nrows();
-        }
-        Some(LeftOutErrors {
+        (!all_rows.is_empty()).then(|| LeftOutErrors {
             recordings,
-            together: residuals.errors_of(dataset, &all_rows, predictor),
+            together: residuals.errors_of(dataset, &all_rows, all),
         })
     }
 
@@ -480,32 +476,6 @@ impl LeftOutErrors {
             closure: closure(&before.together, &self.together, seed),
         })
     }
-}
-
-/// Returns the frequencies of one set-up and the matrix that predicts them from all residuals without any of that
-/// set-up.
-fn predict_setup(
-    dataset: &Dataset,
-    residuals: &Residuals,
-    setup: usize,
-) -> Option<(Vec<usize>, DMatrix<f64>)> {
-    let rows: Vec<usize> = (0..dataset.observables.len())
-        .filter(|&row| {
-            let one = &dataset.observables[row];
-            !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
-        })
-        .collect();
-    let frequencies: Vec<usize> = (0..rows.len())
-        .filter(|&k| dataset.observables[rows[k]].is_frequency())
-        .collect();
-    if frequencies.is_empty() {
-        return None;
-    }
-    let predictor = residuals.predictor(&rows)?.select_rows(&frequencies);
-    Some((
-        frequencies.into_iter().map(|k| rows[k]).collect(),
-        predictor,
-    ))
 }
 
 #[cfg(test)]

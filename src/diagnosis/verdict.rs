@@ -1,14 +1,453 @@
-//! The verdict: from probabilities to an answer, or to none.
+//! Verdict on a test: tests of one explanation, probabilities of all, and an answer, or the reason why there is none.
 
-use crate::goodness_of_fit::GoodnessOfFit;
-use crate::posterior::{
-    Candidate, CandidateGroup, by_group, delta_chi_square, none_of, odds_by_p_value,
+use crate::dataset::Dataset;
+use crate::evidence::{Fit, log_sum};
+use crate::fixture;
+use crate::result::{Block, Closure, Hypothesis, LocationProbabilities, Verdict};
+use crate::settings::{
+    ANOTHER_LEVEL, BLOCK_MISFIT, CLOSED_SHARE, DETECTED, DOUBLED_ERRORS, LISTED_SHARE, LONGEST_SET,
+    MISFIT, NAMED_PROBABILITY, NO_GAP_PRIOR, PREDICTED, SECOND_EFFECT, SEPARATE, SET_PROBABILITY,
+    SMALLEST_P_VALUE, SPARE_DATA,
 };
-use crate::result::{Hypothesis, Verdict};
-use crate::thresholds::{
-    DETECTED, LISTED_SHARE, LONGEST_SET, NAMED_PROBABILITY, SEPARATE, SET_PROBABILITY,
-};
-use tapjoint_beam::effects::EffectId;
+use crate::structure::Arrangement;
+use crate::validate::{Residuals, holdout_goodness};
+use std::f64::consts::E;
+use tapjoint_beam::effects::{EffectId, Group, Place};
+
+// Tests of one explanation: how well it fits the data, block by block, how well it predicts the hold-out data, and
+// whether enough data are left to test it.
+
+/// Returns whether a misfit of hold-out data, of probability `p`, refutes an explanation. They are few, and linearised
+/// about the fit: the limit is that of one block among many.
+pub fn refutes_by_holdout(p: f64) -> bool {
+    p < BLOCK_MISFIT
+}
+
+/// Tests of one explanation.
+#[derive(Debug, Clone)]
+pub struct GoodnessOfFit {
+    /// Goodness of fit, all data together.
+    pub overall: Option<f64>,
+    /// Goodness of fit of its blocks, the worst first.
+    pub blocks: Vec<Block>,
+    /// Goodness of its prediction of hold-out data; `None` without any.
+    holdout: Option<f64>,
+    /// Probability of the peak of its fixture, or of its absence; `None` without a fixture.
+    peak: Option<f64>,
+    /// Numbers of data and parameters; `None` where they are not tested.
+    pub freedom: Option<DegreesOfFreedom>,
+    /// Its closure on hold-out data; `None` where the nominal model has no gap there.
+    pub closure: Option<Closure>,
+    /// The gap on hold-out data exceeds what the prediction leaves open, so that the closure can be certain.
+    pub is_decisive: bool,
+}
+
+/// Numbers of data and parameters of a hypothesis.
+#[derive(Debug, Clone, Copy)]
+pub struct DegreesOfFreedom {
+    /// Frequencies of different modes and arrangements, and other data on which the effects act.
+    pub data: usize,
+    /// Parameters of joint and effects.
+    pub parameters: usize,
+}
+
+impl DegreesOfFreedom {
+    /// Counts each fitted mode once for every set of sensor positions and added
+    /// masses, since these see other shapes and load other positions; slopes along decays, other levels and damping
+    /// ratios count for the effects that make them.
+    pub fn of(dataset: &Dataset, fit: &Fit) -> Self {
+        let [slips, damps] = [EffectId::JointNonlinearity, EffectId::JointDamping]
+            .map(|wanted| fit.effects.iter().any(|one| one.effect == wanted));
+        let mut seen: Vec<(usize, &Arrangement)> = Vec::new();
+        let mut others = 0;
+        for observable in &dataset.observables {
+            if observable.is_frequency() {
+                let one = &dataset.arrangements[observable.configuration];
+                let mut known = seen.iter().filter(|old| old.0 == observable.mode);
+                if known.all(|old| differ(old.1, one, slips)) {
+                    seen.push((observable.mode, one));
+                }
+            }
+            others += usize::from(slips && observable.is_slope());
+            others += usize::from(damps && observable.is_damping());
+        }
+        DegreesOfFreedom {
+            data: seen.len() + others,
+            parameters: dataset.layout(&fit.effects).first_nuisance(),
+        }
+    }
+
+    /// Returns whether too few data are left to test a name with.
+    pub fn are_too_few(self) -> bool {
+        self.data < self.parameters + SPARE_DATA
+    }
+}
+
+/// Returns whether two arrangements have different sensor positions or added masses, or tap levels if these count.
+fn differ(one: &Arrangement, other: &Arrangement, levels_count: bool) -> bool {
+    let sensors = one.sensors.iter().map(|sensor| sensor.position);
+    let fastened = one.fastened.iter().map(|fastened| fastened.0);
+    let levels = one.known_level.zip(other.known_level);
+    let ratio = levels.map_or(0.0, |(a, b)| (a / b).ln().abs());
+    sensors.ne(other.sensors.iter().map(|sensor| sensor.position))
+        || fastened.ne(other.fastened.iter().map(|fastened| fastened.0))
+        || levels_count && ratio >= ANOTHER_LEVEL.ln()
+}
+
+impl GoodnessOfFit {
+    /// Tests a fit by its own data and by the hold-out data; `None` where the fit has no covariance.
+    pub fn new(dataset: &Dataset, fit: &Fit) -> Option<Self> {
+        let residuals = Residuals::new(dataset, fit)?;
+        Some(GoodnessOfFit {
+            overall: residuals.goodness(),
+            blocks: residuals.blocks(dataset),
+            holdout: holdout_goodness(dataset, fit, refutes_by_holdout),
+            peak: fixture::goodness(dataset, fit),
+            freedom: None,
+            closure: None,
+            is_decisive: false,
+        })
+    }
+
+    /// Returns the p-value of the misfit that refutes the hypothesis, the smallest where several do; for one
+    /// block among many that of any.
+    pub fn refuting_p_value(&self) -> Option<f64> {
+        let worst = self.blocks.first().map(|block| block.goodness_of_fit);
+        let worst = worst.filter(|p| *p < BLOCK_MISFIT);
+        let all = [
+            self.overall.filter(|p| *p < MISFIT),
+            self.holdout.filter(|p| refutes_by_holdout(*p)),
+            worst.map(|p| (p * self.blocks.len() as f64).min(MISFIT)),
+            self.peak.filter(|p| *p < MISFIT),
+        ];
+        all.into_iter().flatten().min_by(f64::total_cmp)
+    }
+
+    /// Returns whether hold-out data are predicted no worse than by the nominal model. Two effects at once
+    /// must fulfil it: they have the freedom to imitate a change outside the catalogue.
+    fn improves_holdout(&self) -> bool {
+        self.closure.is_none_or(|closure| closure.value > 0.0)
+    }
+
+    /// Returns whether the hold-out data leave the hypothesis its name: it closes half of the gap, and some of it for
+    /// certain or predicts them within its uncertainty. If they cannot decide, closing some or predicting suffices, but
+    /// no named effect makes their errors much worse.
+    fn passes_holdout(&self) -> bool {
+        let Some(closure) = self.closure else {
+            return true;
+        };
+        let predicts = self.holdout.is_some_and(|p| p > PREDICTED);
+        if self.is_decisive {
+            closure.value >= CLOSED_SHARE && (closure.low > 0.0 || predicts)
+        } else {
+            closure.value > 0.0 || predicts && closure.value > DOUBLED_ERRORS
+        }
+    }
+}
+
+// Probabilities of the hypotheses, and which of them the data cannot separate.
+
+/// Hypothesis that takes part in the comparison, with its fit.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
+    /// Its fit.
+    pub fit: Fit,
+    /// Probability (1).
+    pub probability: f64,
+    /// Prior probability, in units of one group of effects (1).
+    pub prior: f64,
+    /// Standard deviation of the joint's drift, where that is the hypothesis.
+    pub drift: Option<f64>,
+}
+
+impl Candidate {
+    /// Returns a candidate that has no probability yet.
+    pub fn new(hypothesis: Hypothesis, fit: Fit) -> Self {
+        Candidate {
+            hypothesis,
+            fit,
+            probability: 0.0,
+            prior: 1.0,
+            drift: None,
+        }
+    }
+
+    /// Logarithm of evidence times prior.
+    pub fn log_weight(&self) -> f64 {
+        self.fit.log_evidence + self.prior.ln()
+    }
+
+    /// Its effects; none for `none` and `unknown`.
+    pub fn effects(&self) -> &[EffectId] {
+        match &self.hypothesis {
+            Hypothesis::Effects(effects) => effects,
+            _ => &[],
+        }
+    }
+
+    /// Groups of its effects, in order.
+    pub fn groups(&self) -> Vec<Group> {
+        self.effects().iter().map(|effect| effect.group()).collect()
+    }
+
+    /// Returns whether it is something outside the catalogue.
+    pub fn is_unknown(&self) -> bool {
+        self.hypothesis == Hypothesis::Unknown
+    }
+
+    /// Standard deviations of all parameters.
+    pub fn stds(&self) -> Vec<f64> {
+        let count = self.fit.best.priors.len();
+        let stds = self.fit.best.covariance().map(|covariance| {
+            let variances = covariance.diagonal();
+            variances.iter().map(|v| v.max(0.0).sqrt()).collect()
+        });
+        stds.unwrap_or_else(|| vec![f64::INFINITY; count])
+    }
+}
+
+/// Returns the candidate of the nominal model.
+pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
+    let mut all = candidates.iter();
+    all.find(|one| one.hypothesis == Hypothesis::None)
+}
+
+/// Gives every group the same prior probability, split evenly inside; `unknown` is a group, `none`
+/// has [`NO_GAP_PRIOR`] of them. The pairs that were `tried` share one unit among themselves, the accepted
+/// and the others. Sorts the most probable first.
+pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
+    for k in 0..candidates.len() {
+        let one = &candidates[k];
+        candidates[k].prior = if one.effects().len() > 1 {
+            1.0 / tried.max(1) as f64
+        } else {
+            let same = candidates.iter().filter(|other| {
+                let is_single = one.effects().len() == 1 && other.effects().len() == 1;
+                is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
+            });
+            let weight = match one.hypothesis {
+                Hypothesis::None => NO_GAP_PRIOR,
+                _ => 1.0,
+            };
+            weight / same.count() as f64
+        };
+    }
+    let logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
+    let total = log_sum(&logs);
+    for (candidate, log) in candidates.iter_mut().zip(&logs) {
+        candidate.probability = (log - total).exp();
+    }
+    sort(candidates);
+}
+
+fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
+/// Returns the best explanation that can be shown: `unknown` has no residual.
+pub fn best_known(candidates: &[Candidate]) -> Option<usize> {
+    candidates.iter().position(|one| !one.is_unknown())
+}
+
+/// Lowers the probability of the best explanation by what its own misfit says against it.
+///
+/// A misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most (Sellke, Bayarri &
+/// Berger 2001). Such odds count against every explanation that is about as probable as the best. Evidence compares
+/// how well explanations fit under the assumed noise; one that this noise refutes is no explanation
+/// while another stands. If none stands, the noise is in doubt, and with it the evidence. The odds that remain against
+/// the one that is left are evidence for something unknown, which
+/// has no misfit of its own. A best explanation that stands is left alone: what refutes its rivals makes it no
+/// better.
+pub fn calibrate_by_p_value(dataset: &Dataset, candidates: &mut [Candidate]) {
+    let Some(best) = best_known(candidates) else {
+        return;
+    };
+    let odds = odds_against(dataset, &candidates[best]);
+    if odds <= 1.0 {
+        return;
+    }
+    let mut all: Vec<Option<f64>> = vec![None; candidates.len()];
+    all[best] = Some(odds);
+    // Down to explanations as good as the best, and then as good as the best that is not refuted.
+    let mut least = candidates[best].probability * (-SECOND_EFFECT).exp();
+    let mut stands = false;
+    for (k, candidate) in candidates.iter().enumerate().skip(best + 1) {
+        if candidate.is_unknown() || candidate.probability < least {
+            continue;
+        }
+        all[k] = Some(odds_against(dataset, candidate));
+        if !stands && all[k] == Some(1.0) {
+            stands = true;
+            least = candidate.probability * (-SECOND_EFFECT).exp();
+        }
+    }
+    let probabilities: Vec<f64> = candidates.iter().map(|one| one.probability).collect();
+    let Some((left, relative)) = relative_odds(&probabilities, &all) else {
+        return;
+    };
+    let name = candidates[left].hypothesis.clone();
+    let lowered = divided(&probabilities, &relative);
+    for (candidate, probability) in candidates.iter_mut().zip(lowered) {
+        candidate.probability = probability;
+    }
+    sort(candidates);
+    let left_now = candidates.iter().position(|one| one.hypothesis == name);
+    let unknown = candidates.iter().position(Candidate::is_unknown);
+    let odds = all[left].filter(|odds| *odds > 1.0);
+    if let (Some(left), Some(unknown), Some(odds)) = (left_now, unknown, odds) {
+        // All others keep their odds among each other.
+        let odds = odds * candidates[unknown].prior / candidates[left].prior;
+        let weight = odds * candidates[left].probability;
+        if weight > candidates[unknown].probability {
+            let total = 1.0 - candidates[unknown].probability + weight;
+            candidates[unknown].probability = weight;
+            for candidate in candidates.iter_mut() {
+                candidate.probability /= total;
+            }
+            sort(candidates);
+        }
+    }
+}
+
+/// Returns the odds against one explanation; infinite where its fit has no covariance to be tested with.
+fn odds_against(dataset: &Dataset, candidate: &Candidate) -> f64 {
+    let Some(goodness) = GoodnessOfFit::new(dataset, &candidate.fit) else {
+        return f64::INFINITY;
+    };
+    goodness.refuting_p_value().map_or(1.0, odds_by_p_value)
+}
+
+/// Returns the highest odds against an explanation whose misfit has the probability `p`.
+pub fn odds_by_p_value(p: f64) -> f64 {
+    let p = p.clamp(SMALLEST_P_VALUE, 1.0 / E);
+    -1.0 / (E * p * p.ln())
+}
+
+/// Returns which of the tested explanations is left, the first of equal ones, and the odds against every
+/// other of them over those against it; `None` where none was tested or all have infinite odds against them.
+fn relative_odds(probabilities: &[f64], odds: &[Option<f64>]) -> Option<(usize, Vec<Option<f64>>)> {
+    let mut left: Option<(usize, f64)> = None;
+    for (k, odds) in odds.iter().enumerate() {
+        if let Some(odds) = odds.filter(|odds| odds.is_finite()) {
+            let weight = probabilities[k] / odds;
+            if left.is_none_or(|(_, most)| weight > most) {
+                left = Some((k, weight));
+            }
+        }
+    }
+    let (left, _) = left?;
+    let own = odds[left]?;
+    let relative = odds.iter().map(|odds| Some((*odds)? / own));
+    Some((left, relative.collect()))
+}
+
+/// Returns probabilities divided by odds, with the sum 1.
+fn divided(probabilities: &[f64], odds: &[Option<f64>]) -> Vec<f64> {
+    let each = probabilities.iter().zip(odds);
+    let each: Vec<f64> = each.map(|(p, odds)| p / odds.unwrap_or(1.0)).collect();
+    let total: f64 = each.iter().sum();
+    each.into_iter().map(|p| p / total).collect()
+}
+
+/// Candidates of one group of effects; pairs, `none` and `unknown` are groups of their own.
+struct CandidateGroup {
+    /// Indices of the candidates, the most probable first.
+    members: Vec<usize>,
+    /// Probability of the group (1).
+    probability: f64,
+}
+
+/// Returns all groups, the most probable first.
+fn by_group(candidates: &[Candidate]) -> Vec<CandidateGroup> {
+    let mut groups: Vec<CandidateGroup> = Vec::new();
+    for (index, candidate) in candidates.iter().enumerate() {
+        let same = groups.iter_mut().find(|group| {
+            let other = &candidates[group.members[0]];
+            let is_alike = other.groups() == candidate.groups();
+            is_alike
+                && (!candidate.effects().is_empty() || other.hypothesis == candidate.hypothesis)
+        });
+        match same {
+            Some(group) => {
+                group.members.push(index);
+                group.probability += candidate.probability;
+            }
+            None => groups.push(CandidateGroup {
+                members: vec![index],
+                probability: candidate.probability,
+            }),
+        }
+    }
+    groups.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    groups
+}
+
+/// Returns the probability of each location, given that there is a gap.
+pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities {
+    let mut all = LocationProbabilities::default();
+    let gaps = candidates
+        .iter()
+        .filter(|one| one.hypothesis != Hypothesis::None);
+    let total: f64 = gaps.map(|one| one.probability).sum();
+    if total <= 0.0 {
+        return all;
+    }
+    for candidate in candidates {
+        let probability = candidate.probability / total;
+        let share = probability / candidate.effects().len().max(1) as f64;
+        if candidate.is_unknown() {
+            all.unknown += probability;
+        }
+        for effect in candidate.effects() {
+            *match effect.place() {
+                Place::Joint => &mut all.joint,
+                Place::Fixture => &mut all.fixture,
+                Place::Sensor => &mut all.sensor,
+                Place::Body => &mut all.body,
+                Place::Acquisition => &mut all.acquisition,
+            } += share;
+        }
+    }
+    all
+}
+
+/// Returns the squared distance of the predictions of two fits, in standard deviations of the data.
+fn separation(dataset: &Dataset, a: &Fit, b: &Fit) -> f64 {
+    let a = &a.best.optimum.model.predicted;
+    let b = &b.best.optimum.model.predicted;
+    let data = dataset.data.iter().enumerate();
+    data.map(|(row, datum)| ((a[row] - b[row]) / datum.std).powi(2))
+        .sum()
+}
+
+/// Returns the chi square by which a rival fits worse, priors included.
+pub fn delta_chi_square(best: &Fit, rival: &Fit) -> f64 {
+    2.0 * (rival.best.optimum.objective - best.best.optimum.objective)
+}
+
+/// Returns the effects whose best fit predicts the same as that of a candidate.
+pub fn confounded(dataset: &Dataset, candidates: &[Candidate], index: usize) -> Vec<EffectId> {
+    let own = &candidates[index];
+    if own.is_unknown() {
+        return Vec::new();
+    }
+    let mut all = Vec::new();
+    for (k, other) in candidates.iter().enumerate() {
+        if let [effect] = other.effects()
+            && k != index
+            && separation(dataset, &own.fit, &other.fit) < SEPARATE
+            && delta_chi_square(&own.fit, &other.fit).abs() < SEPARATE
+            && !own.effects().contains(effect)
+        {
+            all.push(*effect);
+        }
+    }
+    all
+}
+
+// From probabilities to an answer, or to none.
 
 /// Returns the verdict on a ranking, with the tests of its best explanation and of the nominal model.
 pub fn verdict(
@@ -20,14 +459,14 @@ pub fn verdict(
     // Neither is a misfit that speaks less against the nominal model than an effect has to speak for itself.
     let p_value = none.and_then(GoodnessOfFit::refuting_p_value);
     let is_refuted = p_value.map_or(1.0, odds_by_p_value) >= DETECTED.exp();
-    let over_none = candidates.iter();
-    let over_none = over_none.map(|one| evidence_over_none(candidates, one));
-    if !is_refuted && over_none.fold(f64::NEG_INFINITY, f64::max) < DETECTED {
+    let mut all = candidates.iter();
+    let is_seen = all.any(|one| evidence_over_none(candidates, one) >= DETECTED);
+    if !is_refuted && !is_seen {
         return Verdict::NoGap;
     }
     let groups = by_group(candidates);
     let first = &candidates[groups[0].members[0]];
-    if first.is_unknown() || tested.is_some_and(GoodnessOfFit::is_refuted) {
+    if first.is_unknown() || tested.is_some_and(|one| one.refuting_p_value().is_some()) {
         return Verdict::Unknown;
     }
     // An effect too small to matter always competes with its absence; if no effect explains the
@@ -63,7 +502,14 @@ pub fn verdict(
     }
     let holds = tested.passes_holdout() && (first.effects().len() < 2 || tested.improves_holdout());
     if groups[0].probability >= NAMED_PROBABILITY && holds {
-        return name_of(candidates, &groups[0].members);
+        // Names one effect; a group whose members the data do not separate as a group.
+        let members = &groups[0].members;
+        let total: f64 = members.iter().map(|&k| candidates[k].probability).sum();
+        if first.probability >= NAMED_PROBABILITY * total || members.len() == 1 {
+            return Verdict::Named(first.effects().to_vec());
+        }
+        let likely = likely(candidates, members, total);
+        return Verdict::Group(effects_of(candidates, &likely));
     }
     let aliases = aliases_of_first(candidates);
     let together: f64 = aliases.iter().map(|&k| candidates[k].probability).sum();
@@ -95,34 +541,22 @@ fn likely(candidates: &[Candidate], members: &[usize], all: f64) -> Vec<usize> {
         .collect()
 }
 
-/// Names one effect; a group whose members the data do not separate as a group.
-fn name_of(candidates: &[Candidate], members: &[usize]) -> Verdict {
-    let total: f64 = members.iter().map(|&k| candidates[k].probability).sum();
-    let first = &candidates[members[0]];
-    if first.probability >= NAMED_PROBABILITY * total || members.len() == 1 {
-        return Verdict::Named(first.effects().to_vec());
-    }
-    Verdict::Group(effects_of(candidates, &likely(candidates, members, total)))
-}
-
 /// Returns the first single effect and those after it that fit as well.
 fn aliases_of_first(candidates: &[Candidate]) -> Vec<usize> {
     let singles = (0..candidates.len()).filter(|&k| candidates[k].effects().len() == 1);
     let singles: Vec<usize> = singles.collect();
-    let Some(&first) = singles.first() else {
-        return Vec::new();
-    };
     let mut aliases = likely(candidates, &singles, 1.0);
-    aliases
-        .retain(|&k| delta_chi_square(&candidates[first].fit, &candidates[k].fit).abs() < SEPARATE);
+    aliases.retain(|&k| {
+        let first = &candidates[singles[0]].fit;
+        delta_chi_square(first, &candidates[k].fit).abs() < SEPARATE
+    });
     aliases
 }
 
 /// Returns the shortest list of groups that holds 90 %, each with its likely members.
 fn set_of(candidates: &[Candidate], groups: &[CandidateGroup]) -> Verdict {
-    let mut held = 0.0;
+    let (mut held, mut counted) = (0.0, 0);
     let mut set = Vec::new();
-    let mut counted = 0;
     for group in groups {
         // A group is one of its members, and the data need not decide which one.
         let members = likely(candidates, &group.members, group.probability);
@@ -148,6 +582,114 @@ fn set_of(candidates: &[Candidate], groups: &[CandidateGroup]) -> Verdict {
 mod tests {
     use super::*;
     use crate::tests::fitted;
+
+    fn tested(holdout: f64, is_decisive: bool, [value, low]: [f64; 2]) -> GoodnessOfFit {
+        let closure = Closure {
+            value,
+            low,
+            high: 1.0,
+        };
+        GoodnessOfFit {
+            overall: None,
+            blocks: Vec::new(),
+            holdout: Some(holdout),
+            peak: None,
+            freedom: None,
+            closure: Some(closure),
+            is_decisive,
+        }
+    }
+
+    /// Two effects at once must not predict worse than none; without hold-out data there is no test.
+    #[test]
+    fn limit_two_effects_have_to_improve_on_holdout_data() {
+        for (closure, improves) in [(-7.0, false), (0.1, true)] {
+            assert_eq!(
+                tested(0.5, false, [closure, -9.0]).improves_holdout(),
+                improves
+            );
+        }
+        let unknown = GoodnessOfFit {
+            closure: None,
+            ..tested(0.5, false, [0.0; 2])
+        };
+        assert!(unknown.improves_holdout());
+    }
+
+    #[test]
+    fn limit_what_makes_holdout_data_worse_has_to_predict_them() {
+        for (withheld, decides, closure, holds) in [
+            (0.01, true, [0.9, 0.5], true),
+            (0.01, true, [0.9, -0.5], false),
+            (0.5, true, [0.9, -0.5], true),
+            (0.5, true, [-0.9, -5.0], false),
+            (0.5, true, [0.45, 0.3], false),
+            // Too small a gap to decide by.
+            (0.01, false, [0.9, -0.5], true),
+            (0.5, false, [-0.9, -5.0], true),
+            (0.01, false, [-6.0, -20.0], false),
+            (0.5, false, [-30.0, -60.0], false),
+        ] {
+            let found = tested(withheld, decides, closure).passes_holdout();
+            assert_eq!(found, holds, "{withheld} {decides} {closure:?}");
+        }
+    }
+
+    /// A refuted hypothesis, even against all odds, leaves the others as they were among each other.
+    #[test]
+    fn limit_lowered_probabilities_keep_the_odds_of_all_others() {
+        for odds in [8.0, 1e10, f64::INFINITY] {
+            let after = divided(&[0.6, 0.3, 0.1], &[Some(odds), None, Some(1.0)]);
+            // Rounding of three numbers.
+            assert!((after.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            assert!((after[1] / after[2] - 3.0).abs() < 1e-14);
+            assert!((after[0] / after[1] - 2.0 / odds).abs() < 1e-15);
+        }
+    }
+
+    /// At p = 1/e and above a misfit does not count; below, the odds grow and stay finite down to zero.
+    #[test]
+    fn limit_odds_from_a_misfit_are_even_at_best_and_finite_at_worst() {
+        assert!((odds_by_p_value(1.0) - 1.0).abs() < 1e-15);
+        assert!((odds_by_p_value((-1.0_f64).exp()) - 1.0).abs() < 1e-15);
+        assert!(odds_by_p_value(0.0).is_finite());
+        assert!(odds_by_p_value(0.0) > odds_by_p_value(1e-6));
+    }
+
+    /// Sellke, Bayarri & Berger (2001), table 1: at least 0.407 at p = 0.05 and 0.125 at p = 0.01, to the
+    /// digits printed there.
+    #[test]
+    fn val_odds_from_a_misfit_are_those_of_sellke() {
+        for (p, bound) in [(0.05, 0.407), (0.01, 0.125)] {
+            assert!((1.0 / odds_by_p_value(p) - bound).abs() < 5e-4, "{p}");
+        }
+    }
+
+    /// Equal odds against two change nothing between them, and of equal weights the first is left.
+    #[test]
+    fn limit_equal_odds_keep_the_order() {
+        let (first, relative) =
+            relative_odds(&[0.4, 0.4, 0.2], &[Some(9.0), Some(9.0), None]).unwrap();
+        assert_eq!(first, 0);
+        assert_eq!(relative, [Some(1.0), Some(1.0), None]);
+    }
+
+    /// A rival against which less speaks takes the place; untested ones keep their odds to it.
+    #[test]
+    fn regress_an_explanation_that_stands_takes_the_place_of_a_refuted_one() {
+        let (first, relative) =
+            relative_odds(&[0.8, 0.15, 0.05], &[Some(40.0), Some(4.0), None]).unwrap();
+        assert_eq!(first, 1);
+        assert_eq!(relative, [Some(10.0), Some(1.0), None]);
+    }
+
+    #[test]
+    fn limit_infinite_odds_against_all_leave_nothing_to_choose() {
+        let infinite = Some(f64::INFINITY);
+        assert_eq!(relative_odds(&[0.5, 0.5], &[infinite, infinite]), None);
+        let (first, relative) = relative_odds(&[0.9, 0.1], &[infinite, Some(2.0)]).unwrap();
+        assert_eq!((first, relative), (1, vec![infinite, Some(1.0)]));
+    }
 
     /// A refuted nominal model, by one block perhaps, gives no name to an effect that explains less.
     #[test]

@@ -3,9 +3,8 @@
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
 //!                         frequency_fit  least squares on the frequencies themselves
-//!                         free_beam  modulus and density of a beam without a joint
 //!                      -> estimate   with uncertainty, in SI units, with what speaks against it
-//!                      -> predict    frequencies of the estimate beside the measured ones
+//!                      -> predict    frequencies of the estimate beside the measured ones; modulus of a free beam
 //!                      -> perturbation  how far errors in the frequencies move the estimate
 //! ```
 //!
@@ -27,8 +26,7 @@ pub use frequency_fit as consistent;
 pub use pairing::pair_modes;
 pub use pairs::{
     Doubt, FREQUENCY_FLOOR, JointEstimate, MeasuredMode, ModeLambda, PairsEstimate, PairsModel,
-    SingleMode, Uncertain, estimate_joint, estimate_lap, estimate_pairs, estimate_three_parameter,
-    estimate_two_parameter, pairs_estimator, single_mode_stiffness,
+    SingleMode, Uncertain, estimate_joint, estimate_pairs, pairs_estimator, single_mode_stiffness,
 };
 pub use perturbation::{MonteCarlo, Spread, Stiffnesses, monte_carlo};
 pub use predict::{

@@ -88,30 +88,6 @@ impl PairsModel {
             Self::Lap => JointedBody::halves(&Slenderness::EULER),
         }
     }
-
-    /// One mode's equation, from the frequency equation of [`tapjoint_beam::interface`]: coefficients
-    /// of the unknowns, and the right-hand side. The product, with coefficient 1, stands on the left
-    /// as well.
-    fn equation(self, lambda: f64) -> Equation {
-        let Coefficients { p, x, y, z, q } = self.body().coefficients(lambda);
-        match self {
-            // Divided by ab Q: product + Kx X/Q + Ky Y/Q = -P/Q.
-            Self::TwoParameter | Self::Lap => Equation {
-                coefficients: vec![x / q, y / q],
-                right: -p / q,
-            },
-            // Divided by P: product + a Y/P + b X/P - 2c Z/P = -Q/P.
-            Self::ThreeParameter => Equation {
-                coefficients: vec![y / p, x / p, -2.0 * z / p],
-                right: -q / p,
-            },
-        }
-    }
-}
-
-struct Equation {
-    coefficients: Vec<f64>,
-    right: f64,
 }
 
 /// A measured mode, non-dimensional.
@@ -175,31 +151,8 @@ impl PairsEstimate {
     }
 }
 
-/// Kx and Ky of a cantilever's joint from at least three modes.
-///
-/// # Errors
-/// As [`estimate_pairs`].
-pub fn estimate_two_parameter(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
-    estimate_pairs(PairsModel::TwoParameter, modes)
-}
-
-/// Kx, Ky and Kz of a cantilever's joint from at least four modes.
-///
-/// # Errors
-/// As [`estimate_pairs`].
-pub fn estimate_three_parameter(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
-    estimate_pairs(PairsModel::ThreeParameter, modes)
-}
-
-/// Kx and Ky of a lap joint in the middle from at least three modes, of both symmetries.
-///
-/// # Errors
-/// As [`estimate_pairs`].
-pub fn estimate_lap(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
-    estimate_pairs(PairsModel::Lap, modes)
-}
-
-/// The joint's stiffness by the given frequency equation, from any subset of modes.
+/// The joint's stiffness by the given frequency equation, from any subset of modes: at least three for Kx and
+/// Ky, of a lap joint of both symmetries, and four with Kz.
 ///
 /// # Errors
 /// [`IdentifyError::TooFewModes`], [`IdentifyError::Frequency`] or
@@ -223,11 +176,10 @@ pub fn estimate_pairs(
     for &ModeLambda { mode, lambda } in modes {
         check_frequency(mode, lambda)?;
     }
-    let equations: Vec<Equation> = modes.iter().map(|m| model.equation(m.lambda)).collect();
-    let solution = solve(model, &equations)?;
-    let mut estimate = interpret(model, &solution);
-    estimate.modes = modes.iter().map(|mode| mode.mode).collect();
-    Ok(estimate)
+    Ok(PairsEstimate {
+        modes: modes.iter().map(|mode| mode.mode).collect(),
+        ..interpret(model, &solve(model, modes)?)
+    })
 }
 
 fn check_frequency(mode: usize, value: f64) -> Result<(), IdentifyError> {
@@ -244,13 +196,24 @@ struct Solution {
     condition: f64,
 }
 
-/// Least squares of the equations less their mean, by singular values.
-fn solve(model: PairsModel, equations: &[Equation]) -> Result<Solution, IdentifyError> {
-    let (rows, columns) = (equations.len(), model.unknowns());
-    let mut matrix = DMatrix::from_fn(rows, columns, |row, column| {
-        equations[row].coefficients[column]
-    });
-    let mut right = DVector::from_fn(rows, |row, _| equations[row].right);
+/// Least squares of the modes' equations less their mean, by singular values. A row has the coefficients of the
+/// unknowns, from the frequency equation of [`tapjoint_beam::interface`], and the right-hand side; the product, with
+/// coefficient 1, stands on the left as well.
+fn solve(model: PairsModel, modes: &[ModeLambda]) -> Result<Solution, IdentifyError> {
+    let (rows, columns) = (modes.len(), model.unknowns());
+    let mut matrix = DMatrix::zeros(rows, columns);
+    let mut right = DVector::zeros(rows);
+    for (row, mode) in modes.iter().enumerate() {
+        let Coefficients { p, x, y, z, q } = model.body().coefficients(mode.lambda);
+        let own;
+        (own, right[row]) = match model {
+            // Divided by ab Q: product + Kx X/Q + Ky Y/Q = -P/Q.
+            PairsModel::TwoParameter | PairsModel::Lap => ([x / q, y / q, 0.0], -p / q),
+            // Divided by P: product + a Y/P + b X/P - 2c Z/P = -Q/P.
+            PairsModel::ThreeParameter => ([y / p, x / p, -2.0 * z / p], -q / p),
+        };
+        matrix.row_mut(row).copy_from_slice(&own[..columns]);
+    }
     // Scaled before the means are taken out: a column that is constant but for rounding must
     // stay as small as that rounding.
     let scales: Vec<f64> = matrix.column_iter().map(|column| column.amax()).collect();
@@ -562,13 +525,24 @@ pub fn estimate_joint(
     let frequencies: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
     let lambdas = lambdas_of(beam, modes.iter().map(|mode| mode.mode), &frequencies);
     let pairs = estimate_pairs(model, &lambdas)?;
-    let nearby = Nearby::new(model, beam, modes, frequencies);
+    let nearby = nearby(model, beam, modes, frequencies);
     let [kx, ky, kz, coupling] = PICKED.map(|pick| {
-        let std = nearby.as_ref().and_then(|nearby| nearby.std_of(pick));
+        let std = nearby.as_ref().and_then(|nearby| std_of(nearby, pick));
         pick(&pairs).map(|value| Uncertain::symmetric(value, std))
     });
-    let compliance_std = nearby.and_then(|nearby| nearby.std_of(|pairs| pairs.kz.map(f64::recip)));
-    let kz = kz.map(|kz| through_reciprocal(&kz, compliance_std));
+    // Kz has its interval by way of 1/Kz, which is what the frequencies determine. Where that interval contains
+    // zero, Kz is unbounded on both sides.
+    let std = nearby.and_then(|nearby| std_of(&nearby, |pairs| pairs.kz.map(f64::recip)));
+    let kz = kz.map(|kz| {
+        let compliance = Uncertain::symmetric(1.0 / kz.value, std);
+        let ends = compliance.low.zip(compliance.high);
+        let ends = ends.filter(|(low, high)| low * high > 0.0);
+        Uncertain {
+            low: ends.map(|ends| 1.0 / ends.1),
+            high: ends.map(|ends| 1.0 / ends.0),
+            ..kz
+        }
+    });
     let mut doubts = pairs.doubts.clone();
     if kz.is_some_and(|kz| kz.std.is_some() && kz.low.is_none()) {
         doubts.push(Doubt::CouplingNotEstablished);
@@ -615,12 +589,10 @@ fn lambdas_of(
     numbers: impl Iterator<Item = usize>,
     frequencies: &[f64],
 ) -> Vec<ModeLambda> {
-    let modes = numbers.zip(frequencies);
+    let lambdas = frequencies.iter().map(|f| beam.lambda_of(*f));
+    let modes = numbers.zip(lambdas);
     modes
-        .map(|(mode, &frequency)| ModeLambda {
-            mode,
-            lambda: beam.lambda_of(frequency),
-        })
+        .map(|(mode, lambda)| ModeLambda { mode, lambda })
         .collect()
 }
 
@@ -633,62 +605,40 @@ const PICKED: [Pick; 4] = [
     |pairs| pairs.coupling,
 ];
 
-/// Regressions with each frequency a little higher and lower, by which uncertainties are propagated.
-struct Nearby {
-    /// For each mode the regressions above and below, and its standard uncertainty over their distance.
-    regressions: Vec<([PairsEstimate; 2], f64)>,
+/// The regressions with one frequency a little higher and lower, and its standard uncertainty over their distance.
+type Nearby = ([PairsEstimate; 2], f64);
+
+/// Returns the regressions near each frequency, by which uncertainties are propagated; `None` where a mode has no
+/// standard uncertainty, or where a regression has no answer.
+fn nearby(
+    model: PairsModel,
+    beam: &Beam,
+    modes: &[MeasuredMode],
+    mut frequencies: Vec<f64>,
+) -> Option<Vec<Nearby>> {
+    // Relative step: truncation of the order 1e-12, rounding of the order 1e-10.
+    const STEP: f64 = 1e-6;
+    let mut regressions = Vec::with_capacity(modes.len());
+    for (index, mode) in modes.iter().enumerate() {
+        let (std, step) = (mode.std?, STEP * mode.frequency);
+        let [above, below] = [step, -step].map(|step| {
+            frequencies[index] = mode.frequency + step;
+            let numbers = modes.iter().map(|mode| mode.mode);
+            estimate_pairs(model, &lambdas_of(beam, numbers, &frequencies)).ok()
+        });
+        frequencies[index] = mode.frequency;
+        regressions.push(([above?, below?], std / (2.0 * step)));
+    }
+    Some(regressions)
 }
 
-impl Nearby {
-    /// `None` where a mode has no standard uncertainty, or where a regression has no answer.
-    fn new(
-        model: PairsModel,
-        beam: &Beam,
-        modes: &[MeasuredMode],
-        mut frequencies: Vec<f64>,
-    ) -> Option<Self> {
-        // Relative step: truncation of the order 1e-12, rounding of the order 1e-10.
-        const STEP: f64 = 1e-6;
-        let mut regressions = Vec::with_capacity(modes.len());
-        for (index, mode) in modes.iter().enumerate() {
-            let (std, step) = (mode.std?, STEP * mode.frequency);
-            let [above, below] = [step, -step].map(|step| {
-                frequencies[index] = mode.frequency + step;
-                let numbers = modes.iter().map(|mode| mode.mode);
-                estimate_pairs(model, &lambdas_of(beam, numbers, &frequencies)).ok()
-            });
-            frequencies[index] = mode.frequency;
-            regressions.push(([above?, below?], std / (2.0 * step)));
-        }
-        Some(Self { regressions })
+/// Returns the standard uncertainty of one number, from independent ones of the frequencies: the root of
+/// the sum of (derivative times std)^2, derivatives by central differences. `None` where the number
+/// does not exist nearby.
+fn std_of(nearby: &[Nearby], pick: Pick) -> Option<f64> {
+    let mut variance = 0.0;
+    for ([above, below], weight) in nearby {
+        variance += ((pick(above)? - pick(below)?) * weight).powi(2);
     }
-
-    /// Returns the standard uncertainty of one number, from independent ones of the frequencies: the root of
-    /// the sum of (derivative times std)^2, derivatives by central differences. `None` where the number
-    /// does not exist nearby.
-    fn std_of(&self, pick: Pick) -> Option<f64> {
-        let mut variance = 0.0;
-        for ([above, below], weight) in &self.regressions {
-            variance += ((pick(above)? - pick(below)?) * weight).powi(2);
-        }
-        variance.is_finite().then(|| variance.sqrt())
-    }
-}
-
-/// Returns Kz with its interval by way of 1/Kz, which is what the frequencies determine. Where that
-/// interval contains zero, Kz is unbounded on both sides.
-fn through_reciprocal(kz: &Uncertain, compliance_std: Option<f64>) -> Uncertain {
-    let ends = Uncertain::symmetric(1.0 / kz.value, compliance_std);
-    match (ends.low, ends.high) {
-        (Some(low), Some(high)) if low * high > 0.0 => Uncertain {
-            low: Some(1.0 / high),
-            high: Some(1.0 / low),
-            ..*kz
-        },
-        _ => Uncertain {
-            low: None,
-            high: None,
-            ..*kz
-        },
-    }
+    variance.is_finite().then(|| variance.sqrt())
 }

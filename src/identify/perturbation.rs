@@ -40,10 +40,7 @@ impl Stiffnesses {
         Self {
             kx: combine(self.kx, other.kx),
             ky: combine(self.ky, other.ky),
-            kz: self
-                .kz
-                .zip(other.kz)
-                .map(|(own, other)| combine(own, other)),
+            kz: (self.kz.zip(other.kz)).map(|(own, other)| combine(own, other)),
         }
     }
 }
@@ -136,7 +133,13 @@ pub fn mode_sensitivities(
     for (index, (frequency, &bound)) in frequencies.iter().zip(bounds).enumerate() {
         let small = SMALL_PERCENT / 100.0 * frequency;
         let [by_small, by_bound] = [small, bound].map(|step| {
-            let change = half_difference(frequencies, index, step, &estimator)?;
+            let [high, low] = [step, -step].map(|step| {
+                let mut shifted = frequencies.to_vec();
+                shifted[index] += step;
+                estimator(&shifted)
+            });
+            // Half of the difference between the estimates with this frequency a step higher and lower.
+            let change = high?.combined(&low?, |high, low| 0.5 * (high - low));
             Some(change.combined(&nominal?, |change, nominal| 100.0 * change / nominal))
         });
         sensitivities.push(ModeSensitivity {
@@ -147,21 +150,6 @@ pub fn mode_sensitivities(
         });
     }
     Ok(sensitivities)
-}
-
-/// Half of the difference between the estimates with one frequency a step (Hz) higher and lower.
-fn half_difference(
-    frequencies: &[f64],
-    index: usize,
-    step: f64,
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
-) -> Option<Stiffnesses> {
-    let mut shifted = frequencies.to_vec();
-    shifted[index] = frequencies[index] + step;
-    let high = estimator(&shifted)?;
-    shifted[index] = frequencies[index] - step;
-    let low = estimator(&shifted)?;
-    Some(high.combined(&low, |high, low| 0.5 * (high - low)))
 }
 
 /// Smallest and largest value of a parameter.
@@ -263,15 +251,10 @@ pub fn spans_of(
 }
 
 fn widen(span: &mut Option<Span>, value: f64) {
-    *span = Some(match *span {
-        None => Span {
-            low: value,
-            high: value,
-        },
-        Some(span) => Span {
-            low: span.low.min(value),
-            high: span.high.max(value),
-        },
+    let (low, high) = span.map_or((value, value), |span| (span.low, span.high));
+    *span = Some(Span {
+        low: low.min(value),
+        high: high.max(value),
     });
 }
 
@@ -363,12 +346,7 @@ pub fn monte_carlo(
     seed: u64,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Result<MonteCarlo, IdentifyError> {
-    if frequencies.len() != stds.len() {
-        return Err(IdentifyError::Bounds {
-            frequencies: frequencies.len(),
-            bounds: stds.len(),
-        });
-    }
+    check_bounds(frequencies, stds)?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut found = Vec::with_capacity(samples);
     for _ in 0..samples {

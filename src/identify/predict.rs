@@ -2,7 +2,8 @@
 
 use super::{IdentifyError, MeasuredMode, Uncertain};
 use tapjoint_beam::{
-    Assembly, Beam, BeamTheory, JointStiffness, NaturalMode, Slenderness, natural_modes,
+    Assembly, Beam, BeamTheory, JointStiffness, NaturalMode, Slenderness, natural_frequencies,
+    natural_modes,
 };
 
 /// One mode as predicted and, where it was measured, as measured.
@@ -36,14 +37,8 @@ pub fn predict(
     used: &[usize],
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
-    beam.check()?;
     let highest = measured.iter().map(|mode| mode.mode).max().unwrap_or(0);
-    let slenderness = beam.slenderness(theory);
-    let modes = natural_modes(assembly, joint, &slenderness, count.max(highest))?;
-    let frequencies: Vec<f64> = modes
-        .iter()
-        .map(|mode| beam.frequency_of(mode.lambda))
-        .collect();
+    let frequencies = natural_frequencies(theory, beam, assembly, joint, count.max(highest))?;
     Ok(compare(beam, &frequencies, measured, used))
 }
 
@@ -55,20 +50,19 @@ pub fn compare(
     measured: &[MeasuredMode],
     used: &[usize],
 ) -> Vec<PredictedMode> {
-    let mut modes = Vec::with_capacity(predicted.len());
-    for (mode, &predicted) in (1..).zip(predicted) {
+    let modes = (1..).zip(predicted).map(|(mode, &predicted)| {
         let found = measured.iter().find(|measured| measured.mode == mode);
         let measured = found.map(|found| found.frequency);
-        modes.push(PredictedMode {
+        PredictedMode {
             mode,
             measured,
             predicted,
             lambda: beam.lambda_of(predicted),
             error_percent: measured.map(|measured| 100.0 * (predicted - measured) / measured),
             used: used.contains(&mode),
-        });
-    }
-    modes
+        }
+    });
+    modes.collect()
 }
 
 /// Returns the first `count` lambda (1) of an Euler beam, where no beam is described.
@@ -112,15 +106,13 @@ pub fn estimate_modulus(
 ) -> Result<FreeBeamEstimate, IdentifyError> {
     beam.check()?;
     let highest = modes.iter().map(|mode| mode.mode).max();
-    let Some(highest) = highest else {
-        return Err(IdentifyError::TooFewModes {
-            model: "free beam",
-            unknowns: 1,
-            needed: 1,
-            found: 0,
-            simpler: "",
-        });
-    };
+    let highest = highest.ok_or(IdentifyError::TooFewModes {
+        model: "free beam",
+        unknowns: 1,
+        needed: 1,
+        found: 0,
+        simpler: "",
+    })?;
     let theory = beam.slenderness(theory);
     let exact = natural_modes(Assembly::Free, &JointStiffness::FREE, &theory, highest)?;
     // Measured over nominal frequency, for each mode.

@@ -56,14 +56,9 @@ pub enum Linearised {
         /// Gradient of the cost.
         gradient: DVector<f64>,
     },
-    /// Jacobian and residuals themselves: keeps all digits where the curvature would square a large
-    /// condition number.
-    Rows {
-        /// Derivative of each residual (row) with respect to each parameter (column).
-        jacobian: DMatrix<f64>,
-        /// The residuals.
-        residuals: DVector<f64>,
-    },
+    /// R and, as the last column, Q'r of J = QR, by [`Linearised::of_rows`]: keeps all digits where the
+    /// curvature would square a large condition number. Below them are zeros and what no step changes.
+    Triangle(DMatrix<f64>),
 }
 
 /// When a search ends.
@@ -205,7 +200,8 @@ pub fn minimise<P: Problem>(
             if let Some(next) = step.move_from(problem, &at) {
                 break next;
             }
-            if damping >= settings.damping || step.is_within(settings.step) {
+            let is_short = matches!(&step, Step::To { step, .. } if step.amax() <= settings.step);
+            if damping >= settings.damping || is_short {
                 return Some(at.ended(StopReason::NoBetterStep));
             }
             damping = f64::max(WEAKEST, FACTOR * damping);
@@ -219,11 +215,10 @@ pub fn minimise<P: Problem>(
         if longest <= settings.step {
             return Some(at.ended(StopReason::SmallStep));
         }
-        idle_steps = if gain > settings.idle * at.cost {
-            0
-        } else {
-            idle_steps + 1
-        };
+        idle_steps += 1;
+        if gain > settings.idle * at.cost {
+            idle_steps = 0;
+        }
         if idle_steps >= settings.idle_steps {
             return Some(at.ended(StopReason::Idle));
         }
@@ -245,7 +240,7 @@ struct Point<S> {
     parameters: Vec<f64>,
     state: S,
     cost: f64,
-    local: Local,
+    local: Linearised,
 }
 
 impl<S> Point<S> {
@@ -255,7 +250,7 @@ impl<S> Point<S> {
             cost: problem.cost(&state),
             parameters,
             state,
-            local: Local::from(linearised),
+            local: linearised,
         })
     }
 
@@ -308,11 +303,6 @@ impl Step {
         matches!(self, Self::To { promise, .. } if *promise <= gain)
     }
 
-    /// Returns true for a step that moves no parameter by more than `length`.
-    fn is_within(&self, length: f64) -> bool {
-        matches!(self, Self::To { step, .. } if step.amax() <= length)
-    }
-
     /// Takes the step; `None` where it does not lower the cost.
     fn move_from<P: Problem>(&self, problem: &P, at: &Point<P::State>) -> Option<Point<P::State>> {
         let Self::To { step, .. } = self else {
@@ -328,47 +318,20 @@ impl Step {
     }
 }
 
-/// The linearised problem as it is solved.
-enum Local {
-    /// Curvature A and gradient g.
-    Normal {
-        curvature: DMatrix<f64>,
-        gradient: DVector<f64>,
-    },
-    /// R and, as the last column, Q'r of J = QR; below them are zeros and what no step changes.
-    Triangle(DMatrix<f64>),
-}
-
-impl From<Linearised> for Local {
-    fn from(linearised: Linearised) -> Self {
-        match linearised {
-            Linearised::Normal {
-                curvature,
-                gradient,
-            } => Self::Normal {
-                curvature,
-                gradient,
-            },
-            Linearised::Rows {
-                jacobian,
-                residuals,
-            } => {
-                let (rows, columns) = jacobian.shape();
-                let mut triangle = DMatrix::zeros(rows.max(columns), columns + 1);
-                triangle
-                    .view_mut((0, 0), (rows, columns))
-                    .copy_from(&jacobian);
-                triangle
-                    .view_mut((0, columns), (rows, 1))
-                    .copy_from(&residuals);
-                triangularise(&mut triangle);
-                Self::Triangle(triangle)
-            }
+impl Linearised {
+    /// Returns the triangle of a Jacobian, the derivative of each residual (row) with respect to each parameter
+    /// (column), and of the residuals.
+    pub fn of_rows(mut jacobian: DMatrix<f64>, residuals: &[f64]) -> Self {
+        let (rows, columns) = jacobian.shape();
+        assert_eq!(rows, residuals.len(), "one residual for each row");
+        jacobian = jacobian.resize(rows.max(columns), columns + 1, 0.0);
+        for (row, residual) in residuals.iter().enumerate() {
+            jacobian[(row, columns)] = *residual;
         }
+        triangularise(&mut jacobian);
+        Self::Triangle(jacobian)
     }
-}
 
-impl Local {
     /// Returns the number of directions in which a step may go: one for each parameter, unless
     /// [`Problem::moved`] has it otherwise.
     fn columns(&self) -> usize {
@@ -489,43 +452,6 @@ fn triangularise(matrix: &mut DMatrix<f64>) {
     }
 }
 
-/// Weight of large misfits.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub enum Loss {
-    /// By their square: right for normally distributed errors.
-    #[default]
-    Squares,
-    /// By their square up to so many standard deviations, linearly beyond (Huber). 1.345 keeps 95 % of
-    /// the efficiency where errors are normal.
-    Huber(f64),
-    /// As the negative logarithm of Student's t with so many degrees of freedom: a wild value hardly
-    /// counts. 4 is usual.
-    StudentT(f64),
-}
-
-impl Loss {
-    /// Returns what one standardised residual contributes to the sum of squares.
-    ///
-    /// Student's t: -2 ln p = (nu + 1) ln(1 + r^2/nu), up to a constant.
-    pub fn of(self, residual: f64) -> f64 {
-        let square = residual * residual;
-        match self {
-            Self::Huber(limit) if residual.abs() > limit => limit * (2.0 * residual.abs() - limit),
-            Self::Squares | Self::Huber(_) => square,
-            Self::StudentT(freedom) => (freedom + 1.0) * (square / freedom).ln_1p(),
-        }
-    }
-
-    /// Returns the weight of the residual's square in the linearised problem.
-    pub fn weight(self, residual: f64) -> f64 {
-        match self {
-            Self::Huber(limit) if residual.abs() > limit => limit / residual.abs(),
-            Self::Squares | Self::Huber(_) => 1.0,
-            Self::StudentT(freedom) => (freedom + 1.0) / (freedom + residual * residual),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -552,16 +478,12 @@ mod tests {
 
         fn linearise(&self, at: &[f64], residuals: &mut Self::State) -> Option<Linearised> {
             let jacobian = DMatrix::from_row_slice(2, 2, &[-20.0 * at[0], 10.0, -1.0, 0.0]);
-            let residuals = residuals.clone();
             Some(if self.rows {
-                Linearised::Rows {
-                    jacobian,
-                    residuals,
-                }
+                Linearised::of_rows(jacobian, residuals.as_slice())
             } else {
                 Linearised::Normal {
                     curvature: jacobian.tr_mul(&jacobian),
-                    gradient: jacobian.tr_mul(&residuals),
+                    gradient: jacobian.tr_mul(residuals),
                 }
             })
         }

@@ -50,6 +50,17 @@ pub fn chi_square_tail(value: f64, freedom: f64) -> f64 {
 pub mod student {
     use statrs::distribution::{ContinuousCDF, StudentsT};
 
+    /// Returns what a standardised residual contributes to the sum of squares: -2 ln p = (nu + 1) ln(1 + r^2/nu), up
+    /// to a constant. A wild value hardly counts.
+    pub fn loss(residual: f64, freedom: f64) -> f64 {
+        (freedom + 1.0) * (residual * residual / freedom).ln_1p()
+    }
+
+    /// Returns the weight of the residual's square in the linearised problem, (nu + 1)/(nu + r^2).
+    pub fn weight(residual: f64, freedom: f64) -> f64 {
+        (freedom + 1.0) / (freedom + residual * residual)
+    }
+
     /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any.
     pub fn two_sided(t: f64, freedom: f64) -> f64 {
         if !t.is_finite() {

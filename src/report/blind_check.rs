@@ -5,13 +5,23 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::chart::{PictureFormat, render_picture};
-use super::charts::blind_check::{classes, closure, confusion, reliability};
-use super::{ReportError, ReportFile};
+use crate::data_files::write;
+use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, PictureFormat, Series};
+use crate::run::picture_files;
+use crate::{ReportError, ReportFile};
+use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::Verdict;
 use tapjoint_study::blind_check::{
-    Case, Class, Conduct, Planted, Row, Scores, Target, Truth, render_rows, rows, score,
+    Calibration, Case, CaseKind, Class, Conduct, Planted, Scores, Target, Truth, render_rows, rows,
+    score,
 };
+
+/// Width of the square pictures (pixels).
+const WIDTH: u32 = 900;
+/// Height of a class in the confusion matrix (pixels).
+const CELL: f64 = 34.0;
+/// Closures below this are drawn at it: an effect that makes things much worse.
+const LEAST: f64 = -1.0;
 
 /// All files: `score.json`, `cases.csv`, `truth.json`, and as PNG and SVG `confusion`, `reliability`,
 /// `closure`.
@@ -26,30 +36,18 @@ pub fn render_blind_check(
     let truths: Vec<Truth> = cases.iter().map(|(truth, _)| truth.clone()).collect();
     let score =
         serde_json::to_string_pretty(&score_json(scores, conduct)).map_err(ReportError::Json)?;
-    let mut files: Vec<ReportFile> = [
-        ("score.json", score + "\n"),
-        ("cases.csv", cases_csv(cases)),
-        ("truth.json", truths_json(&truths)?),
-    ]
-    .into_iter()
-    .map(|(name, text)| ReportFile {
-        name: name.to_owned(),
-        bytes: text.into_bytes(),
-    })
-    .collect();
+    let mut files = vec![
+        ReportFile::of("score.json", score + "\n"),
+        ReportFile::of("cases.csv", cases_csv(cases)?),
+        ReportFile::of("truth.json", truths_json(&truths)?),
+    ];
     let charts = [
         Some(confusion(cases)),
         Some(reliability(&scores.calibration)),
         closure(cases),
     ];
     for chart in charts.into_iter().flatten() {
-        let drawing = chart.draw();
-        for (ending, format) in [("png", PictureFormat::Png), ("svg", PictureFormat::Svg)] {
-            files.push(ReportFile {
-                name: format!("{}.{ending}", chart.kind),
-                bytes: render_picture(&drawing, format)?,
-            });
-        }
+        files.extend(picture_files(chart.kind, &chart.draw())?);
     }
     Ok(files)
 }
@@ -62,7 +60,7 @@ pub fn render_confusion_picture(
     cases: &[Case],
     format: PictureFormat,
 ) -> Result<Vec<u8>, ReportError> {
-    render_picture(&confusion(cases).draw(), format)
+    confusion(cases).render(format)
 }
 
 /// The truths as a list of `{"name", "effects", "params"}`, one line for each.
@@ -70,31 +68,25 @@ pub fn render_confusion_picture(
 /// # Errors
 /// [`ReportError::Json`], which does not happen for finite parameters.
 pub fn truths_json(truths: &[Truth]) -> Result<String, ReportError> {
-    let lines = truths
-        .iter()
-        .map(|truth| serde_json::to_string(&truth_json(truth)))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(ReportError::Json)?;
-    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
-}
-
-fn truth_json(truth: &Truth) -> Value {
-    let names: Vec<&str> = truth.effects.iter().map(name_of).collect();
-    let params: serde_json::Map<String, Value> = truth
-        .catalogue()
-        .map(|(id, values)| (id.name().to_owned(), json!(values)))
-        .collect();
-    let mut entry = json!({"name": truth.name, "effects": names, "params": params});
-    let limits = [
-        ("detectable", truth.detectable),
-        ("refutable", truth.refutable),
-    ];
-    for (name, known) in limits {
-        if let Some(known) = known {
-            entry[name] = json!(known);
+    let mut lines = Vec::new();
+    for truth in truths {
+        let names: Vec<&str> = truth.effects.iter().map(name_of).collect();
+        let params = truth.catalogue();
+        let params: serde_json::Map<String, Value> = params
+            .map(|(id, values)| (id.name().to_owned(), json!(values)))
+            .collect();
+        let mut entry = json!({"name": truth.name, "effects": names, "params": params});
+        for (name, known) in [
+            ("detectable", truth.detectable),
+            ("refutable", truth.refutable),
+        ] {
+            if let Some(known) = known {
+                entry[name] = json!(known);
+            }
         }
+        lines.push(serde_json::to_string(&entry).map_err(ReportError::Json)?);
     }
-    entry
+    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
 }
 
 fn name_of(planted: &Planted) -> &str {
@@ -107,10 +99,25 @@ fn name_of(planted: &Planted) -> &str {
 /// The score: every figure with its interval, its counts, what was aimed at and what an ideal observer reaches; and how
 /// the check was conducted.
 pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
-    let figures: serde_json::Map<String, Value> = rows(scores, conduct.extent)
-        .iter()
-        .map(|row| (row.key.to_owned(), figure_json(row)))
-        .collect();
+    let mut figures = serde_json::Map::new();
+    for row in rows(scores, conduct.extent) {
+        let target = match row.target {
+            Target::AtLeast(limit) => json!({"at_least": limit}),
+            Target::AtMost(limit) => json!({"at_most": limit}),
+            Target::None => Value::Null,
+        };
+        let figure = json!({
+            "meaning": row.meaning,
+            "value": row.value.filter(|value| value.is_finite()),
+            "low": row.interval.map(|interval| interval.0),
+            "high": row.interval.map(|interval| interval.1),
+            "hits": row.counts.map(|counts| counts.0),
+            "of": row.counts.map(|counts| counts.1),
+            "target": target,
+            "ideal": row.ideal,
+        });
+        figures.insert(row.key.to_owned(), figure);
+    }
     let [nulls, singles, several, outside] = scores.counts;
     let reliability: Vec<Value> = scores
         .calibration
@@ -119,7 +126,7 @@ pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
         .map(|bin| json!({"from": bin.from, "cases": bin.cases, "stated": bin.stated, "right": bin.right}))
         .collect();
     let mut score = json!({
-        "version": super::document::VERSION,
+        "version": crate::document::VERSION,
         "cases": {"none": nulls, "one": singles, "several": several, "outside": outside},
         "figures": figures,
         "reliability": reliability,
@@ -136,63 +143,34 @@ pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
     score
 }
 
-fn figure_json(row: &Row) -> Value {
-    let target = match row.target {
-        Target::AtLeast(limit) => json!({"at_least": limit}),
-        Target::AtMost(limit) => json!({"at_most": limit}),
-        Target::None => Value::Null,
-    };
-    json!({
-        "meaning": row.meaning,
-        "value": row.value.filter(|value| value.is_finite()),
-        "low": row.interval.map(|interval| interval.0),
-        "high": row.interval.map(|interval| interval.1),
-        "hits": row.counts.map(|counts| counts.0),
-        "of": row.counts.map(|counts| counts.1),
-        "target": target,
-        "ideal": row.ideal,
-    })
-}
-
 /// Every case: what was planted, what was answered.
-fn cases_csv(cases: &[Case]) -> String {
-    let mut text =
-        String::from("name,planted,detectable,refutable,verdict,named,first,probability,closure\n");
+fn cases_csv(cases: &[Case]) -> Result<String, ReportError> {
+    let mut rows = Vec::new();
     for (truth, answer) in cases {
         let planted: Vec<&str> = truth.effects.iter().map(name_of).collect();
         let named: Vec<&str> = answer.effects.iter().map(|id| id.name()).collect();
-        let (first, probability) = answer.first().map_or(("", String::new()), |(class, p)| {
-            (class.name(), format!("{p:.4}"))
-        });
+        let first = answer.first();
         let [detectable, refutable] =
             [truth.detectable, truth.refutable].map(|known| match known {
-                Some(true) => "yes",
-                Some(false) => "no",
-                None => "",
+                Some(true) => "yes".to_owned(),
+                Some(false) => "no".to_owned(),
+                None => String::new(),
             });
-        let closure = answer
-            .closure
-            .map_or(String::new(), |closure| format!("{closure:.4}"));
-        text.push_str(&format!(
-            "{},{},{},{},{},{},{first},{probability},{closure}\n",
-            quoted(&truth.name),
-            quoted(&planted.join("+")),
+        let closure = answer.closure;
+        rows.push(vec![
+            truth.name.clone(),
+            planted.join("+"),
             detectable,
             refutable,
-            answer.verdict_name(),
+            answer.verdict_name().to_owned(),
             named.join("+"),
-        ));
+            first.map_or("", |(class, _)| class.name()).to_owned(),
+            first.map_or_else(String::new, |(_, p)| format!("{p:.4}")),
+            closure.map_or_else(String::new, |closure| format!("{closure:.4}")),
+        ]);
     }
-    text
-}
-
-/// A word of a CSV file; names made elsewhere may hold anything.
-fn quoted(word: &str) -> String {
-    if word.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", word.replace('"', "\"\""))
-    } else {
-        word.to_owned()
-    }
+    let heads = "name,planted,detectable,refutable,verdict,named,first,probability,closure";
+    write(heads, rows)
 }
 
 /// Meaning of the columns of [`tell_apart`].
@@ -229,12 +207,20 @@ pub fn tell_apart(cases: &[Case]) -> String {
                 _ => false,
             })
             .count();
+        // "cross-coupling 2, none 1".
+        let mut others: BTreeMap<Class, usize> = BTreeMap::new();
+        let instead = own.iter().filter_map(|(_, answer)| answer.first());
+        for (other, _) in instead.filter(|(other, _)| *other != class) {
+            *others.entry(other).or_insert(0) += 1;
+        }
+        let others = others.iter();
+        let others = others.map(|(other, count)| format!("{} {count}", other.name()));
         let line = format!(
             "{:<20}{:>7}{:>8}  {}",
             class.name(),
             format!("{first}/{}", own.len()),
             format!("{named}/{}", own.len()),
-            others(&own, class)
+            others.collect::<Vec<_>>().join(", ")
         );
         text.push_str(line.trim_end());
         text.push('\n');
@@ -247,18 +233,129 @@ pub fn tell_apart(cases: &[Case]) -> String {
     format!("{text}{EXPLAINED}\n{}", render_rows(&figures))
 }
 
-/// "cross-coupling 2, none 1".
-fn others(cases: &[&Case], own: Class) -> String {
-    let mut counts: BTreeMap<Class, usize> = BTreeMap::new();
-    for (_, answer) in cases {
-        match answer.first() {
-            Some((class, _)) if class != own => *counts.entry(class).or_insert(0) += 1,
-            _ => {}
+/// The confusion matrix: rows are what was planted, columns the most probable class; each cell holds
+/// the number of cases, and its shade their share of the row.
+fn confusion(cases: &[Case]) -> Chart {
+    let classes = classes();
+    let mut counts = BTreeMap::new();
+    for (truth, answer) in cases {
+        if let Some((planted, (first, _))) = truth.class().zip(answer.first()) {
+            *counts.entry((planted, first)).or_insert(0) += 1;
         }
     }
-    let words: Vec<String> = counts
-        .iter()
-        .map(|(class, count)| format!("{} {count}", class.name()))
-        .collect();
-    words.join(", ")
+    let last = classes.len() as f64 - 0.5;
+    let names = classes.iter().enumerate();
+    let names = names.map(|(at, class)| (at as f64, class.name().to_owned()));
+    let x = Axis::linear(-0.5, last).of("most probable class", "");
+    let x = x.named(names.clone());
+    let y = Axis::linear(-last, 0.5).of("planted", "");
+    let y = y.named(names.map(|(at, name)| (-at, name)));
+    let mut cells = Series::new("", Color::Blue, Mark::Cell);
+    for (row, planted) in classes.iter().enumerate() {
+        let own = counts.iter().filter(|((class, _), _)| class == planted);
+        let total: usize = own.map(|(_, count)| *count).sum();
+        for (column, class) in classes.iter().enumerate() {
+            if let Some(count) = counts.get(&(*planted, *class)) {
+                cells.push(column as f64, -(row as f64));
+                cells.low.push(*count as f64 / total as f64);
+                cells.labels.push(count.to_string());
+            }
+        }
+    }
+    let panel = Panel::new(CELL * classes.len() as f64, x, y).with([cells]);
+    Chart {
+        kind: "confusion",
+        title: "What was planted, and what came first".to_owned(),
+        subtitle:
+            "rows: planted; columns: the most probable class; tests with two effects are left out"
+                .to_owned(),
+        blocks: vec![Block::new(1, vec![panel])],
+        ..Chart::default()
+    }
+}
+
+/// All classes in the catalogue's order, each group once; `resolution` shares its group.
+fn classes() -> Vec<Class> {
+    let mut classes = vec![Class::None];
+    for id in EffectId::ALL {
+        let class = Class::Group(id.group());
+        if id != EffectId::JointDrift && !classes.contains(&class) {
+            classes.push(class);
+        }
+    }
+    classes.push(Class::Unknown);
+    classes
+}
+
+/// The reliability diagram: on the diagonal a stated probability is the share of right answers.
+fn reliability(calibration: &Calibration) -> Chart {
+    let [ece, brier] = [calibration.expected_calibration_error, calibration.brier]
+        .map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
+    let bins = calibration.reliability.iter();
+    let known = bins.filter_map(|bin| Some((bin.stated?, bin.right?, bin.cases)));
+    let places = known.clone().map(|(stated, right, _)| (stated, right));
+    let mut dots = Series::points("", Color::Blue, Mark::Dot(6.0), places);
+    dots.labels = known.map(|(_, _, cases)| cases.to_string()).collect();
+    let diagonal = [(0.0, 0.0), (1.0, 1.0)];
+    let diagonal = Series::points("", Color::Soft, Mark::Dashed(1.5), diagonal);
+    let x = Axis::linear(0.0, 1.0).of("stated probability of the first class", "1");
+    let y = Axis::linear(0.0, 1.05).of("share of right answers", "1");
+    Chart {
+        kind: "reliability",
+        title: "How far the stated probabilities can be trusted".to_owned(),
+        subtitle: format!(
+            "expected calibration error {ece}, Brier score {brier}; numbers: cases in the bin"
+        ),
+        width: WIDTH,
+        blocks: vec![Block::new(
+            1,
+            vec![Panel::new(470.0, x, y).with([diagonal, dots])],
+        )],
+        ..Chart::default()
+    }
+}
+
+/// Closures of all named tests with one effect, sorted, for right and for wrong names; `None` without any.
+fn closure(cases: &[Case]) -> Option<Chart> {
+    let mut series = Vec::new();
+    for (name, color, right) in [
+        ("right name", Color::Blue, true),
+        ("wrong name", Color::Vermilion, false),
+    ] {
+        let values = cases.iter().filter_map(|(truth, answer)| {
+            let CaseKind::Single(id) = truth.kind() else {
+                return None;
+            };
+            let named = matches!(answer.verdict, Some(Verdict::Named(_)));
+            let is_right = answer.named_groups() == [id.group()];
+            answer.closure.filter(|_| named && is_right == right)
+        });
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let count = values.len() as f64;
+        let places = values.iter().enumerate();
+        let places = places.map(|(at, value)| ((at as f64 + 0.5) / count, value.max(LEAST)));
+        let places: Vec<(f64, f64)> = places.collect();
+        let name = format!("{name} ({} tests)", values.len());
+        series.push(Series::points(
+            "",
+            color,
+            Mark::Line(1.2),
+            places.iter().copied(),
+        ));
+        series.push(Series::points(&name, color, Mark::Dot(3.5), places));
+    }
+    let x = Axis::linear(0.0, 1.0).of("share of tests", "1");
+    let y = Axis::linear(LEAST - 0.05, 1.1).of("closure", "1");
+    let panel = Panel::new(450.0, x, y).with(series);
+    (!panel.series.is_empty()).then(|| Chart {
+        kind: "closure",
+        title: "How far the named effect closes the gap on withheld data".to_owned(),
+        subtitle:
+            "1 = down to the noise, 0 = not at all; tests sorted by closure; one effect planted"
+                .to_owned(),
+        width: WIDTH,
+        blocks: vec![Block::new(1, vec![panel])],
+        ..Chart::default()
+    })
 }

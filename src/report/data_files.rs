@@ -1,48 +1,28 @@
 //! Results as comma separated values, one row each, numbers in full precision; frequency response functions also as
 //! universal file.
 
-use super::ReportError;
-use super::document::{Document, Method, ValueSection, method_name};
-use super::tables::estimated;
-use num_complex::Complex64;
+use crate::ReportError;
+use crate::document::{Document, EstimateMethod, Uncertain, method_name};
+use crate::tables::estimated;
 use tapjoint_analysis::Frf;
 use tapjoint_signal::recording::{
-    FrequencyResponse, FrequencyResponses, Point, UffError, UffFormat,
+    FrequencyResponse, FrequencyResponses, Point, RecordingError, UffFormat,
     encode_frequency_responses_uff,
 };
 
-/// Columns of `parameters.csv`.
-const PARAMETER_COLUMNS: [&str; 10] = [
-    "parameter",
-    "method",
-    "unit",
-    "value",
-    "std",
-    "low",
-    "high",
-    "std_scaled",
-    "low_scaled",
-    "high_scaled",
-];
-
-/// Columns of `modes.csv`.
-const MODE_COLUMNS: [&str; 15] = [
-    "mode",
-    "label",
-    "recording",
-    "method",
-    "frequency_Hz",
-    "std_Hz",
-    "line_frequency_Hz",
-    "half_line_Hz",
-    "interpolated_frequency_Hz",
-    "interpolated_bound_Hz",
-    "damping",
-    "damping_std",
-    "lambda",
-    "coherence",
-    "random_error",
-];
+/// Heads of `parameters.csv`.
+const PARAMETERS: &str =
+    "parameter,method,unit,value,std,low,high,std_scaled,low_scaled,high_scaled";
+/// Heads of `modes.csv`.
+const MODES: &str = "mode,label,recording,method,frequency_Hz,std_Hz,line_frequency_Hz,half_line_Hz,\
+     interpolated_frequency_Hz,interpolated_bound_Hz,damping,damping_std,lambda,coherence,random_error";
+/// Heads of `perturbation.csv`: `kind` is what was done to the frequencies, `percent` by how much
+/// where all were changed alike, `mode` which one where one was changed alone, `statistic` what of the
+/// estimates the three numbers are.
+const PERTURBATION: &str = "method,kind,percent,mode,statistic,kx,ky,kz";
+/// Heads of the table of frequency response functions.
+const FUNCTIONS: &str = "recording,response,form,unit,frequency_Hz,h1_real,h1_imaginary,h2_real,h2_imaginary,\
+     hv_real,hv_imaginary,coherence,random_error";
 
 /// Returns `parameters.csv`: one row for each parameter and method; only its header without an estimate.
 ///
@@ -55,63 +35,57 @@ pub fn render_parameters_csv(document: &Document) -> Result<String, ReportError>
     let mut rows = Vec::new();
     if let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) {
         let own = estimate.method;
+        let mut values = Vec::new();
+        for one in estimated(estimate) {
+            values.push((one.name, own, one.unit, *one.value));
+        }
         // Numbers without unit come first.
-        let (numbers, physical): (Vec<_>, Vec<_>) = estimated(estimate)
-            .into_iter()
-            .partition(|one| one.unit == "1");
-        for one in numbers.into_iter().chain(physical) {
-            rows.push(parameter_row(one.name, own, one.unit, one.value));
-        }
-        let mut closed = Vec::new();
-        if let Some(pairs) = &estimate.pairs {
-            if own != Method::Pairs {
-                closed.extend([
-                    ("kx", Method::Pairs, "1", pairs.kx),
-                    ("ky", Method::Pairs, "1", pairs.ky),
-                    ("kz", Method::Pairs, "1", pairs.kz),
-                    ("kt", Method::Pairs, "N/m", pairs.kt),
-                    ("kr", Method::Pairs, "N m/rad", pairs.kr),
-                    ("ktr", Method::Pairs, "N/rad", pairs.ktr),
-                ]);
+        values.sort_by_key(|(_, _, unit, _)| *unit != "1");
+        let pairs = estimate.pairs.iter().flat_map(|pairs| {
+            [
+                ("kx", "1", pairs.kx),
+                ("ky", "1", pairs.ky),
+                ("kz", "1", pairs.kz),
+                ("kt", "N/m", pairs.kt),
+                ("kr", "N m/rad", pairs.kr),
+                ("ktr", "N/rad", pairs.ktr),
+                ("closure", "1", pairs.closure),
+            ]
+        });
+        let pairs = pairs.map(|value| (EstimateMethod::Pairs, value));
+        let free = estimate.free_beam.iter().flat_map(|free| {
+            [
+                ("modulus", "Pa", Some(free.modulus)),
+                ("density", "kg/m3", Some(free.density)),
+            ]
+        });
+        let free = free.map(|value| (EstimateMethod::FreeBeam, value));
+        for (method, (name, unit, value)) in pairs.chain(free) {
+            // The closure is no value of the estimate itself.
+            if let Some(value) = value.filter(|_| method != own || name == "closure") {
+                let value = Uncertain {
+                    value,
+                    ..Uncertain::default()
+                };
+                values.push((name, method, unit, value));
             }
-            closed.push(("closure", Method::Pairs, "1", pairs.closure));
         }
-        if let Some(free) = estimate
-            .free_beam
-            .as_ref()
-            .filter(|_| own != Method::FreeBeam)
-        {
-            closed.extend([
-                ("modulus", Method::FreeBeam, "Pa", Some(free.modulus)),
-                ("density", Method::FreeBeam, "kg/m3", Some(free.density)),
+        for (name, method, unit, value) in values {
+            rows.push(vec![
+                name.to_owned(),
+                method.name().to_owned(),
+                unit.to_owned(),
+                number(Some(value.value)),
+                number(value.std),
+                number(value.low),
+                number(value.high),
+                number(value.std_scaled),
+                number(value.low_scaled),
+                number(value.high_scaled),
             ]);
         }
-        for (name, method, unit, value) in closed {
-            if let Some(value) = value {
-                let value = ValueSection {
-                    value,
-                    ..ValueSection::default()
-                };
-                rows.push(parameter_row(name, method, unit, &value));
-            }
-        }
     }
-    write(&PARAMETER_COLUMNS, rows)
-}
-
-fn parameter_row(name: &str, method: Method, unit: &str, value: &ValueSection) -> Vec<String> {
-    vec![
-        name.to_owned(),
-        method.name().to_owned(),
-        unit.to_owned(),
-        number(Some(value.value)),
-        number(value.std),
-        number(value.low),
-        number(value.high),
-        number(value.std_scaled),
-        number(value.low_scaled),
-        number(value.high_scaled),
-    ]
+    write(PARAMETERS, rows)
 }
 
 /// Returns `modes.csv`: one row for each resonance and each peak that is none.
@@ -139,22 +113,8 @@ pub fn render_modes_csv(document: &Document) -> Result<String, ReportError> {
             number(mode.random_error),
         ]);
     }
-    write(&MODE_COLUMNS, rows)
+    write(MODES, rows)
 }
-
-/// Columns of `perturbation.csv`: `kind` is what was done to the frequencies, `percent` by how much
-/// where all were changed alike, `mode` which one where one was changed alone, `statistic` what of the
-/// estimates the three numbers are.
-const PERTURBATION_COLUMNS: [&str; 8] = [
-    "method",
-    "kind",
-    "percent",
-    "mode",
-    "statistic",
-    "kx",
-    "ky",
-    "kz",
-];
 
 /// Returns `perturbation.csv`; only its header where nothing was perturbed.
 ///
@@ -165,14 +125,7 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
     for found in document.perturbation.iter().flatten() {
         let values = [found.kx, found.ky, found.kz];
         let percent = Some(found.percent);
-        rows.push(changed_row(
-            found.method,
-            "uniform",
-            percent,
-            None,
-            "value",
-            values,
-        ));
+        rows.push((found.method, "uniform", percent, None, "value", values));
     }
     for found in document.perturbation_averages.iter().flatten() {
         let errors = [found.kx_percent, found.ky_percent, found.kz_percent];
@@ -183,28 +136,13 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
         ];
         let percent = Some(found.percent);
         for (name, values) in [("mean error (%)", errors), ("error of mean (%)", of_mean)] {
-            rows.push(changed_row(
-                found.method,
-                "uniform",
-                percent,
-                None,
-                name,
-                values,
-            ));
+            rows.push((found.method, "uniform", percent, None, name, values));
         }
     }
     for found in document.resolution_span.iter().flatten() {
-        let method = found.method;
         for (name, index) in [("smallest", 0), ("largest", 1)] {
             let values = [found.kx, found.ky, found.kz].map(|range| Some(range?[index]));
-            rows.push(changed_row(
-                method,
-                "sign patterns",
-                None,
-                None,
-                name,
-                values,
-            ));
+            rows.push((found.method, "sign patterns", None, None, name, values));
         }
         for mode in &found.sensitivity {
             let change = [mode.kx_percent, mode.ky_percent, mode.kz_percent];
@@ -213,11 +151,19 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
                 mode.ky_percent_per_percent,
                 mode.kz_percent_per_percent,
             ];
-            let one = Some(mode.mode);
-            let name = "change by its bound (%)";
-            rows.push(changed_row(method, "one mode", None, one, name, change));
-            let name = "change per percent (%)";
-            rows.push(changed_row(method, "one mode", None, one, name, slope));
+            for (name, values) in [
+                ("change by its bound (%)", change),
+                ("change per percent (%)", slope),
+            ] {
+                rows.push((
+                    found.method,
+                    "one mode",
+                    None,
+                    Some(mode.mode),
+                    name,
+                    values,
+                ));
+            }
         }
     }
     for found in document.monte_carlo.iter().flatten() {
@@ -227,54 +173,23 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
             ("low", values.map(|value| value?.low)),
             ("high", values.map(|value| value?.high)),
         ] {
-            rows.push(changed_row(
-                found.method,
-                "monte carlo",
-                None,
-                None,
-                name,
-                values,
-            ));
+            rows.push((found.method, "monte carlo", None, None, name, values));
         }
     }
-    write(&PERTURBATION_COLUMNS, rows)
+    let rows = rows.into_iter();
+    let rows = rows.map(|(method, kind, percent, mode, statistic, values)| {
+        let mut cells = vec![
+            method.name().to_owned(),
+            kind.to_owned(),
+            number(percent),
+            mode.map(|mode| mode.to_string()).unwrap_or_default(),
+            statistic.to_owned(),
+        ];
+        cells.extend(values.map(number));
+        cells
+    });
+    write(PERTURBATION, rows.collect())
 }
-
-fn changed_row(
-    method: Method,
-    kind: &str,
-    percent: Option<f64>,
-    mode: Option<usize>,
-    statistic: &str,
-    values: [Option<f64>; 3],
-) -> Vec<String> {
-    let mut cells = vec![
-        method.name().to_owned(),
-        kind.to_owned(),
-        number(percent),
-        mode.map(|mode| mode.to_string()).unwrap_or_default(),
-        statistic.to_owned(),
-    ];
-    cells.extend(values.map(number));
-    cells
-}
-
-/// Columns of the table of frequency response functions.
-const FRF_COLUMNS: [&str; 13] = [
-    "recording",
-    "response",
-    "form",
-    "unit",
-    "frequency_Hz",
-    "h1_real",
-    "h1_imaginary",
-    "h2_real",
-    "h2_imaginary",
-    "hv_real",
-    "hv_imaginary",
-    "coherence",
-    "random_error",
-];
 
 /// Returns one row for each line of each function: all estimators, coherence and random error, in full
 /// precision; a cell is empty where a value does not exist.
@@ -293,7 +208,7 @@ pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
                 frf.lines.frequency(line).to_string(),
             ];
             for values in [&frf.h1, &frf.h2, &frf.hv] {
-                let value: Option<Complex64> = values.get(line).copied().flatten();
+                let value = values.get(line).copied().flatten();
                 row.extend([number(value.map(|v| v.re)), number(value.map(|v| v.im))]);
             }
             for values in [&frf.coherence, &frf.random_error] {
@@ -303,7 +218,7 @@ pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
             rows.push(row);
         }
     }
-    write(&FRF_COLUMNS, rows)
+    write(FUNCTIONS, rows)
 }
 
 /// Returns the shortest digits that give the same number back; empty where there is none.
@@ -314,9 +229,11 @@ pub(super) fn number(value: Option<f64>) -> String {
         .unwrap_or_default()
 }
 
-pub(super) fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, ReportError> {
+/// Returns rows below a line of heads.
+pub(super) fn write(heads: &str, rows: Vec<Vec<String>>) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(header).map_err(ReportError::Csv)?;
+    let heads = heads.split(',');
+    writer.write_record(heads).map_err(ReportError::Csv)?;
     for row in rows {
         writer.write_record(row).map_err(ReportError::Csv)?;
     }
@@ -333,7 +250,7 @@ pub(super) fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, R
 ///
 /// # Errors
 /// Values that are not finite.
-pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, UffError> {
+pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = Vec::new();
     for (number, group) in (1..).zip(frfs.chunk_by(|a, b| a.recording == b.recording)) {
         let Some(first) = group.first() else { continue };

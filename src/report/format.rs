@@ -176,14 +176,11 @@ pub fn signed_or_below(percent: f64) -> String {
 /// Lines lie at exact fractions, 335.625 ± 0.625, which rounding to two digits would spoil: where
 /// four decimals hold the bound exactly, the reading keeps them.
 pub fn line_reading(line: f64, half_line: f64) -> Rounded {
-    let exact = (0..=4).find(|decimals| {
-        let scaled = half_line * 10f64.powi(*decimals);
-        (scaled - scaled.round()).abs() < 1e-6 && scaled.round() >= 1.0
-    });
-    match exact {
+    match exact_decimals(half_line, 1.0) {
         Some(decimals) if line.is_finite() && line.abs() < PLAIN_LARGEST => {
             // The line itself may need one decimal more than its bound.
-            let decimals = (decimals.max(1) as usize).max(needed_decimals(line));
+            let needed = exact_decimals(line, f64::NEG_INFINITY).unwrap_or(0);
+            let decimals = decimals.max(1).max(needed);
             Rounded {
                 value: typographic(&format!("{line:.decimals$}")),
                 uncertainty: Some(format!("{half_line:.decimals$}")),
@@ -202,14 +199,13 @@ pub fn with_decimals_of(value: f64, written: &str) -> String {
     typographic(&format!("{value:.decimals$}"))
 }
 
-/// Decimals, at most four, that hold a value exactly; 0 where four do not suffice.
-fn needed_decimals(value: f64) -> usize {
-    (0..=4)
-        .find(|decimals| {
-            let scaled = value * 10f64.powi(*decimals as i32);
-            (scaled - scaled.round()).abs() < 1e-6
-        })
-        .unwrap_or(0)
+/// Decimals, at most four, that hold a value exactly and leave it at least so many units of the last; `None` where
+/// four do not suffice.
+fn exact_decimals(value: f64, least: f64) -> Option<usize> {
+    (0..=4).find(|decimals| {
+        let scaled = value * 10f64.powi(*decimals as i32);
+        (scaled - scaled.round()).abs() < 1e-6 && scaled.round() >= least
+    })
 }
 
 /// A unit as print has it: "m/s²" for "m/s2".

@@ -6,8 +6,8 @@ use super::ReportError;
 use super::document::{Document, WarningSection};
 use super::format::{capital, significant, trimmed};
 use super::tables::{self, Table};
+use super::words::diagnosis::gap_story;
 use super::words::findings::{no_estimate, sentences};
-use super::words::gap::gap_story;
 use tapjoint_beam::{Assembly, BeamTheory};
 use tapjoint_description::JointModel;
 
@@ -20,7 +20,7 @@ pub struct InlineFigure {
     pub caption: String,
     /// An `<svg>` element that this crate made.
     pub svg: String,
-    /// Its curves for the page's script, as [`super::chart::packed`] makes them.
+    /// Its curves for the page's script, as [`crate::picture::packed`] makes them.
     pub live: Option<String>,
     /// True where it is so high that in print it takes a page of its own.
     pub tall: bool,
@@ -48,7 +48,7 @@ struct Live {
 struct Page<'a> {
     title: String,
     facts: Vec<(&'static str, String)>,
-    warnings: &'a [WarningSection],
+    warnings: Vec<&'a WarningSection>,
     findings: Vec<String>,
     sections: Vec<Section<'a>>,
     method: Method,
@@ -92,12 +92,11 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     sections.retain(|section| section.id != "uncertainty" || !section.is_empty());
     let any_live = figures.iter().any(|figure| figure.live.is_some());
     let name = document.test.as_ref().map(|test| test.name.clone());
+    let name = name.filter(|name| !name.is_empty());
     let page = Page {
-        title: name
-            .filter(|name| !name.is_empty())
-            .unwrap_or_else(|| "Unnamed test".to_owned()),
+        title: name.unwrap_or_else(|| "Unnamed test".to_owned()),
         facts: facts(document),
-        warnings: &document.warnings,
+        warnings: document.main_warnings().collect(),
         findings: sentences(document),
         sections,
         method: Method {

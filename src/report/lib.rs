@@ -3,28 +3,31 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
-pub mod chart;
-pub mod charts;
 mod data_files;
 pub mod deck;
 pub mod document;
 pub mod format;
-pub mod html;
-pub mod tables;
-pub mod text;
-
-mod publication;
-
-/// Every sentence about a result, once.
-pub mod words {
-    pub mod findings;
-    pub mod gap;
-}
-
+mod html;
+pub mod picture;
 mod resolution;
 mod run;
 mod short_names;
-mod text_table;
+pub mod tables;
+mod text;
+
+/// The charts of a report, each built once from the results that it shows.
+pub mod charts {
+    pub mod diagnosis;
+    pub mod joint;
+    pub mod modes;
+    pub mod spectra;
+}
+
+/// Every sentence about a result, once.
+pub mod words {
+    pub mod diagnosis;
+    pub mod findings;
+}
 
 pub use data_files::{
     render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
@@ -33,14 +36,14 @@ pub use data_files::{
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
-pub use html::render_html;
-pub use publication::render_reproduction;
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     MODEL_FILE, earlier_files, render_cloud_picture, render_frf_picture, render_json, render_run,
     render_schema, render_spectrum_picture,
 };
-pub use text::{render_gap_text, render_readings, render_stages, render_text};
+pub use text::{
+    render_gap_text, render_readings, render_reproduction, render_stages, render_text, wrapped,
+};
 
 /// A finished file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +52,15 @@ pub struct ReportFile {
     pub name: String,
     /// Content.
     pub bytes: Vec<u8>,
+}
+
+impl ReportFile {
+    fn of(name: &str, text: String) -> ReportFile {
+        ReportFile {
+            name: name.to_owned(),
+            bytes: text.into_bytes(),
+        }
+    }
 }
 
 /// Reasons for which a report cannot be written.

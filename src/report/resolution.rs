@@ -1,39 +1,20 @@
 //! The study of resolution as text, table of values and picture.
 
-use super::ReportError;
-use super::chart::{PictureFormat, render_picture};
-use super::charts::resolution::resolution;
-use super::data_files::{number, write};
-use super::format::{MISSING, capital, optional, significant, trimmed};
-use super::tables::{Table, number as column};
-use super::text::{render_table, wrapped};
+use crate::ReportError;
+use crate::data_files::{number, write};
+use crate::format::{MISSING, capital, optional, significant, trimmed};
+use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, PictureFormat, Series, Tick, extent};
+use crate::tables::{Table, number as cell};
+use crate::text::{render_table, wrapped};
 use tapjoint_study::resolution::{
     EstimateMethod, ReadBy, ResolutionStudy, StudiedMode, StudiedStiffness, WindowName,
 };
 
-/// Columns of the CSV.
-const COLUMNS: [&str; 20] = [
-    "quantity",
-    "name",
-    "method",
-    "unit",
-    "block",
-    "lines",
-    "window",
-    "reading",
-    "band_low_Hz",
-    "band_high_Hz",
-    "line_spacing_Hz",
-    "half_line_bound",
-    "uniform_on_line_rms",
-    "rms",
-    "mean",
-    "p95",
-    "largest",
-    "found",
-    "own",
-    "draws",
-];
+/// Heads of the CSV.
+const HEADS: &str = "quantity,name,method,unit,block,lines,window,reading,band_low_Hz,band_high_Hz,line_spacing_Hz,\
+     half_line_bound,uniform_on_line_rms,rms,mean,p95,largest,found,own,draws";
+/// Labels of block sizes that fit under a panel.
+const MOST_BLOCKS: usize = 5;
 
 /// The study for a terminal of 80 columns.
 pub fn render_resolution(study: &ResolutionStudy) -> String {
@@ -48,7 +29,7 @@ pub fn render_resolution(study: &ResolutionStudy) -> String {
         study.noise_db,
         study.seed
     );
-    let lines = render_table(&resolution_lines(study));
+    let lines = render_table(&lines_table(study));
     let mut parts = vec![wrapped(&conditions, 0), lines];
     let mut windows: Vec<WindowName> = Vec::new();
     for answer in &study.answers {
@@ -61,11 +42,11 @@ pub fn render_resolution(study: &ResolutionStudy) -> String {
             parts.push(format!("WINDOW {}\n", window.name()));
         }
         for mode in &study.modes {
-            parts.push(render_table(&resolution_frequencies(study, window, mode)));
+            parts.push(render_table(&frequencies_table(study, window, mode)));
         }
         for stiffness in &study.stiffnesses {
             for method in EstimateMethod::ALL {
-                let table = resolution_stiffnesses(study, window, method, stiffness);
+                let table = stiffnesses_table(study, window, method, stiffness);
                 parts.push(render_table(&table));
             }
         }
@@ -129,7 +110,7 @@ pub fn render_resolution_csv(study: &ResolutionStudy) -> Result<String, ReportEr
             row.draws.to_string(),
         ]);
     }
-    write(&COLUMNS, rows)
+    write(HEADS, rows)
 }
 
 fn lines_of(study: &ResolutionStudy, block: usize) -> String {
@@ -145,47 +126,29 @@ pub fn render_resolution_picture(
     study: &ResolutionStudy,
     format: PictureFormat,
 ) -> Result<Vec<u8>, ReportError> {
-    render_picture(&resolution(study).draw(), format)
+    resolution(study).render(format)
 }
 
 /// Lines, spacing and length of record of each block size.
-fn resolution_lines(study: &ResolutionStudy) -> Table {
-    let mut columns = vec![
-        column("Block"),
-        column("Lines"),
-        column("Half line (% of band)"),
-    ];
-    let bands = study.blocks.first().map_or(&[][..], |block| &block.bands);
-    for band in bands {
-        let name = format!(
-            "{}\u{2013}{} Hz",
-            trimmed(band.low, 4),
-            trimmed(band.high, 4)
-        );
-        columns.push(column(&format!("{name}: spacing (Hz)")));
-        columns.push(column("record (s)"));
-    }
-    let mut rows = Vec::new();
-    for block in &study.blocks {
+fn lines_table(study: &ResolutionStudy) -> Table {
+    let rows = study.blocks.iter().map(|block| {
+        let half_line = significant(block.half_line_percent_of_band, 4);
         let mut row = vec![
-            block.block.to_string(),
-            block.lines.to_string(),
-            significant(block.half_line_percent_of_band, 4),
+            cell("Block", block.block.to_string()),
+            cell("Lines", block.lines.to_string()),
+            cell("Half line (% of band)", half_line),
         ];
         for band in &block.bands {
-            row.push(significant(band.spacing, 4));
-            row.push(significant(band.seconds, 3));
+            let (low, high) = (trimmed(band.low, 4), trimmed(band.high, 4));
+            let head = format!("{low}\u{2013}{high} Hz: spacing (Hz)");
+            row.push(cell(&head, significant(band.spacing, 4)));
+            row.push(cell("record (s)", significant(band.seconds, 3)));
         }
-        rows.push(row);
-    }
-    Table {
-        caption:
-            "Lines: half a line is band/(2 lines), lines = block/2.56; spacing; record of one tap"
-                .to_owned(),
-        columns,
-        rows,
-        note: String::new(),
-    }
+        row
+    });
+    let caption =
+        "Lines: half a line is band/(2 lines), lines = block/2.56; spacing; record of one tap";
+    Table::of(caption, rows, "")
 }
 
 /// Errors of one quantity at one block size and by one way of reading.
@@ -211,46 +174,34 @@ fn errors_table(
             readings.push(answer.reading);
         }
     }
-    let [first, second, share] = heads;
-    let mut columns = vec![column("Block"), column(first), column(second)];
-    columns.extend(readings.iter().map(|reading| column(reading.name())));
-    columns.push(column(share));
-    let mut rows = Vec::new();
-    for block in study.blocks.iter().map(|block| block.block) {
-        let errors = readings.iter().map(|reading| find(block, *reading));
+    let rows = study.blocks.iter().map(|block| {
+        let errors = readings.iter().map(|reading| find(block.block, *reading));
         let errors: Vec<Option<Errors>> = errors.collect();
         let any = errors.iter().flatten().next();
-        let mut row = vec![block.to_string()];
-        for bound in any.map_or([None; 2], |any| any.bounds) {
-            row.push(optional(bound, 3));
+        let mut row = vec![cell("Block", block.block.to_string())];
+        for (head, bound) in heads.iter().zip(any.map_or([None; 2], |any| any.bounds)) {
+            row.push(cell(head, optional(bound, 3)));
         }
-        for errors in &errors {
-            row.push(optional(errors.as_ref().and_then(|errors| errors.rms), 3));
+        for (reading, errors) in readings.iter().zip(&errors) {
+            let rms = errors.as_ref().and_then(|errors| errors.rms);
+            row.push(cell(reading.name(), optional(rms, 3)));
         }
-        row.push(match any {
+        let share = match any {
             // Rounded down: 100 % means all.
             Some(any) if any.draws > 0 => {
                 let percent = 100.0 * any.found as f64 / any.draws as f64;
                 format!("{} %", percent.floor())
             }
             _ => MISSING.to_owned(),
-        });
-        rows.push(row);
-    }
-    Table {
-        caption,
-        columns,
-        rows,
-        note: String::new(),
-    }
+        };
+        row.push(cell(heads[2], share));
+        row
+    });
+    Table::of(caption, rows, "")
 }
 
 /// Returns the rms errors of one mode's frequency in the band from which estimates take it.
-fn resolution_frequencies(
-    study: &ResolutionStudy,
-    window: WindowName,
-    mode: &StudiedMode,
-) -> Table {
+fn frequencies_table(study: &ResolutionStudy, window: WindowName, mode: &StudiedMode) -> Table {
     let caption = format!(
         "Mode {}, {} Hz, read in {}\u{2013}{} Hz{}: rms error of the frequency (Hz)",
         mode.mode,
@@ -279,7 +230,7 @@ fn resolution_frequencies(
 }
 
 /// Returns the rms errors of one stiffness by one method.
-fn resolution_stiffnesses(
+fn stiffnesses_table(
     study: &ResolutionStudy,
     window: WindowName,
     method: EstimateMethod,
@@ -311,4 +262,161 @@ fn resolution_stiffnesses(
             draws: row.draws,
         })
     })
+}
+
+/// The study's first window as a chart.
+fn resolution(study: &ResolutionStudy) -> Chart {
+    let window = study.answers.first();
+    let window = window.map_or(WindowName::Automatic, |answer| answer.window);
+    let mut readings: Vec<ReadBy> = study.answers.iter().map(|one| one.reading).collect();
+    readings.dedup();
+    readings.truncate(ReadBy::ALL.len());
+    let frequencies = readings
+        .iter()
+        .map(|reading| mode_curves(study, window, *reading));
+    let stiffnesses = readings
+        .iter()
+        .map(|reading| stiffness_curves(study, window, *reading));
+    let rows = [
+        (
+            "Frequencies",
+            "error of the frequency",
+            frequencies.collect(),
+        ),
+        (
+            "Stiffnesses",
+            "error of the stiffness",
+            stiffnesses.collect(),
+        ),
+    ];
+    let blocks = rows.map(
+        |(name, label, curves): (&str, &str, Vec<Vec<Series>>)| Block {
+            name: name.to_owned(),
+            ..Block::new(
+                readings.len().max(1),
+                panels(study, &readings, label, curves),
+            )
+        },
+    );
+    Chart {
+        kind: "resolution",
+        title: "Spectral resolution error against block size".to_owned(),
+        subtitle: format!(
+            "rms over {} virtual tests ({} fitted); window {}, damping {} %, noise {} dB below the peak",
+            study.draws,
+            study.fit_draws,
+            window.name(),
+            trimmed(100.0 * study.damping, 3),
+            study.noise_db
+        ),
+        blocks: blocks.into_iter().collect(),
+        ..Chart::default()
+    }
+}
+
+/// A panel for each reading, all with the same vertical axis.
+fn panels(
+    study: &ResolutionStudy,
+    readings: &[ReadBy],
+    label: &str,
+    curves: Vec<Vec<Series>>,
+) -> Vec<Panel> {
+    let heights = curves.iter().flatten().flat_map(|series| &series.y);
+    let (low, high) = extent(heights.copied()).unwrap_or((1e-3, 10.0));
+    let blocks = study.blocks.iter().map(|block| block.block as f64);
+    let (first, last) = extent(blocks.clone()).unwrap_or((512.0, 65536.0));
+    let mut x = Axis::logarithmic(first / 1.2, last * 1.2).of("block", "samples");
+    let stride = study.blocks.len().div_ceil(MOST_BLOCKS).max(1);
+    for (index, value) in blocks.enumerate() {
+        let label = (index % stride == 0).then(|| value.to_string());
+        x.names.push(Tick { value, label });
+    }
+    let mut panels = Vec::new();
+    for (reading, series) in readings.iter().zip(curves) {
+        let title = match reading {
+            ReadBy::Line => "read on the line",
+            ReadBy::Interpolated => "read between the lines",
+            ReadBy::Fit => "fitted",
+        };
+        let y = Axis::logarithmic(low / 1.5, high * 1.5).of(label, "%");
+        panels.push(Panel::new(300.0, x.clone(), y).titled(title).with(series));
+    }
+    panels
+}
+
+/// Errors over block size; values that are not positive have no place on the axis.
+fn curve(points: impl Iterator<Item = (usize, Option<f64>)>) -> Vec<(f64, f64)> {
+    let known = points.filter_map(|(block, error)| Some((block as f64, error?)));
+    known.filter(|(_, error)| *error > 0.0).collect()
+}
+
+/// A line with its points.
+fn marked(name: &str, color: Color, mark: Mark, points: Vec<(f64, f64)>) -> [Series; 2] {
+    let width = if matches!(mark, Mark::Dot(_)) {
+        2.0
+    } else {
+        1.3
+    };
+    let line = Series::points("", color, Mark::Line(width), points.clone());
+    [line, Series::points(name, color, mark, points)]
+}
+
+/// Errors of the frequencies in percent of each, and their half lines.
+fn mode_curves(study: &ResolutionStudy, window: WindowName, reading: ReadBy) -> Vec<Series> {
+    let mut curves = Vec::new();
+    for (index, mode) in study.modes.iter().enumerate() {
+        let color = Color::curve(index);
+        let rows = study.frequency_errors.iter().filter(|row| {
+            (row.window, row.reading) == (window, reading)
+                && (row.mode, row.band) == (mode.mode, mode.band)
+        });
+        let bounds = curve(
+            rows.clone()
+                .map(|row| (row.block, Some(100.0 * row.half_line / mode.frequency))),
+        );
+        // One entry of the legend explains the broken lines of all colours.
+        let name = if index == 0 { "half-line bound" } else { "" };
+        curves.push(Series::points(name, color, Mark::Dashed(1.3), bounds));
+        let name = format!("mode {}: {} Hz", mode.mode, significant(mode.frequency, 4));
+        let errors = curve(rows.map(|row| {
+            let percent = row.rms.map(|rms| 100.0 * rms / mode.frequency);
+            (row.block, percent)
+        }));
+        curves.extend(marked(&name, color, Mark::Dot(4.0), errors));
+    }
+    curves
+}
+
+/// Errors of the stiffnesses, the largest that half lines make of them, and the wanted accuracy.
+fn stiffness_curves(study: &ResolutionStudy, window: WindowName, reading: ReadBy) -> Vec<Series> {
+    let mut curves = Vec::new();
+    for (index, stiffness) in study.stiffnesses.iter().enumerate() {
+        let color = Color::curve(index);
+        for (method, words, mark) in [
+            (EstimateMethod::Pairs, "pairs", Mark::Ring(5.0)),
+            (EstimateMethod::Consistent, "consistent", Mark::Dot(4.0)),
+        ] {
+            let rows = study.stiffness_errors.iter().filter(|row| {
+                (row.window, row.reading) == (window, reading)
+                    && (row.method, row.parameter) == (method, stiffness.parameter)
+            });
+            if method == EstimateMethod::Consistent {
+                let bounds = rows
+                    .clone()
+                    .map(|row| (row.block, row.half_line_bound_percent));
+                curves.push(Series::points("", color, Mark::Dashed(1.3), curve(bounds)));
+            }
+            let name = format!("{}, {words}", stiffness.parameter);
+            let errors = curve(rows.map(|row| (row.block, row.rms_percent)));
+            curves.extend(marked(&name, color, mark, errors));
+        }
+    }
+    let blocks = study.blocks.iter().map(|block| block.block as f64);
+    if let Some((first, last)) = extent(blocks) {
+        let wanted = study.accuracy_percent;
+        let name = format!("wanted: {} %", trimmed(wanted, 3));
+        let ends = [(first, wanted), (last, wanted)];
+        curves.push(Series::points(&name, Color::Ink, Mark::Line(1.2), ends));
+    }
+    curves
 }

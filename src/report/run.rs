@@ -7,18 +7,15 @@ use serde_json::Value;
 use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint_signal::spectral::FrfEstimator;
 
-use super::chart::{Chart, PictureFormat, packed, render_picture, render_svg};
-use super::charts::amplitude::amplitude;
-use super::charts::gap::{gap, place_map};
-use super::charts::joint::{cloud, frequencies};
-use super::charts::shapes::shapes;
-use super::charts::spectra::{frf, spectrum};
-use super::charts::stabilisation::stabilisation;
-use super::charts::taps::taps;
-use super::document::Document;
-use super::html::{InlineFigure, render_html};
-use super::short_names::{ends_of_paths, stems};
-use super::{
+use crate::charts::diagnosis::{gap, place_map};
+use crate::charts::joint::{cloud, frequencies, shapes};
+use crate::charts::modes::{amplitude, stabilisation};
+use crate::charts::spectra::{frf, spectrum, taps};
+use crate::document::Document;
+use crate::html::{InlineFigure, render_html};
+use crate::picture::{Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
+use crate::short_names::{ends_of_paths, stems};
+use crate::{
     ReportError, ReportFile, render_modes_csv, render_parameters_csv, render_perturbation_csv,
 };
 
@@ -51,19 +48,16 @@ pub fn render_run(
     }
     // Before a figure that takes a page of its own, half of a page would stay empty.
     figures.sort_by_key(|figure| figure.tall);
-    let mut words = vec![
-        ("report.html", render_html(document, &figures)?),
-        ("report.json", json?),
-        ("parameters.csv", render_parameters_csv(document)?),
-        ("modes.csv", render_modes_csv(document)?),
-    ];
+    files.extend([
+        ReportFile::of("report.html", render_html(document, &figures)?),
+        ReportFile::of("report.json", json?),
+        ReportFile::of("parameters.csv", render_parameters_csv(document)?),
+        ReportFile::of("modes.csv", render_modes_csv(document)?),
+    ]);
     if document.perturbation.is_some() {
-        words.push(("perturbation.csv", render_perturbation_csv(document)?));
+        let text = render_perturbation_csv(document)?;
+        files.push(ReportFile::of("perturbation.csv", text));
     }
-    files.extend(words.into_iter().map(|(name, text)| ReportFile {
-        name: name.to_owned(),
-        bytes: text.into_bytes(),
-    }));
     Ok(files)
 }
 
@@ -79,7 +73,7 @@ pub fn render_spectrum_picture(
     let name = ends_of_paths(&[&recording.file]).concat();
     let chart = spectrum(recording, &name);
     let chart = chart.or_else(|| frf(recording, &name, &given_frfs(recording), &[]));
-    optional(chart, format)
+    chart.map(|chart| chart.render(format)).transpose()
 }
 
 /// Returns frequency response functions of a recording as a picture, all estimators shown; `None` without a hammer or
@@ -93,7 +87,8 @@ pub fn render_frf_picture(
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
     let name = ends_of_paths(&[&recording.file]).concat();
-    optional(frf(recording, &name, frfs, &FrfEstimator::ALL), format)
+    let chart = frf(recording, &name, frfs, &FrfEstimator::ALL);
+    chart.map(|chart| chart.render(format)).transpose()
 }
 
 /// The estimates under changed frequencies as a picture; `None` where there are none.
@@ -104,12 +99,9 @@ pub fn render_cloud_picture(
     document: &Document,
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
-    optional(cloud(document), format)
-}
-
-fn optional(chart: Option<Chart>, format: PictureFormat) -> Result<Option<Vec<u8>>, ReportError> {
-    let picture = chart.map(|chart| render_picture(&chart.draw(), format));
-    picture.transpose()
+    cloud(document)
+        .map(|chart| chart.render(format))
+        .transpose()
 }
 
 /// Returns a recording's frequency response functions; none without a hammer.
@@ -117,17 +109,21 @@ fn given_frfs(recording: &RecordingResult) -> Vec<Frf> {
     frfs_of(recording, &FrfSettings::default()).unwrap_or_default()
 }
 
-/// Returns a picture as files for screens and for papers, and for the page.
+/// Returns a picture as files for screens and for papers.
+pub(crate) fn picture_files(name: &str, drawing: &Drawing) -> Result<[ReportFile; 2], ReportError> {
+    let png = render_picture(drawing, PictureFormat::Png)?;
+    let svg = render_picture(drawing, PictureFormat::Svg)?;
+    Ok(
+        [("png", png), ("svg", svg)].map(|(ending, bytes)| ReportFile {
+            name: format!("{name}.{ending}"),
+            bytes,
+        }),
+    )
+}
+
+/// Returns a picture as files, and for the page.
 fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
     let drawing = chart.draw();
-    let png = ReportFile {
-        name: format!("{name}.png"),
-        bytes: render_picture(&drawing, PictureFormat::Png)?,
-    };
-    let svg = ReportFile {
-        name: format!("{name}.svg"),
-        bytes: render_picture(&drawing, PictureFormat::Svg)?,
-    };
     let figure = InlineFigure {
         section: match chart.kind {
             "taps" => "recordings",
@@ -141,7 +137,7 @@ fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFig
         tall: drawing.height > drawing.width,
         live: chart.page().as_ref().map(packed).transpose()?,
     };
-    Ok(([png, svg], figure))
+    Ok((picture_files(name, &drawing)?, figure))
 }
 
 /// Returns all pictures that there are data for, with the names of their files without ending.

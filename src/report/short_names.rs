@@ -11,7 +11,14 @@ const SHORTEST: usize = 4;
 /// that all share, without the words that all begin and end with, and at last without their middles. A way
 /// in which two names would be the same is left out.
 pub fn ways(names: &[String]) -> Vec<Vec<String>> {
-    let plain = without_ending(&without_folder(names));
+    let without_folder = without_shared(names, |name| {
+        name.split_at(name.rfind(['/', '\\']).map_or(0, |at| at + 1))
+    });
+    let plain = without_shared(&without_folder, |name| {
+        let place = name.rfind('.').filter(|place| *place > 0);
+        let (plain, ending) = name.split_at(place.unwrap_or(name.len()));
+        (ending, plain)
+    });
     let cores = cores(&plain);
     let longest = cores.iter().map(|core| core.chars().count()).max();
     let shorter = (SHORTEST..longest.unwrap_or(0)).rev();
@@ -41,33 +48,11 @@ pub fn ends_of_paths(files: &[&str]) -> Vec<String> {
     ends
 }
 
-/// Returns the names without the folder that all share.
-fn without_folder(names: &[String]) -> Vec<String> {
-    let places = names.iter().map(|name| name.rfind(['/', '\\']));
-    let folders = names.iter().zip(places);
-    let mut folders = folders.map(|(name, place)| &name[..place.map_or(0, |at| at + 1)]);
-    let first = folders.next().unwrap_or_default();
-    match folders.all(|folder| folder == first) {
-        true => names
-            .iter()
-            .map(|name| name[first.len()..].to_owned())
-            .collect(),
-        false => names.to_vec(),
-    }
-}
-
-/// Returns the names without the ending that all share.
-fn without_ending(names: &[String]) -> Vec<String> {
-    let mut endings = names.iter().map(|name| {
-        let place = name.rfind('.').filter(|place| *place > 0);
-        place.map_or("", |place| &name[place..])
-    });
-    let first = endings.next().unwrap_or_default();
-    match endings.all(|ending| ending == first) {
-        true => {
-            let plain = names.iter().map(|name| &name[..name.len() - first.len()]);
-            plain.map(str::to_owned).collect()
-        }
+/// Returns the names without the part that all share: names are split into that part and the rest.
+fn without_shared(names: &[String], split: impl Fn(&str) -> (&str, &str)) -> Vec<String> {
+    let parts: Vec<(&str, &str)> = names.iter().map(|name| split(name)).collect();
+    match parts.iter().all(|(shared, _)| *shared == parts[0].0) {
+        true => parts.iter().map(|(_, rest)| (*rest).to_owned()).collect(),
         false => names.to_vec(),
     }
 }

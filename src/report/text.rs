@@ -1,71 +1,62 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
-use super::document::{Document, ReadBy, RecordingSection, method_name};
-use super::format::{capital, signed_percent, significant, trimmed};
-use super::tables::{self, Table};
-pub use super::text_table::{render_table, wrapped};
-use super::words::findings::{brief, no_estimate};
-use super::words::gap::gap_story;
+use std::collections::BTreeSet;
+
+use crate::document::{Document, ReadBy, method_name};
+use crate::format::{MISSING, capital, signed_percent, significant, trimmed};
+use crate::short_names::ways;
+use crate::tables::{self, Column, Place, Table, listed};
+use crate::words::diagnosis::gap_story;
+use crate::words::findings::{brief, no_estimate};
+use tapjoint_study::publication::{Reproduction, Verdict};
 
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
 
 /// Everything the document holds.
 pub fn render_text(document: &Document) -> String {
-    let sections = [
-        joined(&[tables::datasets(document)]),
-        recordings(document),
-        taps(document),
-        modes(document),
-        frfs(document),
-        estimate(document),
-        prediction(document),
-        gap(document),
-        perturbation(document),
-        quality(document),
-        warnings(document),
-        ending(document),
-    ];
-    let mut text = String::new();
-    for section in sections.iter().filter(|section| !section.is_empty()) {
-        if !text.is_empty() {
-            text.push('\n');
-        }
-        text.push_str(section);
-    }
-    text
-}
-
-/// The recordings, and of recordings that were only looked at their channels; empty without any.
-pub fn recordings(document: &Document) -> String {
+    // Channels are shown where recordings were only looked at.
     let inspected = document.modes.is_none();
     let channels = tables::channels(document).filter(|_| inspected);
-    joined(&[tables::recordings(document), channels])
-}
-
-/// The taps; empty without any. Of many taps the rejected ones, and how many were used.
-pub fn taps(document: &Document) -> String {
-    let recordings = document.recordings.as_deref().unwrap_or_default();
-    let count: usize = recordings
-        .iter()
-        .map(|recording| recording.taps.len())
-        .sum();
-    if count > MOST_TAPS {
-        joined(&[tables::taps_used(document), tables::rejected_taps(document)])
-    } else {
-        joined(&[tables::taps(document)])
-    }
+    let recordings = document.recordings.iter().flatten();
+    let taps: usize = recordings.map(|recording| recording.taps.len()).sum();
+    // Many taps are not listed: only the rejected ones are, and how many were used.
+    let taps = match taps > MOST_TAPS {
+        true => [tables::taps_used(document), tables::rejected_taps(document)],
+        false => [tables::taps(document), None],
+    };
+    joined([
+        plain(tables::datasets(document)),
+        joined([plain(tables::recordings(document)), plain(channels)]),
+        joined(taps.map(plain)),
+        modes(document),
+        noted(tables::frfs(document)),
+        estimate(document),
+        plain(tables::prediction(document)),
+        gap(document),
+        joined([
+            plain(tables::perturbation(document)),
+            plain(tables::averages(document)),
+            noted(tables::spans(document)),
+            noted(tables::sensitivity(document)),
+            noted(tables::monte_carlo(document)),
+        ]),
+        // The ending counts all checks.
+        plain(tables::quality_doubts(document)),
+        warnings(document),
+        ending(document),
+    ])
 }
 
 /// The modes; empty without any, and where their frequency response functions are listed.
-pub fn modes(document: &Document) -> String {
+fn modes(document: &Document) -> String {
     let listed = document.frfs.as_ref().is_some_and(|frfs| !frfs.is_empty());
     let Some(table) = tables::modes(document).filter(|_| !listed) else {
         return String::new();
     };
+    let mut text = render_table(&table);
     let modes = document.modes.as_deref().unwrap_or_default();
-    let fitted = modes.iter().any(|mode| mode.method == Some(ReadBy::Fit));
-    let note = if fitted {
+    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
         // The numbered modes without a fit: " (mode 3: interpolated; mode 4: line)".
         let others = modes.iter().filter(|mode| mode.method != Some(ReadBy::Fit));
         let others = others
@@ -80,82 +71,45 @@ pub fn modes(document: &Document) -> String {
              \u{b1} half line; damping \u{b1} one standard deviation.",
             tables::fitted_to(document),
         );
-        wrapped(&note, 0)
-    } else {
-        String::new()
-    };
-    let from = tables::modes_from(document).map_or(String::new(), |from| wrapped(&from, 0));
-    render_table(&table) + &note + &from
-}
-
-/// The resonances on the frequency response functions; empty where those were not asked for.
-pub fn frfs(document: &Document) -> String {
-    noted(tables::frfs(document))
+        text.push_str(&wrapped(&note, 0));
+    }
+    text.extend(tables::modes_from(document).map(|from| wrapped(&from, 0)));
+    text
 }
 
 /// The estimate and how far its regression closes, or why there is none; empty where it was not
 /// asked for.
-pub fn estimate(document: &Document) -> String {
-    match &document.estimate {
-        None => String::new(),
+fn estimate(document: &Document) -> String {
+    let found = match &document.estimate {
+        None => return String::new(),
         Some(None) => {
             let words = no_estimate(document).unwrap_or_default();
-            wrapped(&format!("{}.", capital(&words)), 0)
+            return wrapped(&format!("{}.", capital(&words)), 0);
         }
-        Some(Some(found)) => {
-            let mut text = joined(&[tables::parameters(document)]);
-            if let Some(methods) = tables::methods(document) {
-                text.push('\n');
-                text.push_str(&render_table(&methods));
-            }
-            let closure = found.pairs.as_ref().and_then(|pairs| pairs.closure);
-            if let Some(closure) = closure {
-                let percent = signed_percent(Some(100.0 * closure));
-                let words = format!(
-                    "From modes {}. The pair regression contradicts itself by {percent} % (0: not at all).",
-                    listed(&found.modes_used)
-                );
-                text.push_str(&wrapped(&words, 0));
-            }
-            for warning in document.warnings_beside() {
-                let note = format!("note ({}): {}", warning.code, warning.text);
-                text.push_str(&wrapped(&note, 2));
-            }
-            text
-        }
+        Some(Some(found)) => found,
+    };
+    let mut text = plain(tables::parameters(document));
+    if let Some(methods) = tables::methods(document) {
+        text.push('\n');
+        text.push_str(&render_table(&methods));
     }
-}
-
-fn listed(modes: &[usize]) -> String {
-    let modes: Vec<String> = modes.iter().map(usize::to_string).collect();
-    modes.join(", ")
-}
-
-/// Measured beside predicted frequencies; empty without a prediction.
-pub fn prediction(document: &Document) -> String {
-    joined(&[tables::prediction(document)])
-}
-
-/// The estimates under changed frequencies; empty where it was not computed.
-pub fn perturbation(document: &Document) -> String {
-    let texts = [
-        joined(&[tables::perturbation(document)]),
-        joined(&[tables::averages(document)]),
-        noted(tables::spans(document)),
-        noted(tables::sensitivity(document)),
-        noted(tables::monte_carlo(document)),
-    ];
-    let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
-    texts.join("\n")
-}
-
-/// The checks of good practice that leave a doubt; empty without any. The ending counts them all.
-pub fn quality(document: &Document) -> String {
-    joined(&[tables::quality_doubts(document)])
+    if let Some(closure) = found.pairs.as_ref().and_then(|pairs| pairs.closure) {
+        let percent = signed_percent(Some(100.0 * closure));
+        let words = format!(
+            "From modes {}. Self-check of the pair regression (closure): {percent} %; 0 is perfect.",
+            listed(&found.modes_used)
+        );
+        text.push_str(&wrapped(&words, 0));
+    }
+    for warning in document.warnings_beside() {
+        let note = format!("note ({}): {}", warning.code, warning.text);
+        text.push_str(&wrapped(&note, 2));
+    }
+    text
 }
 
 /// The warnings that concern the result; empty without any. Those of the pair regression stand with it.
-pub fn warnings(document: &Document) -> String {
+fn warnings(document: &Document) -> String {
     document
         .main_warnings()
         .map(|warning| wrapped(&format!("warning ({}): {}", warning.code, warning.text), 2))
@@ -163,7 +117,7 @@ pub fn warnings(document: &Document) -> String {
 }
 
 /// The findings, in five lines at most (longer where a reason is given).
-pub fn ending(document: &Document) -> String {
+fn ending(document: &Document) -> String {
     let lines = brief(document);
     if lines.is_empty() {
         return String::new();
@@ -174,89 +128,77 @@ pub fn ending(document: &Document) -> String {
     format!("What was found\n{}", lines.collect::<String>())
 }
 
-/// A table with what its columns mean.
+/// A table without what its columns mean; empty without one.
+fn plain(table: Option<Table>) -> String {
+    table.as_ref().map_or_else(String::new, render_table)
+}
+
+/// A table with what its columns mean; empty without one.
 fn noted(table: Option<Table>) -> String {
-    table.map_or(String::new(), |table| {
+    table.map_or_else(String::new, |table| {
         render_table(&table) + &wrapped(&table.note, 0)
     })
 }
 
-fn joined(tables: &[Option<Table>]) -> String {
-    let texts: Vec<String> = tables.iter().flatten().map(render_table).collect();
-    texts.join("\n")
+/// Those of the parts that are not empty, with an empty line between them.
+fn joined<const N: usize>(parts: [String; N]) -> String {
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join("\n")
 }
 
 /// The errors of the nominal model, the story of the gap, and the hypotheses.
 pub fn render_gap_text(document: &Document) -> String {
-    let sections = [prediction(document), gap(document), warnings(document)];
-    let said: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
-    said.join("\n")
+    let prediction = plain(tables::prediction(document));
+    joined([prediction, gap(document), warnings(document)])
 }
 
 /// The story of the gap and the hypotheses; empty without a diagnosis.
 fn gap(document: &Document) -> String {
-    let story: String = gap_story(document)
-        .iter()
-        .map(|sentence| wrapped(sentence, 2) + "\n")
-        .collect();
+    let story = gap_story(document);
+    let story = story.iter().map(|sentence| wrapped(sentence, 2) + "\n");
     let tables = [tables::hypotheses(document), tables::next_tests(document)];
-    let tables: Vec<String> = tables
-        .into_iter()
-        .map(noted)
-        .filter(|table| !table.is_empty())
-        .collect();
-    let tables = tables.join("\n");
-    if story.is_empty() || tables.is_empty() {
-        return story + &tables;
-    }
-    format!("{story}\n{tables}")
+    joined([story.collect(), joined(tables.map(noted))])
 }
 
 /// Returns a line for each recording, the peaks and the estimate; empty where nothing was computed.
 pub fn render_stages(document: &Document) -> String {
-    let recordings = document.recordings.as_deref().unwrap_or_default();
-    let mut lines: Vec<String> = recordings.iter().map(recording_stage).collect();
+    let mut lines = Vec::new();
+    for found in document.recordings.iter().flatten() {
+        let accepted = found.taps.iter().filter(|tap| tap.accepted).count();
+        let mut parts = vec![format!("{} channels", found.channels)];
+        if let Some((rate, seconds)) = found.sample_rate.zip(found.seconds) {
+            parts.push(format!("{} Hz, {seconds:.2} s", trimmed(rate, 6)));
+            parts.push(format!("{accepted} of {} taps accepted", found.taps.len()));
+        }
+        if let Some([low, high]) = found.band {
+            parts.push(format!("{} to {} Hz", trimmed(low, 6), trimmed(high, 6)));
+        }
+        if let Some((block, spacing)) = found.block.zip(found.line_spacing) {
+            let spacing = significant(spacing, 4);
+            parts.push(format!(
+                "blocks of {block} samples, lines {spacing} Hz apart"
+            ));
+        }
+        parts.extend(found.window.iter().map(|window| format!("{window} window")));
+        lines.push(format!("{}: {}", found.file, parts.join("; ")));
+    }
     if let Some(modes) = &document.modes {
         let numbered = modes.iter().filter(|mode| mode.mode.is_some()).count();
         let peaks = modes.len();
         lines.push(format!("modes: {peaks} peaks, {numbered} with a number"));
     }
     if let Some(found) = document.estimate.as_ref().and_then(Option::as_ref) {
-        let mut head = format!(
-            "estimate: {} from modes {}",
+        let misfit = found.misfit.as_ref();
+        lines.push(format!(
+            "estimate: {} from modes {}{}",
             found.method.name(),
-            listed(&found.modes_used)
-        );
-        if let Some(misfit) = &found.misfit {
-            head.push_str(&format!("; {}", misfit.verdict));
-        }
-        lines.push(head);
+            listed(&found.modes_used),
+            misfit.map_or_else(String::new, |misfit| format!("; {}", misfit.verdict))
+        ));
         let statements = found.identifiability.iter().flat_map(|can| &can.statements);
         lines.extend(statements.map(|words| format!("estimate: {words}")));
     }
     lines.iter().map(|line| format!("{line}\n")).collect()
-}
-
-fn recording_stage(found: &RecordingSection) -> String {
-    let accepted = found.taps.iter().filter(|tap| tap.accepted).count();
-    let mut parts = vec![format!("{} channels", found.channels)];
-    if let Some((rate, seconds)) = found.sample_rate.zip(found.seconds) {
-        parts.push(format!("{} Hz, {seconds:.2} s", trimmed(rate, 6)));
-        parts.push(format!("{accepted} of {} taps accepted", found.taps.len()));
-    }
-    if let Some([low, high]) = found.band {
-        parts.push(format!("{} to {} Hz", trimmed(low, 6), trimmed(high, 6)));
-    }
-    if let Some((block, spacing)) = found.block.zip(found.line_spacing) {
-        let spacing = significant(spacing, 4);
-        parts.push(format!(
-            "blocks of {block} samples, lines {spacing} Hz apart"
-        ));
-    }
-    if let Some(window) = &found.window {
-        parts.push(format!("{window} window"));
-    }
-    format!("{}: {}", found.file, parts.join("; "))
 }
 
 /// Returns every tap and every peak of every recording; empty without recordings.
@@ -285,4 +227,387 @@ pub fn render_readings(document: &Document) -> String {
         }
     }
     text
+}
+
+/// Width of the terminal (characters).
+pub const WIDTH: usize = 80;
+
+/// Space between columns (characters).
+const GAP: usize = 2;
+/// Narrowest a column of words is cut to (characters).
+const NARROWEST: usize = 8;
+/// A column of words this wide reads well (characters): names of files give way for no more.
+const READABLE: usize = 24;
+/// So many ways to shorten names leave out only what all of them share: these come before a column goes.
+const GENTLE: usize = 3;
+/// Most rows printed: a terminal is no place for a thousand taps.
+const MOST_ROWS: usize = 40;
+
+/// A table as it is printed.
+struct Layout {
+    table: Table,
+    /// Lines of each column's head.
+    heads: Vec<Vec<String>>,
+    shown: Vec<Shown>,
+}
+
+/// A column that is printed.
+#[derive(Clone, Copy)]
+struct Shown {
+    index: usize,
+    /// Characters.
+    width: usize,
+}
+
+/// Returns a table with its caption, in 80 columns. Heads go to two lines where one has no room, names of files
+/// are shortened so that they stay apart, columns that can be had elsewhere are left out, then words that do
+/// not fit go on below, and at last columns do. Numbers are never cut.
+pub fn render_table(table: &Table) -> String {
+    let Layout {
+        table,
+        heads,
+        shown,
+    } = layout(table);
+    let mut text = wrapped(&table.caption, 0);
+    for part in parts(&shown) {
+        text.push_str(&row(&table, &part, &heads));
+        text.push_str(&"-".repeat(total(&part).min(WIDTH)));
+        text.push('\n');
+        for cells in table.rows.iter().take(MOST_ROWS) {
+            let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
+            text.push_str(&row(&table, &part, &cells));
+        }
+    }
+    let more = table.rows.len().saturating_sub(MOST_ROWS);
+    if more > 0 {
+        text.push_str(&format!("... and {more} more\n"));
+    }
+    text
+}
+
+/// Returns the width of columns with the space between them.
+fn total(shown: &[Shown]) -> usize {
+    let widths = shown.iter().map(|column| column.width).sum::<usize>();
+    widths + GAP * shown.len().saturating_sub(1)
+}
+
+/// Returns the columns in as many parts as have room side by side, each with the first column, which names the rows.
+fn parts(shown: &[Shown]) -> Vec<Vec<Shown>> {
+    let mut parts: Vec<Vec<Shown>> = Vec::new();
+    for &column in shown {
+        match parts.last_mut() {
+            Some(part) if total(part) + GAP + column.width <= WIDTH => part.push(column),
+            None => parts.push(vec![column]),
+            Some(_) => parts.push(vec![shown[0], column]),
+        }
+    }
+    parts
+}
+
+/// Returns the first layout that has room, in the order of what it costs.
+fn layout(table: &Table) -> Layout {
+    let mut named = with_short_names(table);
+    let spacious = named.iter().take(GENTLE).map(|table| (table, true));
+    for (table, spacious) in spacious.chain(named.iter().map(|table| (table, false))) {
+        let names = table.columns.iter().map(|column| column.name.as_str());
+        let one_line = names.clone().map(|name| vec![name.to_owned()]);
+        // On two lines: its unit below its name, or its last word.
+        let two_lines = names.map(|name| {
+            let place = name.rfind(" (").or_else(|| name.rfind(' '));
+            let (first, second) = name.split_at(place.unwrap_or(0));
+            vec![first.to_owned(), second.trim_start().to_owned()]
+        });
+        for heads in [one_line.collect(), two_lines.collect::<Vec<_>>()] {
+            let mut shown = natural_widths(table, &heads, spacious);
+            let least = shown.iter().map(|column| {
+                let head = &table.columns[column.index];
+                match head.is_number || is_name(head) {
+                    true => column.width,
+                    false => column.width.min(READABLE),
+                }
+            });
+            if least.sum::<usize>() <= room(shown.len()) {
+                shrink(table, &mut shown);
+                let table = table.clone();
+                return Layout {
+                    table,
+                    heads,
+                    shown,
+                };
+            }
+        }
+    }
+    let table = named.pop().unwrap_or_else(|| table.clone());
+    // Heads no wider than the cells below them, as far as their words allow, all on as many lines.
+    let mut heads = Vec::new();
+    for (index, column) in table.columns.iter().enumerate() {
+        let cells = table.rows.iter().filter_map(|row| row.get(index));
+        let words = column.name.split(' ').map(length);
+        let width = cells.map(|cell| length(cell)).chain(words).max();
+        heads.push(broken(&column.name, width.unwrap_or(0)));
+    }
+    let lines = heads.iter().map(Vec::len).max().unwrap_or(0);
+    for head in &mut heads {
+        head.splice(..0, vec![String::new(); lines - head.len()]);
+    }
+    let mut shown = natural_widths(&table, &heads, false);
+    shrink(&table, &mut shown);
+    Layout {
+        table,
+        heads,
+        shown,
+    }
+}
+
+/// Returns the table with its names of files as they are, then shorter and shorter.
+fn with_short_names(table: &Table) -> Vec<Table> {
+    let Some(index) = table.columns.iter().position(is_name) else {
+        return vec![table.clone()];
+    };
+    let cells = table.rows.iter().filter_map(|row| row.get(index));
+    let names: BTreeSet<&String> = cells.filter(|c| !c.is_empty() && *c != MISSING).collect();
+    let names: Vec<String> = names.into_iter().cloned().collect();
+    let mut tables = Vec::new();
+    for way in ways(&names) {
+        let mut table = table.clone();
+        for cell in table.rows.iter_mut().filter_map(|row| row.get_mut(index)) {
+            let place = names.iter().position(|name| name == cell);
+            if let Some(short) = place.and_then(|place| way.get(place)) {
+                cell.clone_from(short);
+            }
+        }
+        if way != names {
+            table.columns[index].name = "File".to_owned();
+        }
+        tables.push(table);
+    }
+    tables
+}
+
+/// Returns the characters that columns share.
+fn room(columns: usize) -> usize {
+    WIDTH.saturating_sub(GAP * columns.saturating_sub(1))
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// Returns the columns with widths that hold every head and cell on one line; with those that are left out where
+/// there is no room, or without.
+fn natural_widths(table: &Table, heads: &[Vec<String>], spacious: bool) -> Vec<Shown> {
+    let mut shown = Vec::new();
+    for (index, column) in table.columns.iter().enumerate() {
+        if column.place == Place::Everywhere || spacious && column.place == Place::Spacious {
+            let head = heads.get(index).into_iter().flatten();
+            let rows = table.rows.iter().take(MOST_ROWS);
+            let cells = rows.filter_map(|row| row.get(index));
+            let width = head.chain(cells).map(|text| length(text)).max();
+            let width = width.unwrap_or(0);
+            shown.push(Shown { index, width });
+        }
+    }
+    shown
+}
+
+/// Shrinks columns of words where they pass the terminal's width, names of files last.
+fn shrink(table: &Table, shown: &mut [Shown]) {
+    let room = room(shown.len());
+    while shown.iter().map(|column| column.width).sum::<usize>() > room {
+        let words = shown
+            .iter_mut()
+            .filter(|column| !table.columns[column.index].is_number && column.width > NARROWEST);
+        let widest =
+            words.max_by_key(|column| (!is_name(&table.columns[column.index]), column.width));
+        match widest {
+            Some(column) => column.width -= 1,
+            None => break,
+        }
+    }
+}
+
+/// True for a column of names of files, which are shortened before they are broken.
+fn is_name(column: &Column) -> bool {
+    matches!(column.name.as_str(), "Recording" | "File")
+}
+
+/// Returns one row, on as many lines as its longest cell of words needs.
+fn row(table: &Table, shown: &[Shown], cells: &[Vec<String>]) -> String {
+    let mut columns: Vec<Vec<String>> = Vec::new();
+    for column in shown {
+        let cell = cells.get(column.index).into_iter().flatten();
+        columns.push(match table.columns[column.index].is_number {
+            true => cell.cloned().collect(),
+            false => cell.flat_map(|text| broken(text, column.width)).collect(),
+        });
+    }
+    let lines = columns.iter().map(Vec::len).max().unwrap_or(0);
+    let mut text = String::new();
+    for line in 0..lines {
+        let mut padded = Vec::new();
+        for (column, pieces) in shown.iter().zip(&columns) {
+            let piece = pieces.get(line).map_or("", String::as_str);
+            let (piece, width) = (piece.replace('\u{a0}', " "), column.width);
+            padded.push(match table.columns[column.index].is_number {
+                true => format!("{piece:>width$}"),
+                false => format!("{piece:<width$}"),
+            });
+        }
+        text.push_str(padded.join("  ").trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+/// Returns a text in lines of at most `width` characters, broken between words where that is possible.
+fn broken(text: &str, width: usize) -> Vec<String> {
+    // A number stays with its unit: "mains 50 Hz".
+    let text = text.replace(" Hz", "\u{a0}Hz");
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let mut rest: Vec<char> = word.chars().collect();
+        let used = lines.last().map_or(0, |line| length(line));
+        if used > 0 && used + 1 + rest.len() <= width {
+            if let Some(line) = lines.last_mut() {
+                line.push(' ');
+                line.extend(rest);
+            }
+            continue;
+        }
+        while !rest.is_empty() {
+            let piece: String = rest.drain(..rest.len().min(width.max(1))).collect();
+            match lines.last_mut() {
+                Some(line) if line.is_empty() => line.push_str(&piece),
+                _ => lines.push(piece),
+            }
+        }
+    }
+    lines
+}
+
+/// Returns a text broken into lines of at most 80 characters; lines after the first are indented.
+pub fn wrapped(text: &str, indent: usize) -> String {
+    let lines = lines_of(text, WIDTH, indent);
+    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
+    lines.join("\n").replace('\u{a0}', " ") + "\n"
+}
+
+/// Returns a text in lines of at most `width` characters; lines after the first are indented.
+pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    // Lines are not broken at no-break spaces.
+    let words = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
+    for word in words.filter(|word| !word.is_empty()) {
+        let mut word = word.to_owned();
+        let room = width.saturating_sub(indent);
+        if length(&word) > room {
+            word = word.chars().take(room.saturating_sub(1)).collect();
+            word.push('\u{2026}');
+        }
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(&word),
+            Some(line) if length(line) + 1 + length(&word) <= width => {
+                line.push(' ');
+                line.push_str(&word);
+            }
+            _ => lines.push(" ".repeat(indent) + &word),
+        }
+    }
+    lines
+}
+
+/// Renders all tables, each with its remarks, and a count of the verdicts.
+pub fn render_reproduction(reproduction: &Reproduction) -> String {
+    let mut text = String::from(
+        "The tables of Ingole & Chatterjee beside our numbers\n\n\
+         reproduces: yes = equal within the row's tolerance (one unit in the last\n\
+         printed digit, unless the rounding of the input is known to leave more);\n\
+         rounding = different, but not beyond what that rounding does; NO (n) = see\n\
+         remark n; given = measured or chosen, nothing to compute.\n",
+    );
+    for table in &reproduction.tables {
+        text.push_str(&format!("\nTable {}: {}\n", table.number, table.title));
+        text.push_str(&line("", "printed", "ours", "diff %", "reproduces"));
+        let mut remarks: Vec<&str> = Vec::new();
+        for row in &table.rows {
+            let mut verdict = match row.verdict {
+                Verdict::Reproduces => "yes",
+                Verdict::WithinRounding => "rounding",
+                Verdict::DoesNotReproduce => "NO",
+                Verdict::Given => "given",
+            }
+            .to_owned();
+            if let Some(remark) = row.remark {
+                let known = remarks.iter().position(|known| *known == remark);
+                let place = known.unwrap_or(remarks.len());
+                if known.is_none() {
+                    remarks.push(remark);
+                }
+                verdict = format!("{verdict} ({})", place + 1);
+            }
+            let ours = row.ours.map(|ours| row.printed.format_like(ours));
+            let difference = match row.difference_percent() {
+                None => String::new(),
+                Some(percent) if percent.abs() >= 1000.0 => "> 1000".to_owned(),
+                Some(percent) if percent.abs() >= 10.0 => format!("{percent:+.1}"),
+                Some(percent) => format!("{percent:+.3}"),
+            };
+            let ours = ours.unwrap_or_default();
+            text.push_str(&line(
+                &row.label,
+                &row.printed.text,
+                &ours,
+                &difference,
+                &verdict,
+            ));
+        }
+        for (index, remark) in remarks.iter().enumerate() {
+            let number = format!("({})", index + 1);
+            text.push_str(&wrapped(&format!("{number} {remark}"), number.len() + 1));
+        }
+    }
+    text.push_str(&format!(
+        "\n{} rows reproduce, {} within the rounding of their input, {} do not,\n{} are given.\n",
+        reproduction.count(Verdict::Reproduces),
+        reproduction.count(Verdict::WithinRounding),
+        reproduction.count(Verdict::DoesNotReproduce),
+        reproduction.count(Verdict::Given),
+    ));
+    text
+}
+
+fn line(label: &str, printed: &str, ours: &str, difference: &str, verdict: &str) -> String {
+    let line = format!("{label:<37}{printed:>10} {ours:>10} {difference:>8} {verdict}");
+    format!("{}\n", line.trim_end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn regress_numbers_are_never_cut() {
+        let column = |index: usize| Column {
+            name: format!("0\u{2013}10000 Hz: spacing {index} (Hz)"),
+            is_number: true,
+            place: Place::Everywhere,
+        };
+        // Few enough for narrow heads, and too many for any.
+        for count in [5, 9, 14] {
+            let cell = |index: usize| format!("0.123456{index}");
+            let table = Table {
+                caption: "Wide".into(),
+                columns: (10..10 + count).map(column).collect(),
+                rows: vec![(10..10 + count).map(cell).collect()],
+                note: String::new(),
+            };
+            let text = render_table(&table);
+            assert!(!text.contains('\u{2026}'), "{text}");
+            for index in 10..10 + count {
+                assert!(text.contains(&cell(index)), "{index} of {count}:\n{text}");
+            }
+            for line in text.lines() {
+                assert!(line.chars().count() <= 80, "{line}");
+            }
+        }
+    }
 }

@@ -7,6 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{PI, TAU};
+use tapjoint_numerics::bessel_i0;
 
 /// Quality of the mounting's resonance: what screws and wax have, between 10 and 30.
 const MOUNTING_QUALITY: f64 = 20.0;
@@ -15,7 +16,7 @@ const DRIFT_TIME: f64 = 5.0;
 /// The mains' third harmonic beside the first.
 const THIRD_HARMONIC: f64 = 0.3;
 
-/// What a channel carries.
+/// Quantity that a channel carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Signal {
     /// The hammer's force (N).
@@ -55,7 +56,7 @@ enum Converter {
     Bare(f64),
 }
 
-/// What is added after the anti-alias filter.
+/// Noise, offset, drift and hum, which are added after the anti-alias filter.
 #[derive(Debug, Clone)]
 struct Disturbance {
     random: ChaCha8Rng,
@@ -150,28 +151,23 @@ impl Chain {
             Converter::Filtered(filter) => filter.output(),
             Converter::Bare(last) => *last,
         };
-        (value + self.disturbance.next()) / self.scale
-    }
-}
-
-impl Disturbance {
-    fn next(&mut self) -> f64 {
+        let added = &mut self.disturbance;
         // Both are drawn for every sample, so that switching one off does not change the other.
         let [noise, push]: [f64; 2] =
-            std::array::from_fn(|_| StandardNormal.sample(&mut self.random));
-        let mut sum = self.offset + self.noise * noise;
-        if self.drift > 0.0 {
+            std::array::from_fn(|_| StandardNormal.sample(&mut added.random));
+        let mut sum = added.offset + added.noise * noise;
+        if added.drift > 0.0 {
             // An Ornstein-Uhlenbeck process of constant variance.
-            let keep = self.drift_memory;
-            self.drifted = keep * self.drifted + self.drift * (1.0 - keep * keep).sqrt() * push;
-            sum += self.drifted;
+            let keep = added.drift_memory;
+            added.drifted = keep * added.drifted + added.drift * (1.0 - keep * keep).sqrt() * push;
+            sum += added.drifted;
         }
-        if self.hum > 0.0 {
-            let angle = self.mains_angle;
-            sum += self.hum * (angle.sin() + THIRD_HARMONIC * (3.0 * angle).sin());
-            self.mains_angle = (angle + self.mains_step) % TAU;
+        if added.hum > 0.0 {
+            let angle = added.mains_angle;
+            sum += added.hum * (angle.sin() + THIRD_HARMONIC * (3.0 * angle).sin());
+            added.mains_angle = (angle + added.mains_step) % TAU;
         }
-        sum
+        (value + sum) / self.scale
     }
 }
 
@@ -270,9 +266,14 @@ impl Decimator {
             .map(|index| {
                 let offset = index as f64 - half as f64;
                 let x = offset / half as f64;
-                let window = bessel_i0(BETA * (1.0 - x * x).max(0.0).sqrt());
+                let argument = BETA * (1.0 - x * x).max(0.0).sqrt();
                 // Cut-off in the middle of the transition, half the rate after decimation.
-                window * sinc(offset / factor as f64)
+                let angle = PI * (offset / factor as f64);
+                let sinc = match offset == 0.0 {
+                    true => 1.0,
+                    false => angle.sin() / angle,
+                };
+                bessel_i0(argument) * sinc
             })
             .collect();
         let sum: f64 = weights.iter().sum();
@@ -307,27 +308,6 @@ impl Decimator {
         let tail: f64 = rest.iter().zip(others).map(|(w, x)| w * x).sum();
         sums.iter().sum::<f64>() + tail
     }
-}
-
-fn sinc(x: f64) -> f64 {
-    if x == 0.0 {
-        1.0
-    } else {
-        (PI * x).sin() / (PI * x)
-    }
-}
-
-/// Modified Bessel function of the first kind, sum of ((x/2)^n/n!)^2.
-fn bessel_i0(x: f64) -> f64 {
-    let mut term = 1.0;
-    let mut sum = 1.0;
-    let mut n = 1.0;
-    while term > 1e-17 * sum {
-        term *= (0.5 * x / n).powi(2);
-        sum += term;
-        n += 1.0;
-    }
-    sum
 }
 
 #[cfg(test)]

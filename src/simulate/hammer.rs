@@ -1,4 +1,4 @@
-//! The hand that swings the hammer (when, where and how hard it strikes), and the pulses of its taps in
+//! The hand that swings the hammer, with the times, places and forces of its taps, and the pulses of the taps in
 //! closed form, so that the motion they cause can be integrated exactly.
 
 use num_complex::Complex64;
@@ -16,9 +16,9 @@ const LATE: f64 = 0.05;
 /// One tap.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tap {
-    /// When its pulse begins (s).
+    /// Beginning of its pulse (s).
     pub time: f64,
-    /// Where it strikes (m).
+    /// Place of the strike (m).
     pub position: f64,
     /// Peak force (N).
     pub peak_force: f64,
@@ -45,10 +45,10 @@ pub enum TapKind {
     },
 }
 
-/// What all taps of a recording have in common.
+/// Properties that all taps of a recording share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapPlan {
-    /// How many taps.
+    /// Number of taps.
     pub taps: usize,
     /// Time from tap to tap (s).
     pub interval: f64,
@@ -127,14 +127,11 @@ impl Iterator for Hammer {
         let length = self.plan.pulse_length * length_factor;
         let kind = self.kind();
         self.index += 1;
+        let share = if kind == TapKind::Weak { WEAK } else { 1.0 };
         Some(Tap {
             time,
             position: position.clamp(0.0, self.plan.beam_length),
-            peak_force: if kind == TapKind::Weak {
-                WEAK * peak
-            } else {
-                peak
-            },
+            peak_force: share * peak,
             length,
             kind,
         })
@@ -196,9 +193,9 @@ impl PulseShape {
 /// One pulse of force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse {
-    /// When it begins (s).
+    /// Beginning (s).
     pub start: f64,
-    /// How long it lasts (s).
+    /// Duration (s).
     pub length: f64,
     /// Its peak (N).
     pub peak: f64,
@@ -207,7 +204,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// When it ends (s).
+    /// End (s).
     pub fn end(&self) -> f64 {
         self.start + self.length
     }
@@ -300,13 +297,12 @@ impl Tip {
 
     /// Returns the softest tip that excites up to this frequency (Hz), as good practice recommends.
     pub fn softest_for(frequency: f64) -> Self {
-        for tip in Self::ALL {
+        let mut tips = Self::ALL.into_iter();
+        let softest = tips.find(|tip| {
             let (length, shape) = tip.pulse();
-            if shape.half_amplitude_frequency(length) >= frequency {
-                return tip;
-            }
-        }
-        Self::Steel
+            shape.half_amplitude_frequency(length) >= frequency
+        });
+        softest.unwrap_or(Self::Steel)
     }
 }
 
@@ -324,11 +320,11 @@ pub struct HammerSettings {
     pub interval: Option<f64>,
     /// Quiet time before the first tap (s). 0.5: room for the pre-trigger.
     pub lead: f64,
-    /// How much the taps' peaks differ (1, standard deviation). 0.1: a practised hand.
+    /// Scatter of the taps' peaks (1, standard deviation). 0.1: a practised hand.
     pub level_scatter: f64,
-    /// How much the pulses' lengths differ (1, standard deviation). 0.03.
+    /// Scatter of the pulses' lengths (1, standard deviation). 0.03.
     pub length_scatter: f64,
-    /// How far from the marked place the taps strike (m, standard deviation). 0.5 mm: a marked place.
+    /// Distance of the taps from the marked place (m, standard deviation). 0.5 mm: a marked place.
     pub place_scatter: f64,
     /// Part of the taps that strike twice (1). 0.
     pub double_hits: f64,

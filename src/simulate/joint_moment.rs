@@ -11,7 +11,7 @@ use super::observed_structure::{Oscillator, ReducedStructure};
 use num_complex::Complex64;
 use tapjoint_beam::effects::{JointLaw, JointLawKind};
 
-/// How many sliders stand for a continuous distribution of them: kinks are then a fortieth of the whole.
+/// Number of sliders that stand for a continuous distribution: kinks are then a fortieth of the whole.
 const SLIDERS: usize = 40;
 /// Sliders are distributed up to this multiple of the hardest tap's rotation, or to where the joint
 /// would slip as a whole.
@@ -53,7 +53,7 @@ pub struct Slider {
     pub slip: f64,
 }
 
-/// What the moment adds to that of the linear spring, at one rotation.
+/// Moment beyond that of the linear spring, at one rotation.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Extra {
     /// M - k theta (N m).
@@ -65,7 +65,8 @@ pub(super) struct Extra {
 }
 
 impl JointMoment {
-    /// Of a law, with the stiffness at rest (N m/rad) and the rotation (rad) that the hardest tap brings.
+    /// Returns the moment of a law, with the stiffness at rest (N m/rad) and the rotation (rad) that the hardest
+    /// tap brings.
     pub fn of_law(law: &JointLaw, stiffness: f64, hardest: f64) -> Self {
         let coefficient = law.coefficient(hardest);
         match law.kind() {
@@ -101,7 +102,7 @@ impl JointMoment {
         }
     }
 
-    /// How many positions of sliders it remembers.
+    /// Number of positions of sliders that it remembers.
     pub(super) fn memory(&self) -> usize {
         match self {
             Self::Elastic { .. } => 0,
@@ -216,8 +217,8 @@ impl Slider {
 
 /// Nodes of the polynomial.
 pub(super) const NODES: usize = 4;
-/// Where rotations are computed: the nodes after the first, and the middle, where the polynomial is
-/// held against the moment.
+/// Number of places at which rotations are computed: the nodes after the first, and the middle, where the
+/// polynomial is held against the moment.
 pub(super) const PLACES: usize = 4;
 /// The place that is the middle of the step.
 pub(super) const MIDDLE: usize = 3;
@@ -246,7 +247,7 @@ pub(super) struct Collocation {
     pub(super) influence: [[f64; NODES]; PLACES],
     /// Free motion of each mode over the step.
     pub(super) advance: Vec<Complex64>,
-    /// What the moment at each node adds to each mode's state at the end.
+    /// Addition to each mode's state at the end by the moment at each node.
     pub(super) drive: Vec<[Complex64; NODES]>,
 }
 

@@ -1,7 +1,7 @@
-//! How a laboratory carries out a test. The defaults are those of a decent one: calibrated sensors
-//! glued or screwed on, a 24-bit recorder with an anti-alias filter, a practised hand.
+//! The laboratory that carries out a test, and the reasons for which a described test cannot be simulated.
 //!
-//! Why a described test cannot be simulated.
+//! The defaults are those of a decent laboratory: calibrated sensors glued or screwed on, a 24-bit recorder
+//! with an anti-alias filter, a practised hand.
 
 use super::hammer::HammerSettings;
 use serde::Serialize;
@@ -17,7 +17,7 @@ pub struct Laboratory {
     pub sensors: SensorSettings,
     /// The recorder.
     pub recorder: RecorderSettings,
-    /// What the structure dissipates and how it hangs.
+    /// Damping and suspension of the structure.
     pub specimen: SpecimenSettings,
 }
 
@@ -75,7 +75,7 @@ impl Default for SensorSettings {
     }
 }
 
-/// Whether there is an anti-alias filter.
+/// Anti-alias filter of the recorder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AntiAlias {
@@ -122,7 +122,7 @@ impl Default for RecorderSettings {
     }
 }
 
-/// What the structure dissipates beside the joint's own loss, and how a free one hangs.
+/// Damping of the structure beside the joint's own loss, and the suspension of a free one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpecimenSettings {
     /// Damping.
@@ -173,67 +173,38 @@ impl Damping {
     }
 }
 
-/// Why a described test cannot be simulated.
+/// Reason for which a described test cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
-    /// Nothing is to be recorded.
-    #[error(
-        "there is no recording to simulate; add [[recording]] with `file` and `tap` in place of [measured]"
-    )]
-    NoRecordings,
-    /// No sensor to record with.
-    #[error("there is no sensor to record with; add [[sensor]] with `name` and `position`")]
-    NoSensors,
-    /// The hammer's place is missing.
-    #[error(
-        "line {line}: {file}: where the hammer strikes is missing; add `tap` (m along the beam)"
-    )]
-    NoTap {
+    /// There is no recording to make, or no sensor to make it with.
+    #[error("there is no {0}")]
+    Nothing(&'static str),
+    /// A recording that cannot be made.
+    #[error("line {line}: {file}{problem}")]
+    Described {
         /// The recording.
         file: String,
         /// Its line in the description.
         line: usize,
+        /// Cause and remedy, in words that continue the sentence.
+        problem: &'static str,
     },
-    /// Frequency response functions are not recorded.
-    #[error(
-        "line {line}: {file} is a file of frequency response functions, and time series are simulated; remove `form`"
-    )]
-    Responses {
-        /// The recording.
-        file: String,
-        /// Its line in the description.
-        line: usize,
-    },
-    /// Two recordings have one file and are not the same.
-    #[error(
-        "line {line}: {file} was described before with another `tap`, `level`, `at` or `mass`; give each recording a file of its own"
-    )]
-    SameFile {
-        /// The file.
-        file: String,
-        /// The second one's line in the description.
-        line: usize,
-    },
-    /// A sensor without a place.
-    #[error("sensor {name}: its place is missing; add `position` (m along the beam)")]
-    NoPosition {
+    /// A sensor that cannot be simulated.
+    #[error("sensor {name}: {problem}")]
+    Sensor {
         /// The sensor.
         name: String,
-    },
-    /// A microphone.
-    #[error("sensor {name}: sound is not simulated; leave the sensor out")]
-    Sound {
-        /// The sensor.
-        name: String,
+        /// Cause and remedy.
+        problem: &'static str,
     },
     /// The joint's stiffness is not given.
     #[error(
         "the joint's stiffness is not given: {missing} missing; add {keys} to [joint], or give --kx and --ky"
     )]
     NoJoint {
-        /// What is missing.
+        /// The springs that are missing.
         missing: &'static str,
-        /// What to add.
+        /// Keys to add.
         keys: &'static str,
     },
     /// A reading bias needs no simulator.
@@ -264,21 +235,21 @@ pub enum SimulateError {
         file: String,
         /// The rate (Hz).
         rate: u32,
-        /// What it reaches to (Hz).
+        /// Highest frequency that it reaches to (Hz).
         reach: f64,
-        /// Where the band ends (Hz).
+        /// End of the band (Hz).
         band: f64,
-        /// What is needed (Hz).
+        /// Rate that is needed (Hz).
         needed: f64,
     },
     /// A number of the laboratory that cannot be.
     #[error("{quantity} is {value}, but must be {allowed}")]
     Setting {
-        /// Which.
+        /// Name of the number.
         quantity: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Values that it may have.
         allowed: &'static str,
     },
     /// The structure cannot exist.

@@ -6,7 +6,7 @@
 //!          -> RecordingRun        hammer, sensors, recorder: one sample of every channel after the other
 //! ```
 //!
-//! What the diagnosis must not see stays here: the truth is an argument and an output of its own,
+//! The truth stays here, out of the diagnosis's sight: it is an argument and an output of its own,
 //! never a part of the recording.
 
 mod chain;

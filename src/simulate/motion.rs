@@ -6,14 +6,13 @@
 
 use super::hammer::Pulse;
 use super::joint_moment::{
-    Collocation, MIDDLE, NODES, PLACES, at_middle, derivatives_at_end, places,
+    Collocation, Extra, JointMoment, MIDDLE, NODES, PLACES, at_middle, derivatives_at_end, places,
 };
-use super::joint_moment::{Extra, JointMoment};
 use super::observed_structure::{Oscillator, ReducedStructure, Sensed, StruckPlace, seen};
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
-/// So often (steps) states are looked at that may have died down.
+/// Number of steps between looks for states that have died down.
 const FORGET_EVERY: u64 = 256;
 /// Square of a state (m2 kg/s2) that is nothing beside any that was struck.
 const NOTHING: f64 = 1e-200;
@@ -60,7 +59,7 @@ impl MovingModes {
     }
 }
 
-/// How the signal of one sensor follows from the states.
+/// Factors by which the signal of one sensor follows from the states.
 #[derive(Debug, Clone)]
 struct SensorRow {
     derivative: usize,
@@ -149,15 +148,11 @@ impl Motion {
 
     /// Force of the hammer now (N).
     pub fn force(&self) -> f64 {
-        let time = self.time();
-        let pulses = self
-            .strikes
-            .iter()
-            .map(|strike| strike.pulse.force(time)[0]);
-        pulses.sum()
+        let (time, strikes) = (self.time(), self.strikes.iter());
+        strikes.map(|strike| strike.pulse.force(time)[0]).sum()
     }
 
-    /// What each sensor feels now, in SI units.
+    /// Writes the signal of each sensor now, in SI units.
     pub fn responses(&self, out: &mut [f64]) {
         for (row, out) in self.sensors.iter().zip(out.iter_mut()) {
             *out = seen(&row.of_states, &self.modes.states);
@@ -193,11 +188,9 @@ impl Motion {
 
     /// Rotation of the joint's spring now (rad), between strikes.
     pub fn joint_rotation(&self) -> f64 {
-        let of_modes: f64 = self
-            .structure
-            .modes
-            .iter()
-            .zip(self.modes.oscillators.iter().zip(&self.modes.states))
+        let moving = self.modes.oscillators.iter().zip(&self.modes.states);
+        let modes = self.structure.modes.iter().zip(moving);
+        let of_modes: f64 = modes
             .map(|(mode, (oscillator, state))| mode.at_joint * oscillator.motion(*state, 0.0)[0])
             .sum();
         let moment = self.joint.as_ref().map_or(0.0, |joint| joint.moment()[0]);
@@ -207,11 +200,8 @@ impl Motion {
     /// Energy of the structure (J), kinetic and elastic, between strikes: that of the modes, of the
     /// modes left out, and what the joint stores beyond its linear spring.
     pub fn energy(&self) -> f64 {
-        let modes: f64 = self
-            .modes
-            .oscillators
-            .iter()
-            .zip(&self.modes.states)
+        let moving = self.modes.oscillators.iter().zip(&self.modes.states);
+        let modes: f64 = moving
             .map(|(oscillator, state)| oscillator.energy(*state))
             .sum();
         let joint = self.joint.as_ref().map_or(0.0, |joint| {
@@ -261,7 +251,7 @@ const FINEST: usize = 6;
 /// of the linear spring at the present amplitude, of an elastic joint. Energy is then kept to some 1e-9
 /// in a thousand periods.
 const ELASTIC_TOLERANCE: f64 = 1e-8;
-/// The same where sliders make kinks, which no polynomial follows.
+/// Largest difference where sliders make kinks, which no polynomial follows.
 const SLIP_TOLERANCE: f64 = 1e-6;
 /// Newton's steps; three or four are usual, and what needs more needs a shorter step.
 const ITERATIONS: usize = 12;
@@ -278,9 +268,9 @@ struct JointMotion {
     /// Rotation by the imaginary part of each mode's state.
     rotation_of: Vec<f64>,
     division: usize,
-    /// Where the sliders stand.
+    /// Rotations at which the sliders stand (rad).
     memory: Vec<f64>,
-    /// Where they stand at each place of the step under trial.
+    /// Their rotations at each place of the step under trial.
     trial: [Vec<f64>; PLACES],
     rotation: f64,
     /// Moment on the structure, -(M - k theta), at the nodes of the last step.
@@ -323,10 +313,7 @@ impl JointMotion {
                     Collocation::new(structure, oscillators, part)
                 })
                 .collect(),
-            rotation_of: structure
-                .modes
-                .iter()
-                .zip(oscillators)
+            rotation_of: (structure.modes.iter().zip(oscillators))
                 .map(|(mode, oscillator)| mode.at_joint / oscillator.pole.im)
                 .collect(),
             division: 0,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_beam::{JointStiffness, StructureError};
-use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
+use tapjoint_description::{coupling, described_beam, described_specimen};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
 /// them has fallen with the cube of their number.
@@ -25,7 +25,7 @@ const SUSPENSION_DAMPING: f64 = 0.03;
 pub struct ObservedStructure {
     /// Motions on the suspension first, then the elastic modes.
     modes: Arc<SpecimenModes>,
-    /// How many of them are motions on the suspension.
+    /// Number of motions on the suspension among them.
     suspended: usize,
     sensors: Vec<f64>,
     reduced: ReducedStructure,
@@ -52,7 +52,13 @@ impl ObservedStructure {
         let elastic = specimen.modes(count, Mesh::SIMULATION)?;
         // Compliance of the joint by the modes that are not even computed.
         let beyond_computed = (specimen.joint).map_or(0.0, |_| elastic.joint_compliance_beyond());
-        let (modes, suspended) = hang(specimen, settings, elastic)?;
+        let (modes, suspended) = match settings.suspension {
+            // No rigid-body motion at all.
+            None if hangs(specimen) => (elastic, 0),
+            Some(frequencies) if hangs(specimen) => elastic.on_suspension(Some(frequencies))?,
+            // What turns about a pivot may be held by cables.
+            _ => elastic.on_suspension(None)?,
+        };
         let mut moving = Vec::new();
         for mode in 0..modes.len() {
             let frequency = modes.frequencies()[mode];
@@ -78,15 +84,13 @@ impl ObservedStructure {
                 at_joint: modes.joint_motion(mode)[1],
             });
         }
+        let turned = beyond(&modes, moving.len(), |mode| {
+            modes.joint_motion(mode)[1].powi(2)
+        });
+        let places = sensors.iter();
         let reduced = ReducedStructure {
-            joint_compliance: beyond_computed
-                + beyond(&modes, moving.len(), |mode| {
-                    modes.joint_motion(mode)[1].powi(2)
-                }),
-            joint_to_sensors: sensors
-                .iter()
-                .map(|&x| joint_to(&modes, moving.len(), x))
-                .collect(),
+            joint_compliance: beyond_computed + turned,
+            joint_to_sensors: places.map(|&x| joint_to(&modes, moving.len(), x)).collect(),
             modes: moving,
         };
         Ok(Self {
@@ -115,45 +119,27 @@ impl ObservedStructure {
         modes.map(|mode| mode.frequency)
     }
 
-    /// How it feels a strike at a position (m).
+    /// Returns the response to a strike at a position (m).
     pub fn struck(&self, position: f64) -> StruckPlace {
-        let moving = self.reduced.modes.len();
+        let (modes, moving) = (&self.modes, self.reduced.modes.len());
+        let to_sensors = self.sensors.iter().map(|&x| {
+            beyond(modes, moving, |mode| {
+                modes.displacement(mode, x) * modes.displacement(mode, position)
+            })
+        });
         StruckPlace {
             at_modes: (0..moving)
-                .map(|mode| self.modes.displacement(mode, position))
+                .map(|mode| modes.displacement(mode, position))
                 .collect(),
-            to_sensors: self
-                .sensors
-                .iter()
-                .map(|&x| {
-                    beyond(&self.modes, moving, |mode| {
-                        self.modes.displacement(mode, x) * self.modes.displacement(mode, position)
-                    })
-                })
-                .collect(),
-            to_joint: joint_to(&self.modes, moving, position),
+            to_sensors: to_sensors.collect(),
+            to_joint: joint_to(modes, moving, position),
         }
     }
 }
 
-/// Whether a specimen hangs, since nothing holds it.
+/// Returns true for a specimen that hangs, since nothing holds it.
 pub(super) fn hangs(specimen: &Specimen) -> bool {
     matches!(specimen.body, Body::Joined(_)) || specimen.joint_stiffnesses() == [0.0; 2]
-}
-
-/// The modes with the motions on the suspension before them, and the number of those.
-fn hang(
-    specimen: &Specimen,
-    settings: &SpecimenSettings,
-    elastic: SpecimenModes,
-) -> Result<(SpecimenModes, usize), StructureError> {
-    match settings.suspension {
-        // No rigid-body motion at all.
-        None if hangs(specimen) => Ok((elastic, 0)),
-        Some(frequencies) if hangs(specimen) => elastic.on_suspension(Some(frequencies)),
-        // What turns about a pivot may be held by cables.
-        _ => elastic.on_suspension(None),
-    }
 }
 
 /// Sum over the modes that do not move in time of a product of shapes, over omega^2.
@@ -178,9 +164,8 @@ pub(super) fn nominal_specimen(
 ) -> Result<Specimen, SimulateError> {
     let mut specimen = described_specimen(test, joint(test, given)?);
     let sensors = sensor_places(test, recording)?.into_iter();
-    specimen
-        .masses
-        .extend(sensors.filter(|sensor| sensor.mass > 0.0));
+    let known = sensors.filter(|sensor| sensor.mass > 0.0);
+    specimen.masses.extend(known);
     specimen.masses.extend(&recording.masses);
     Ok(specimen)
 }
@@ -192,49 +177,42 @@ fn joint(
     if test.joint.kind == Assembly::Free {
         return Ok(None);
     }
-    let units = StiffnessUnits::of(&described_beam(test));
-    if let Some(given) = given {
-        return Ok(Some(Joint {
-            kt: given.kx * units.kt,
-            kr: given.ky * units.kr,
-            coupling: coupling(given.kx, given.ky, given.cross_compliance),
-        }));
-    }
-    let (missing, keys) = match (test.joint.kt, test.joint.kr) {
-        (Some(kt), Some(kr)) => {
-            let ktr = test.joint.ktr.unwrap_or(f64::INFINITY);
+    let (missing, keys) = match (given, test.joint.kt, test.joint.kr) {
+        (Some(given), ..) => {
+            let units = StiffnessUnits::of(&described_beam(test));
             return Ok(Some(Joint {
-                kt,
-                kr,
-                coupling: coupling(kt, kr, 1.0 / ktr),
+                kt: given.kx * units.kt,
+                kr: given.ky * units.kr,
+                coupling: coupling(given.kx, given.ky, given.cross_compliance),
             }));
         }
-        (None, None) => (
+        (None, Some(kt), Some(kr)) => {
+            let coupling = coupling(kt, kr, 1.0 / test.joint.ktr.unwrap_or(f64::INFINITY));
+            return Ok(Some(Joint { kt, kr, coupling }));
+        }
+        (None, None, None) => (
             "kt and kr are",
             "`kt = 1.9e6` (N/m) and `kr = 1.2e3` (N m/rad)",
         ),
-        (None, Some(_)) => ("kt is", "`kt = 1.9e6` (N/m)"),
-        (Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
+        (None, None, Some(_)) => ("kt is", "`kt = 1.9e6` (N/m)"),
+        (None, Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
     };
     Err(SimulateError::NoJoint { missing, keys })
 }
 
-/// Where the sensors sit in a recording, with their masses by the datasheet.
+/// Places of the sensors in a recording, with their masses by the datasheet.
 pub(super) fn sensor_places(
     test: &TestDescription,
     recording: &RecordingDescription,
 ) -> Result<Vec<PointMass>, SimulateError> {
     let places = test.sensors.iter().map(|sensor| {
-        if sensor.kind == SensorKind::Sound {
-            return Err(SimulateError::Sound {
-                name: sensor.name.clone(),
-            });
-        }
-        let position = recording.place_of(sensor);
-        let position = position.ok_or_else(|| SimulateError::NoPosition {
-            name: sensor.name.clone(),
-        })?;
-        Ok(PointMass::new(position, sensor.mass.unwrap_or(0.0)))
+        let problem = match (sensor.kind, recording.place_of(sensor)) {
+            (SensorKind::Sound, _) => "sound is not simulated; leave the sensor out",
+            (_, Some(x)) => return Ok(PointMass::new(x, sensor.mass.unwrap_or(0.0))),
+            (_, None) => "its place is missing; add `position` (m along the beam)",
+        };
+        let name = sensor.name.clone();
+        Err(SimulateError::Sensor { name, problem })
     });
     places.collect()
 }
@@ -252,7 +230,7 @@ pub struct ReducedMode {
     pub at_joint: f64,
 }
 
-/// What a structure answers with: its modes up to some frequency, those beyond as springs.
+/// A structure as it answers: its modes up to some frequency, those beyond as springs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReducedStructure {
     /// The modes that move in time.
@@ -263,7 +241,7 @@ pub struct ReducedStructure {
     pub joint_to_sensors: Vec<f64>,
 }
 
-/// How one place is struck: the shapes there, and the compliance of the modes left out.
+/// A place that is struck: the shapes there, and the compliance of the modes left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StruckPlace {
     /// Shape of each mode (kg^-1/2).
@@ -274,7 +252,7 @@ pub struct StruckPlace {
     pub to_joint: f64,
 }
 
-/// What a sensor senses.
+/// Quantity that a sensor senses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensed {
     /// Acceleration (m/s2).
@@ -341,7 +319,7 @@ pub(super) fn seen(factors: &[[f64; 2]], states: &[Complex64]) -> f64 {
 }
 
 impl Sensed {
-    /// Which of displacement, velocity, acceleration it is.
+    /// Order of the derivative of the displacement: 0, 1 or 2.
     pub(super) fn derivative(self) -> usize {
         match self {
             Self::Displacement => 0,

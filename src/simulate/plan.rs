@@ -14,17 +14,17 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, apply};
-use tapjoint_beam::specimen::{PointMass, Specimen};
+use tapjoint_beam::specimen::Specimen;
 use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
 
-/// What is to be simulated.
+/// A test to be simulated.
 #[derive(Debug, Clone)]
 pub struct TestPlan<'a> {
     /// The test as described: the nominal structure, with its joint.
     pub description: &'a TestDescription,
-    /// What the description leaves out.
+    /// Effects that the description leaves out.
     pub effects: &'a [Effect],
-    /// How the test is carried out.
+    /// The laboratory that carries the test out.
     pub laboratory: &'a Laboratory,
     /// The joint, where it is not the description's.
     pub joint: Option<JointStiffness>,
@@ -54,13 +54,13 @@ pub struct VirtualTest {
 pub struct VirtualRecording {
     /// Name of the file: a WAV file in the test's folder.
     pub file: String,
-    /// How hard it is struck (1).
+    /// Level of the taps (1).
     pub level: f64,
-    /// What is seen of the structure: at rest, where its joint is not linear.
+    /// The structure as it is seen: at rest, where its joint is not linear.
     pub seen: Seen,
     /// The structure in its modes.
     pub structure: ObservedStructure,
-    /// How it is recorded.
+    /// Settings of the recording.
     pub plan: RecordingPlan,
 }
 
@@ -73,17 +73,11 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     let test = plan.description;
     let described = distinct_files(test)?;
     check_effects(test, plan.effects)?;
-    check_softening(plan.effects)?;
-    let mut recordings = Vec::new();
-    let mut trials = Vec::new();
+    let (mut recordings, mut trials) = (Vec::new(), Vec::new());
     for (visit, file) in described.iter().enumerate() {
-        let recording = prepare(plan, file, visit)?;
-        trials.push(try_out(
-            &recording.structure,
-            &recording.plan,
-            plan.laboratory,
-        ));
-        recordings.push(recording);
+        let one = prepare(plan, file, visit)?;
+        trials.push(try_out(&one.structure, &one.plan, plan.laboratory));
+        recordings.push(one);
     }
     let scales = scales(test, &trials);
     let joint_law = hardest(&recordings, &trials);
@@ -95,7 +89,10 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
             };
         }
         if let Some((law, hardest)) = &joint_law {
-            let stiffness = turning_stiffness(&recording.seen.specimen)?;
+            let [_, stiffness] = recording.seen.specimen.joint_stiffnesses();
+            if !(stiffness > 0.0 && stiffness.is_finite()) {
+                return Err(SimulateError::NoRotation { stiffness });
+            }
             recording.plan.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
         }
     }
@@ -131,17 +128,26 @@ struct WantedFile<'a> {
 
 fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, SimulateError> {
     if test.recordings.is_empty() {
-        return Err(SimulateError::NoRecordings);
+        return Err(SimulateError::Nothing(
+            "recording to simulate; add [[recording]] with `file` and `tap` in place of [measured]",
+        ));
     }
     if test.sensors.is_empty() {
-        return Err(SimulateError::NoSensors);
+        return Err(SimulateError::Nothing(
+            "sensor to record with; add [[sensor]] with `name` and `position`",
+        ));
     }
     let mut distinct: Vec<WantedFile<'_>> = Vec::new();
     for recording in &test.recordings {
         let file = wav_name(recording);
         let line = recording.line;
         if recording.form.is_some() {
-            return Err(SimulateError::Responses { file, line });
+            let problem = " is a file of frequency response functions, and time series are simulated; remove `form`";
+            return Err(SimulateError::Described {
+                file,
+                line,
+                problem,
+            });
         }
         let highest = recording.band.map(|(_, high)| high);
         let block_seconds = match (recording.block, recording.band) {
@@ -163,12 +169,15 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, Simulat
             || first.at != recording.at
             || first.masses != recording.masses
         {
-            return Err(SimulateError::SameFile { file, line });
+            let problem = " was described before with another `tap`, `level`, `at` or `mass`; give each recording a file of its own";
+            return Err(SimulateError::Described {
+                file,
+                line,
+                problem,
+            });
         }
-        found.highest = [found.highest, highest]
-            .into_iter()
-            .flatten()
-            .reduce(f64::max);
+        let both = [found.highest, highest].into_iter().flatten();
+        found.highest = both.reduce(f64::max);
         found.block_seconds = found.block_seconds.max(block_seconds);
     }
     Ok(distinct)
@@ -186,14 +195,24 @@ fn prepare(
     visit: usize,
 ) -> Result<VirtualRecording, SimulateError> {
     let (test, laboratory, described) = (plan.description, plan.laboratory, wanted.recording);
-    let tap = described.tap.ok_or_else(|| SimulateError::NoTap {
+    let tap = described.tap.ok_or_else(|| SimulateError::Described {
         file: wanted.name.clone(),
         line: described.line,
+        problem: ": where the hammer strikes is missing; add `tap` (m along the beam)",
     })?;
     let places = sensor_places(test, described)?;
     let nominal = nominal_specimen(test, described, plan.joint)?;
     let level = described.level.unwrap_or(1.0);
-    let seen = see(plan, &nominal, &places, visit);
+    let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+    // Streams of their own, behind those of the recordings' channels.
+    random.set_stream(1 << 40 | visit as u64);
+    // A joint that is not linear is seen at rest.
+    let circumstances = Circumstances {
+        sensors: &places,
+        level: 0.0,
+        drift: std::array::from_fn(|_| StandardNormal.sample(&mut random)),
+    };
+    let seen = apply(plan.effects, &nominal, &circumstances);
     let (nominal_length, length) = (nominal.body.length(), seen.specimen.body.length());
     let sample_rate = sample_rate(laboratory, &wanted.name, wanted.highest)?;
     let reach = f64::from(sample_rate) / 2.56;
@@ -218,9 +237,9 @@ fn prepare(
         seed: plan.seed,
         number: visit as u64,
     };
-    let positions: Vec<f64> = places
-        .iter()
-        .map(|place| marked_position(place.position, nominal_length, length))
+    let positions = places.iter().map(|place| place.position);
+    let positions: Vec<f64> = positions
+        .map(|position| marked_position(position, nominal_length, length))
         .collect();
     let structure = ObservedStructure::new(
         &seen.specimen,
@@ -253,19 +272,6 @@ fn marked_position(position: f64, nominal_length: f64, length: f64) -> f64 {
     (position * length / nominal_length).min(length)
 }
 
-/// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.
-fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[PointMass], visit: usize) -> Seen {
-    let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
-    // Streams of their own, behind those of the recordings' channels.
-    random.set_stream(1 << 40 | visit as u64);
-    let circumstances = Circumstances {
-        sensors: places,
-        level: 0.0,
-        drift: std::array::from_fn(|_| StandardNormal.sample(&mut random)),
-    };
-    apply(plan.effects, nominal, &circumstances)
-}
-
 /// Usual sample rates (Hz) of analysers: 2.56 times the band.
 const USUAL_RATES: [u32; 7] = [2560, 5120, 10_240, 12_800, 25_600, 51_200, 102_400];
 
@@ -278,9 +284,8 @@ fn sample_rate(
     let Some(rate) = laboratory.recorder.sample_rate else {
         // Without a band, 2000 Hz: the modes of a beam of some decimetres that the method uses.
         let needed = 2.56 * highest.unwrap_or(2000.0);
-        let usual = USUAL_RATES
-            .into_iter()
-            .find(|rate| f64::from(*rate) >= needed);
+        let mut usual = USUAL_RATES.into_iter();
+        let usual = usual.find(|rate| f64::from(*rate) >= needed);
         return Ok(usual.unwrap_or(needed.ceil() as u32));
     };
     let reach = f64::from(rate) / 2.56;
@@ -342,41 +347,6 @@ fn hardest(recordings: &[VirtualRecording], trials: &[Trial]) -> Option<(JointLa
     Some((law, rotations.fold(0.0, f64::max)))
 }
 
-/// Refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would
-/// then be simulated is not what the ratio says.
-fn check_softening(effects: &[Effect]) -> Result<(), SimulateError> {
-    let mut nonlinear = effects
-        .iter()
-        .filter(|effect| effect.id == EffectId::JointNonlinearity);
-    let Some(law) = nonlinear.find_map(|effect| {
-        Some(JointLaw {
-            ratio: effect.value("ratio")?,
-            exponent: effect.value("exponent")?,
-        })
-    }) else {
-        return Ok(());
-    };
-    let least = -(1.0 - LEAST_SLOPE) / (law.exponent + 1.0);
-    let coefficient = law.coefficient(1.0);
-    if coefficient >= least {
-        return Ok(());
-    }
-    Err(SimulateError::SoftensTooFar {
-        ratio: law.ratio,
-        exponent: law.exponent,
-        least: law.ratio * least / coefficient,
-    })
-}
-
-fn turning_stiffness(specimen: &Specimen) -> Result<f64, SimulateError> {
-    let [_, stiffness] = specimen.joint_stiffnesses();
-    if stiffness > 0.0 && stiffness.is_finite() {
-        Ok(stiffness)
-    } else {
-        Err(SimulateError::NoRotation { stiffness })
-    }
-}
-
 /// Looks at every number.
 fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
     let (hammer, sensors, recorder) = (
@@ -423,10 +393,20 @@ fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
     )?;
     let clock = [("the clock's error", recorder.clock_error)];
     check_all(&clock, |value| value.abs() < 0.5, "smaller than 0.5")?;
-    check_all(&damping(laboratory), |value| value >= 0.0, "at least 0")
+    let damping = match &laboratory.specimen.damping {
+        Damping::Modal(ratios) => ratios.iter().map(|&r| ("a damping ratio", r)).collect(),
+        Damping::Rayleigh { mass, stiffness } => vec![
+            ("the mass-proportional damping", *mass),
+            ("the stiffness-proportional damping", *stiffness),
+        ],
+    };
+    check_all(&damping, |value| value >= 0.0, "at least 0")
 }
 
-/// Refuses effects that would change nothing or that no recording contains: the truth would say what is not so.
+/// Refuses effects that would change nothing or that no recording contains: the truth would not be true.
+///
+/// It also refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would then be
+/// simulated is not what the ratio says.
 fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), SimulateError> {
     let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
     if planted.contains(&EffectId::Resolution) {
@@ -437,17 +417,23 @@ fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), Simul
     if planted.contains(&EffectId::SensorMass) && all_stated {
         return Err(SimulateError::NothingToWeigh);
     }
-    Ok(())
-}
-
-fn damping(laboratory: &Laboratory) -> Vec<(&'static str, f64)> {
-    match &laboratory.specimen.damping {
-        Damping::Modal(ratios) => ratios.iter().map(|&r| ("a damping ratio", r)).collect(),
-        Damping::Rayleigh { mass, stiffness } => vec![
-            ("the mass-proportional damping", *mass),
-            ("the stiffness-proportional damping", *stiffness),
-        ],
+    let mut nonlinear = effects.iter();
+    let nonlinear = nonlinear.find(|effect| effect.id == EffectId::JointNonlinearity);
+    let values = nonlinear.map(|effect| [effect.value("ratio"), effect.value("exponent")]);
+    if let Some([Some(ratio), Some(exponent)]) = values {
+        let law = JointLaw { ratio, exponent };
+        let least = -(1.0 - LEAST_SLOPE) / (exponent + 1.0);
+        let coefficient = law.coefficient(1.0);
+        if coefficient.is_nan() || coefficient < least {
+            let least = ratio * least / coefficient;
+            return Err(SimulateError::SoftensTooFar {
+                ratio,
+                exponent,
+                least,
+            });
+        }
     }
+    Ok(())
 }
 
 fn check_all(
@@ -455,10 +441,8 @@ fn check_all(
     good: impl Fn(f64) -> bool,
     allowed: &'static str,
 ) -> Result<(), SimulateError> {
-    let bad = values
-        .iter()
-        .find(|(_, value)| !value.is_finite() || !good(*value));
-    match bad {
+    let mut values = values.iter();
+    match values.find(|(_, value)| !value.is_finite() || !good(*value)) {
         None => Ok(()),
         Some(&(quantity, value)) => Err(SimulateError::Setting {
             quantity,

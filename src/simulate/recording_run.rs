@@ -38,7 +38,7 @@ pub struct RecordingPlan {
     pub sample_rate: u32,
     /// Samples per channel.
     pub frames: u64,
-    /// What a true frequency is multiplied by when the file is read: the clock's error.
+    /// Factor on a true frequency when the file is read: the clock's error.
     pub frequency_scale: f64,
     /// Channels in the order of the file, each with its SI units per unit of the file. Responses come
     /// in the order of the structure's sensors.
@@ -128,6 +128,13 @@ impl RecordingRun {
             AntiAlias::Off => 0,
         };
         let sensed = plan.sensed();
+        let mut sensors = 0..;
+        let signals = plan.channels.iter();
+        let sources = signals.map(|(signal, _)| match signal {
+            Signal::Force => None,
+            Signal::Response(_) => sensors.next(),
+        });
+        let sources = sources.collect();
         let rates = Rates {
             factor,
             file: file_rate,
@@ -150,7 +157,7 @@ impl RecordingRun {
             hammer: Hammer::new(&laboratory.hammer, &plan.taps, plan.random(0)).peekable(),
             shape: plan.taps.pulse_shape,
             chains,
-            sources: sources(plan),
+            sources,
             factor,
             frames_left: plan.frames,
             primed: 2 * delay as u64,
@@ -219,18 +226,6 @@ impl RecordingRun {
     }
 }
 
-/// For each channel the sensor it belongs to.
-fn sources(plan: &RecordingPlan) -> Vec<Option<usize>> {
-    let mut sensors = 0..;
-    let channels = plan.channels.iter();
-    channels
-        .map(|(signal, _)| match signal {
-            Signal::Force => None,
-            Signal::Response(_) => sensors.next(),
-        })
-        .collect()
-}
-
 /// One mode of the structure as the sensors see it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedMode {
@@ -244,7 +239,7 @@ pub struct SimulatedMode {
     pub shape_at_sensors: Vec<f64>,
 }
 
-/// How a virtual test is carried out.
+/// Settings of a virtual test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapTestSettings {
     /// Sample rate (Hz). 5120, for a band to 2000 Hz.
@@ -437,7 +432,7 @@ pub(super) struct Trial {
     pub(super) joint_rotation: f64,
 }
 
-/// So long the tap is followed: some periods of the lowest mode of beams that are tapped by hand (s).
+/// Time for which the tap is followed: some periods of the lowest mode of beams that are tapped by hand (s).
 const FOLLOWED: f64 = 0.3;
 
 /// Strikes the linear structure once, to find how far channels and joint will be driven.

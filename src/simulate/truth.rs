@@ -1,4 +1,4 @@
-//! What is true of a virtual test, to be kept from whoever diagnoses it.
+//! The truth about a virtual test, to be kept from whoever diagnoses it.
 
 use super::hammer::Tap;
 use super::laboratory::Laboratory;
@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use tapjoint_beam::effects::Effect;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Joint, Specimen};
-use tapjoint_description::described::described_beam;
+use tapjoint_description::described_beam;
 use tapjoint_description::{Scale, TestDescription};
 use toml::{Table, Value};
 
-/// All that is true of a virtual test.
+/// The whole truth about a virtual test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Truth {
     /// Version of this form.
@@ -21,7 +21,7 @@ pub struct Truth {
     pub name: String,
     /// Seed of everything random.
     pub seed: u64,
-    /// What the description leaves out.
+    /// Effects that the description leaves out.
     pub effects: Vec<PlantedEffect>,
     /// The nominal joint.
     pub joint: Option<JointTruth>,
@@ -29,7 +29,7 @@ pub struct Truth {
     pub joint_law: Option<LawTruth>,
     /// The recordings.
     pub recordings: Vec<RecordingTruth>,
-    /// How the test was carried out.
+    /// The laboratory that carried the test out.
     pub laboratory: Laboratory,
 }
 
@@ -73,7 +73,7 @@ pub struct LawTruth {
     pub hardest_rotation: f64,
 }
 
-/// What is true of one recording.
+/// The truth about one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingTruth {
     /// Its file.
@@ -82,9 +82,9 @@ pub struct RecordingTruth {
     pub sample_rate: u32,
     /// Length (s), in true seconds.
     pub seconds: f64,
-    /// How hard it was struck (1).
+    /// Level of the taps (1).
     pub level: f64,
-    /// What true frequencies are multiplied by when the file is read (1): the clock.
+    /// Factor on true frequencies when the file is read (1): the clock.
     pub frequency_scale: f64,
     /// The joint on this visit, at rest.
     pub joint: Option<JointTruth>,
@@ -188,7 +188,7 @@ fn recording_of(
     }
 }
 
-/// What stands at the head of the description.
+/// Head of the description.
 const HEAD: &str = "# Recordings of a virtual test, made by `tapjoint simulate`.\n\n";
 
 /// Returns the nominal description, as its user has it: the recordings as they were written, no effects, and
@@ -220,8 +220,16 @@ pub fn nominal_description(
     }
     for (recording, described) in tables(&mut table, "recording").zip(&test.recordings) {
         let file = wav_name(described);
-        if let (Some(band), false) = (band_above(simulated, &file), recording.contains_key("band"))
+        let mut recorded = simulated.recordings.iter();
+        let recorded = recorded.find(|recording| recording.file == file);
+        // The suspension as the user chose it: what cables add to it belongs to what is planted.
+        if let (Some(recorded), Some([up, rock])) = (recorded, simulated.suspension)
+            && !recording.contains_key("band")
         {
+            // The band begins above the suspension of a structure that hangs: motions on it are no modes of the
+            // beam. Five times its frequency, in whole hertz: it is 4 % of a resonance there.
+            let reach = f64::from(recorded.plan.sample_rate) / 2.56;
+            let band = [(5.0 * up.max(rock)).ceil(), reach];
             recording.insert("band".into(), Value::Array(band.map(Value::Float).to_vec()));
         }
         recording.insert("file".into(), file.into());
@@ -229,19 +237,6 @@ pub fn nominal_description(
         recording.remove("level");
     }
     Ok(format!("{HEAD}{table}"))
-}
-
-/// A band (Hz) that begins above the suspension of a structure that hangs, whose motions on it are no
-/// modes of the beam.
-fn band_above(simulated: &VirtualTest, file: &str) -> Option<[f64; 2]> {
-    let mut recordings = simulated.recordings.iter();
-    let recording = recordings.find(|recording| recording.file == file)?;
-    // The suspension as the user chose it: what cables add to it belongs to what is planted.
-    let [up, rock] = simulated.suspension?;
-    let highest = up.max(rock);
-    let reach = f64::from(recording.plan.sample_rate) / 2.56;
-    // Five times the suspension's frequency, in whole hertz: it is 4 % of a resonance there.
-    Some([(5.0 * highest).ceil(), reach])
 }
 
 fn tables<'t>(table: &'t mut Table, key: &str) -> impl Iterator<Item = &'t mut Table> {

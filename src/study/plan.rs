@@ -23,7 +23,7 @@ use tapjoint_diagnosis::{
 /// 1 % level, (2.576 + 1.282)^2.
 pub(super) const NOTICED: f64 = 14.9;
 
-/// How a plan is judged.
+/// Settings for the judgement of a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanSettings {
     /// Tests drawn for each effect group and for none. 4.
@@ -95,7 +95,26 @@ pub fn judge_plan(
 ) -> Result<Vec<Case>, PlanError> {
     let nominal = nominal_with(test, settings.joint);
     let plan = plan_of(test, settings)?;
-    let groups = groups_of(test.joint.kind);
+    // A lap joint has no coupling and no fixture, a beam by itself no joint. Nothing pulls on either: both are free, and
+    // a force that pushed them would buckle them.
+    let cannot: &[EffectId] = match test.joint.kind {
+        Assembly::Cantilever => &[],
+        Assembly::Lap => &[
+            EffectId::CrossCoupling,
+            EffectId::Fixture,
+            EffectId::AxialLoad,
+        ],
+        Assembly::Free => &[
+            EffectId::CrossCoupling,
+            EffectId::Fixture,
+            EffectId::JointMass,
+            EffectId::JointNonlinearity,
+            EffectId::JointDamping,
+            EffectId::AxialLoad,
+        ],
+    };
+    let mut groups = GROUPS.to_vec();
+    groups.retain(|group| !cannot.contains(&group[0]));
     let total = (groups.len() + 1) * settings.draws;
     let done = AtomicUsize::new(0);
     (0..total)
@@ -192,30 +211,6 @@ fn case(
         refutable: None,
     };
     let diagnosis = diagnose(&observed, nominal, &GapSettings::default());
-    let answer = diagnosis.map_or_else(|_| Answer::none(), |found| Answer::of(&found));
+    let answer = diagnosis.map_or_else(|_| Answer::default(), |found| Answer::of(&found));
     Ok((truth, answer))
-}
-
-/// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
-/// no joint. Nothing pulls on either: both are free, and a force that pushed them would buckle them.
-fn groups_of(kind: Assembly) -> Vec<&'static [EffectId]> {
-    let cannot: &[EffectId] = match kind {
-        Assembly::Cantilever => &[],
-        Assembly::Lap => &[
-            EffectId::CrossCoupling,
-            EffectId::Fixture,
-            EffectId::AxialLoad,
-        ],
-        Assembly::Free => &[
-            EffectId::CrossCoupling,
-            EffectId::Fixture,
-            EffectId::JointMass,
-            EffectId::JointNonlinearity,
-            EffectId::JointDamping,
-            EffectId::AxialLoad,
-        ],
-    };
-    let mut groups = GROUPS.to_vec();
-    groups.retain(|group| !cannot.contains(&group[0]));
-    groups
 }

@@ -26,11 +26,11 @@ pub struct UpdatedModel {
 pub struct DescribedEffectError {
     /// Line of the effect's table; `None` where there is no such structure without effects either.
     pub line: Option<usize>,
-    /// What is wrong with it.
+    /// The fault.
     pub cause: EffectCause,
 }
 
-/// What is wrong with a described effect.
+/// A fault of a described effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectCause {
     /// There is no such effect, or not of this size.
@@ -64,7 +64,18 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
         None => all.find(|one| one.hypothesis != Hypothesis::Unknown),
     }?;
     let mut effects = found.effects.clone();
-    add_coupling(&mut effects, found.coupling)?;
+    // Descriptions have no coupling of the joint's own model: it goes to the effects.
+    if found.coupling != 0.0 {
+        let mut all = effects.iter_mut();
+        let own = all.find(|one| one.id == EffectId::CrossCoupling);
+        let beside = own.as_ref().and_then(|one| one.value("coupling"));
+        let total = found.coupling + beside.unwrap_or(0.0);
+        let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
+        match own {
+            Some(own) => *own = whole,
+            None => effects.push(whole),
+        }
+    }
     let mut text = heading(diagnosis, found);
     text.push_str(&described(test, found));
     for effect in &effects {
@@ -75,24 +86,6 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
         hypothesis: found.hypothesis.name(),
         text,
     })
-}
-
-/// Adds the coupling of the joint's own model to the effects, because descriptions have none.
-fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
-    if held == 0.0 {
-        return Some(());
-    }
-    let own = effects
-        .iter_mut()
-        .find(|one| one.id == EffectId::CrossCoupling);
-    let found = own.as_ref().and_then(|one| one.value("coupling"));
-    let total = held + found.unwrap_or(0.0);
-    let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
-    match own {
-        Some(own) => *own = whole,
-        None => effects.push(whole),
-    }
-    Some(())
 }
 
 fn heading(diagnosis: &Diagnosis, found: &HypothesisResult) -> String {
@@ -140,9 +133,22 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         ));
     }
     text.push_str(&line("density", beam.density * (-2.0 * found.scale).exp()));
-    let poisson = beam.poisson.map(|poisson| line("poisson", poisson));
-    text.push_str(&poisson.unwrap_or_default());
-    text.push_str(&right_half(test, found.scale));
+    text.extend(beam.poisson.map(|poisson| line("poisson", poisson)));
+    if let Some(right) = &test.joint.right {
+        text.push_str("\n[beam.right]\n");
+        let density = right.density.map(|own| own * (-2.0 * found.scale).exp());
+        let own = [
+            ("width", right.width),
+            ("thickness", right.thickness),
+            ("modulus", right.modulus),
+            ("density", density),
+            ("poisson", right.poisson),
+        ];
+        text.extend(
+            own.iter()
+                .filter_map(|(key, value)| Some(line(key, (*value)?))),
+        );
+    }
     text.push_str(&joint(test, found));
     text.push_str(&sensors(test));
     text.push_str(&fastened(test));
@@ -150,26 +156,6 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
     text
-}
-
-fn right_half(test: &TestDescription, scale: f64) -> String {
-    let Some(right) = &test.joint.right else {
-        return String::new();
-    };
-    let own = [
-        ("width", right.width),
-        ("thickness", right.thickness),
-        ("modulus", right.modulus),
-        (
-            "density",
-            right.density.map(|own| own * (-2.0 * scale).exp()),
-        ),
-        ("poisson", right.poisson),
-    ];
-    let lines = own
-        .iter()
-        .filter_map(|(key, value)| Some(line(key, (*value)?)));
-    format!("\n[beam.right]\n{}", lines.collect::<String>())
 }
 
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
@@ -187,9 +173,11 @@ fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str(&line("kt", kt));
         text.push_str(&line("kr", kr));
     }
-    if let Some(position) = test.joint.position {
-        text.push_str(&line("position", position));
-    }
+    text.extend(
+        test.joint
+            .position
+            .map(|position| line("position", position)),
+    );
     if let Some(overlap) = &test.joint.overlap {
         text.push_str(&format!(
             "overlap = {{ length = {:?}, mass = {:?} }}\n",
@@ -210,12 +198,7 @@ fn sensors(test: &TestDescription) -> String {
         let position = test.place_of(sensor)?;
         let mut text = format!("\n[[sensor]]\nname = {}\n", quoted(&sensor.name));
         text.push_str(&line("position", position));
-        text.push_str(
-            &sensor
-                .mass
-                .map(|mass| line("mass", mass))
-                .unwrap_or_default(),
-        );
+        text.extend(sensor.mass.map(|mass| line("mass", mass)));
         Some(text)
     });
     tables.collect()
@@ -226,7 +209,7 @@ fn sensors(test: &TestDescription) -> String {
 const KNOWN_MASSES: &str = "\n# Known, not found: what was fastened in the first recording. Where recordings are \
                             added for\n# `tapjoint simulate`, move it into their [[recording.mass]] tables.";
 
-/// What is fastened in the first recording: no recording describes it any more.
+/// The masses of the first recording: no recording describes it any more.
 fn fastened(test: &TestDescription) -> String {
     let masses = test.recordings.first().map(|recording| &recording.masses);
     let mut tables = String::new();

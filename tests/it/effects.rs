@@ -1,5 +1,6 @@
 //! The catalogue of effects, and what each does to a specimen.
 
+use crate::joint_law::LawInClosedForm;
 use crate::shared::steel_strip;
 use std::f64::consts::PI;
 use tapjoint::effects::{

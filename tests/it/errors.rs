@@ -272,7 +272,7 @@ fn regress_text_that_is_no_toml_names_its_line() {
         let error = TestDescription::parse(text, "t.toml").expect_err("no TOML");
         assert_eq!(error.line, line, "{text:?}: {error}");
         assert!(
-            matches!(*error.problem, DescriptionProblem::Syntax { .. }),
+            error.problem.starts_with("not valid TOML"),
             "{text:?}: {error}"
         );
     }
@@ -633,9 +633,9 @@ fn regress_outputs_that_cannot_be_written_are_found_out_before_any_work() {
         let title = arguments.join(" ");
         messages += &refused(&title, SPOILED, csv.as_bytes(), &[arguments]);
     }
-    assert_snapshot("errors_outputs", &messages);
-    // Where even the system's owner may make nothing.
+    // The system's own words differ from system to system. In /proc even its owner may make nothing.
     if cfg!(target_os = "linux") {
+        assert_snapshot("errors_outputs", &messages);
         let arguments = ["run", "test.toml", "--out", "/proc/tapjoint-report"];
         let said = refused("/proc", SPOILED, csv.as_bytes(), &[&arguments]);
         assert_snapshot("errors_outputs_without_permission", &said);

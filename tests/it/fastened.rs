@@ -4,8 +4,8 @@ use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use tapjoint::described::described_specimen;
 use tapjoint::description::TestDescription;
+use tapjoint::description::described_specimen;
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     GapSettings, Nominal, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
@@ -265,7 +265,7 @@ fn regress_loaded_recordings_are_numbered_with_a_known_joint_and_never_by_the_ba
     assert_eq!(numbers(&known, 1), [1, 2, 3, 4, 5]);
     let unnumbered = |analysis: &Analysis| {
         let warnings = analysis.warnings.iter();
-        warnings.filter(|w| w.code() == "unnumbered").count()
+        warnings.filter(|w| w.code == "unnumbered").count()
     };
     assert_eq!(unnumbered(&known), 0);
     // One mode of the bare beam does not tell of two stiffnesses.

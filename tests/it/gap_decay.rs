@@ -1,5 +1,6 @@
 //! Joints whose stiffness depends on the amplitude: what recordings of them are diagnosed as.
 
+use crate::joint_law::LawInClosedForm;
 use crate::shared::data;
 use crate::shared::virtual_strip;
 use proptest::prelude::*;

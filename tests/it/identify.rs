@@ -9,8 +9,7 @@ use tapjoint::identify::perturbation::{
 };
 use tapjoint::identify::{
     Doubt, IdentifyError, MeasuredMode, ModeLambda, PairsModel, Stiffnesses, estimate_joint,
-    estimate_lap, estimate_modulus, estimate_pairs, estimate_three_parameter,
-    estimate_two_parameter, pairs_estimator, predict, single_mode_stiffness,
+    estimate_modulus, estimate_pairs, pairs_estimator, predict, single_mode_stiffness,
 };
 use tapjoint::structure::receptance::EndFunctions;
 use tapjoint::structure::{
@@ -62,8 +61,11 @@ fn recover_two_stiffnesses_from_any_modes() {
     ] {
         for modes in subsets {
             let joint = JointStiffness::two_parameter(kx, ky);
-            let found =
-                estimate_two_parameter(&exact(Assembly::Cantilever, &joint, modes)).unwrap();
+            let found = estimate_pairs(
+                PairsModel::TwoParameter,
+                &exact(Assembly::Cantilever, &joint, modes),
+            )
+            .unwrap();
             let case = format!("{kx} {ky} from modes {modes:?}");
             // Rounding of lambda (1e-16), amplified by how little the modes feel a stiff spring.
             close(found.kx, kx, 1e-7, &case);
@@ -90,7 +92,7 @@ fn recover_three_stiffnesses_from_any_modes() {
         for modes in subsets {
             let joint = JointStiffness::three_parameter(kx, ky, kz);
             let modes = exact(Assembly::Cantilever, &joint, modes);
-            let found = estimate_three_parameter(&modes).unwrap();
+            let found = estimate_pairs(PairsModel::ThreeParameter, &modes).unwrap();
             let case = format!("{kx} {ky} {kz} from {modes:?}");
             close(found.kx, kx, 1e-7, &case);
             close(found.ky, ky, 1e-7, &case);
@@ -112,7 +114,7 @@ fn recover_lap_joint_from_any_modes_of_both_symmetries() {
         for modes in subsets {
             let joint = JointStiffness::two_parameter(kx, ky);
             let modes = exact(Assembly::Lap, &joint, modes);
-            let found = estimate_lap(&modes).unwrap();
+            let found = estimate_pairs(PairsModel::Lap, &modes).unwrap();
             let case = format!("{kx} {ky} from {modes:?}");
             close(found.kx, kx, 1e-8, &case);
             close(found.ky, ky, 1e-8, &case);
@@ -165,7 +167,8 @@ fn val_free_intercept_is_the_regression_over_all_pairs() {
         vec![1.8, 4.4, 6.9, 9.2, 12.1],
         vec![1.2, 3.3, 5.9],
     ] {
-        let found = estimate_two_parameter(&ModeLambda::numbered(&lambdas)).unwrap();
+        let found =
+            estimate_pairs(PairsModel::TwoParameter, &ModeLambda::numbered(&lambdas)).unwrap();
         let [kx, ky] = by_literal_pairs(&lambdas);
         // Normal equations square the condition number, about 1e2 here.
         close(found.kx, kx, 1e-9, "kx");
@@ -202,7 +205,8 @@ fn limit_one_symmetry_alone_does_not_determine_a_lap_joint() {
             .map(|(index, _)| index + 1)
             .collect();
         assert!(alike.len() >= 3, "{all:?}");
-        let error = estimate_lap(&exact(Assembly::Lap, &joint, &alike)).unwrap_err();
+        let error =
+            estimate_pairs(PairsModel::Lap, &exact(Assembly::Lap, &joint, &alike)).unwrap_err();
         assert!(
             matches!(error, IdentifyError::Undetermined { rank: 1, .. }),
             "{error}"
@@ -215,7 +219,7 @@ fn limit_one_symmetry_alone_does_not_determine_a_lap_joint() {
 fn limit_impossible_frequencies_and_estimates() {
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let modes = ModeLambda::numbered(&[1.8, bad, 7.0, 9.0]);
-        let error = estimate_two_parameter(&modes).unwrap_err();
+        let error = estimate_pairs(PairsModel::TwoParameter, &modes).unwrap_err();
         assert!(
             matches!(error, IdentifyError::Frequency { mode: 2, .. }),
             "{error}"
@@ -224,14 +228,14 @@ fn limit_impossible_frequencies_and_estimates() {
     }
     // Three times the same frequency says one thing three times.
     let same = ModeLambda::numbered(&[1.8, 1.8, 1.8]);
-    let error = estimate_two_parameter(&same).unwrap_err();
+    let error = estimate_pairs(PairsModel::TwoParameter, &same).unwrap_err();
     assert!(
         matches!(error, IdentifyError::Undetermined { .. }),
         "{error}"
     );
     // A beam above its clamped frequencies: some stiffness must be negative, and is said to be.
     let impossible = ModeLambda::numbered(&[1.95, 4.9, 8.2, 11.4]);
-    let found = estimate_two_parameter(&impossible).unwrap();
+    let found = estimate_pairs(PairsModel::TwoParameter, &impossible).unwrap();
     let negative = |doubt: &Doubt| matches!(doubt, Doubt::Negative { .. });
     assert!(found.doubts.iter().any(negative), "{found:?}");
 }

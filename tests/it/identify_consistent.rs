@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::identify::consistent::{
     BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
-    JointedStructure, LapLayout, Limit, Loss, Neighbourhood, PARAMETERS, Parameter, Point,
-    Quantity, Route, Verdict, estimate_consistently,
+    JointedStructure, LapLayout, Limit, Neighbourhood, PARAMETERS, Parameter, Point, Quantity,
+    Route, Verdict,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
 use tapjoint::structure::joint::StiffnessUnits;
@@ -48,6 +48,14 @@ fn frequencies_at(model: &FrequencyModel, point: &Point, count: usize) -> Vec<f6
     (1..=count)
         .map(|mode| model.response(point, mode, mode as f64).frequency)
         .collect()
+}
+
+fn estimate_consistently(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> Result<ConsistentEstimate, IdentifyError> {
+    ConsistentEstimator::new(structure, modes, settings)?.estimate()
 }
 
 fn close(found: f64, expected: f64, relative: f64, what: &str) {
@@ -379,8 +387,8 @@ fn val_clamped_beam_leaves_modulus_and_rotation_nearly_undecided() {
         "modulus",
     );
     close(value(&estimate, Quantity::Kr), 4.1e3, 0.012, "kr");
-    let correlation = estimate.correlation(Parameter::Kr, Parameter::Modulus);
-    assert!(correlation.unwrap() < -0.95, "{correlation:?}");
+    let correlation = estimate.correlations[0].value;
+    assert!(correlation < -0.95, "{correlation}");
     let alone = ConsistentSettings::fitting(&[Parameter::Kr]).with_relative_weights();
     let estimate = estimate_consistently(&structure, &modes, &alone).unwrap();
     close(
@@ -499,13 +507,6 @@ fn recover_from_modes_with_gaps() {
     // Exact frequencies.
     close(value(&estimate, Quantity::Kx), 800.0, 1e-9, "kx");
     close(value(&estimate, Quantity::Ky), 9.0, 1e-9, "ky");
-    let offered: Vec<usize> = estimate
-        .identifiability
-        .extra_modes
-        .iter()
-        .map(|extra| extra.mode)
-        .collect();
-    assert_eq!(offered, [3, 5, 6, 8]);
 }
 
 #[test]
@@ -551,19 +552,21 @@ fn prop_repetitions_do_not_depend_on_threads() {
     let modes = modes_of(&TABLE_4, |f| Some(3e-3 * f));
     let settings = ConsistentSettings::two_parameter();
     let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
+    let near = estimator.neighbourhood();
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| estimator.monte_carlo(2000, 5).unwrap())
+        pool.install(|| estimator.monte_carlo(&near, 2000, 5).unwrap())
     };
     let (one, two) = (on(1), on(2));
     assert_eq!(one, two);
-    assert_ne!(one.spreads, estimator.monte_carlo(2000, 6).unwrap().spreads);
+    assert_ne!(one, estimator.monte_carlo(&near, 2000, 6).unwrap());
     let estimate = estimator.estimate().unwrap();
     let kx = estimate.quantity(Quantity::Kx).unwrap();
-    let width = (one.spreads[0].high - one.spreads[0].low) / (kx.high.unwrap() - kx.low.unwrap());
+    let spread = one.kx.unwrap();
+    let width = (spread.high - spread.low) / (kx.high.unwrap() - kx.low.unwrap());
     // 2000 repetitions know the ends of a 95 % interval to about 3 %.
     assert!((width - 1.0).abs() < 0.1, "{width}");
 }
@@ -601,7 +604,7 @@ fn recover_a_joint_through_a_sensors_mass() {
 }
 
 #[test]
-fn recover_density_where_the_beam_was_weighed() {
+fn recover_only_the_ratio_of_modulus_and_density() {
     let beam = Beam {
         length: 0.5,
         ..steel_strip()
@@ -621,24 +624,12 @@ fn recover_density_where_the_beam_was_weighed() {
     )
     .unwrap();
     let modes = modes_of(&exact, |f| Some(1e-3 * f));
-    let mut settings = ConsistentSettings::fitting(&[Parameter::Modulus, Parameter::Density]);
+    let settings = ConsistentSettings::fitting(&[Parameter::Modulus, Parameter::Density]);
     let unweighed = estimate_consistently(&free, &modes, &settings).unwrap();
     let modulus = unweighed.quantity(Quantity::Modulus).unwrap();
     assert_eq!((modulus.std, modulus.low, modulus.high), (None, None, None));
     let words = &unweighed.identifiability.flat[0].words;
     assert!(words.contains("only modulus / density is"), "{words}");
-    settings.weighed_mass = Some((truth.mass(), 0.001 * truth.mass()));
-    let weighed = estimate_consistently(&free, &modes, &settings).unwrap();
-    // Exact data; the modulus has the uncertainty of the mass and twice that of four frequencies.
-    close(value(&weighed, Quantity::Modulus), 70e9, 1e-8, "modulus");
-    close(value(&weighed, Quantity::Density), 2700.0, 1e-8, "density");
-    let std = weighed.quantity(Quantity::Modulus).unwrap().std.unwrap();
-    close(
-        std / 70e9,
-        f64::hypot(1e-3, 1e-3),
-        1e-6,
-        "std of the modulus",
-    );
 }
 
 #[test]
@@ -687,61 +678,6 @@ fn prop_an_uncertain_modulus_widens_what_depends_on_it() {
     }
     let estimate = estimate_consistently(&cantilever(), &modes, &uncertain).unwrap();
     assert!(estimate.quantity(Quantity::Modulus).is_some());
-}
-
-#[test]
-fn recover_in_spite_of_a_wild_frequency() {
-    let truth = joint(1415.0, 4.83, 0.0);
-    let mut frequencies = exact_frequencies(&truth, 8);
-    frequencies[2] *= 1.03;
-    let error = |loss: Loss, std: Option<f64>| {
-        let mut settings = ConsistentSettings::two_parameter();
-        settings.loss = loss;
-        if std.is_none() {
-            settings = settings.with_relative_weights();
-        }
-        let modes = modes_of(&frequencies, |f| std.map(|std| std * f));
-        let estimate = estimate_consistently(&cantilever(), &modes, &settings).unwrap();
-        (estimate.joint.kx / truth.kx).ln().abs() + (estimate.joint.ky / truth.ky).ln().abs()
-    };
-    for std in [Some(1e-3), None] {
-        let squares = error(Loss::Squares, std);
-        for loss in [Loss::Huber(1.345), Loss::StudentT(4.0)] {
-            let robust = error(loss, std);
-            assert!(
-                robust < 0.4 * squares,
-                "{loss:?} {std:?}: {robust} against {squares}"
-            );
-        }
-    }
-}
-
-#[test]
-fn prop_an_extra_mode_brings_what_was_announced() {
-    let truth = joint(900.0, 12.0, 0.1);
-    let exact = exact_frequencies(&truth, 5);
-    let settings = ConsistentSettings::three_parameter();
-    let with = |count: usize| {
-        let modes = modes_of(&exact[..count], |f| Some(1e-3 * f));
-        let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
-        (estimator.estimate().unwrap(), estimator.fit().stds)
-    };
-    let ((four, _), (_, five)) = (with(4), with(5));
-    let announced = four.identifiability.extra_modes.last().unwrap();
-    assert_eq!(announced.mode, 5);
-    close(announced.frequency, exact[4], 1e-8, "predicted frequency");
-    for (announced, found) in announced.stds.iter().zip(five) {
-        // The same linear algebra by another route.
-        close(
-            announced.unwrap(),
-            found.unwrap(),
-            1e-5,
-            "standard uncertainty",
-        );
-    }
-    let leverages: f64 = four.modes.iter().map(|mode| mode.leverage).sum();
-    // The fit takes as much freedom as it has parameters.
-    close(leverages, 3.0, 1e-6, "sum of leverages");
 }
 
 #[test]

@@ -20,6 +20,7 @@ mod gap_fixture;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;
+mod joint_law;
 mod modal_fit;
 mod observations;
 mod pairing;

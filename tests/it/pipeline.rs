@@ -443,10 +443,10 @@ fn regress_a_coarse_reading_does_not_hide_the_misfit_of_a_sharp_one() {
     frequencies[2] *= 0.97;
     let analysis = identified(beam, &frequencies, &format!("std = {stds:?}\n"));
     let mut misfits = analysis.warnings.iter();
-    let misfit = misfits.find(|warning| warning.code() == "prediction-error");
+    let misfit = misfits.find(|warning| warning.code == "prediction-error");
     let misfit = misfit.map(ToString::to_string).unwrap_or_default();
     assert!(misfit.contains("the model misses mode 3 by"), "{misfit}");
-    assert!(misfits.all(|warning| warning.code() != "prediction-error"));
+    assert!(misfits.all(|warning| warning.code != "prediction-error"));
 }
 
 /// The numbers of the peaks, and what is said of mode 1 (Hz), where only modes 2 to 4 were in the band of

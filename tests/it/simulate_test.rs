@@ -1,5 +1,6 @@
 //! Virtual tests as a whole: what the recordings say against closed forms, and what may not change them.
 
+use crate::joint_law::LawInClosedForm;
 use crate::shared::tapped_strip;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;

@@ -11,6 +11,34 @@ use tapjoint::structure::{
     mode_shapes, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint, natural_modes,
 };
 
+/// Receptances of the free beam at its end.
+trait Receptances {
+    /// Displacement per force at one end of the free beam, in units of L^3/(E I):
+    /// eta11 = -F5 / (lambda^3 F3).
+    fn eta11(&self) -> f64;
+
+    /// Rotation per force, or displacement per moment, in units of L^2/(E I):
+    /// eta12 = F1 / (lambda^2 F3). Its sign belongs to rotation = -dw/dx, x along the beam.
+    fn eta12(&self) -> f64;
+
+    /// Rotation per moment, in units of L/(E I): eta22 = F6 / (lambda F3).
+    fn eta22(&self) -> f64;
+}
+
+impl Receptances for EndFunctions {
+    fn eta11(&self) -> f64 {
+        -self.f5 / (self.lambda.powi(4) * self.f3)
+    }
+
+    fn eta12(&self) -> f64 {
+        self.f1 / (self.lambda.powi(4) * self.f3)
+    }
+
+    fn eta22(&self) -> f64 {
+        self.f6 / (self.lambda.powi(4) * self.f3)
+    }
+}
+
 fn joint(kx: f64, ky: f64) -> JointStiffness {
     JointStiffness::two_parameter(kx, ky)
 }

@@ -473,7 +473,7 @@ const RESOLUTION: &[ParameterInfo] = &[signed(
 )];
 
 impl EffectId {
-    /// Returns its parameters, the one that measures its size first.
+    /// Returns its parameters. The first one measures its size, but for the fixture.
     pub fn parameters(self) -> &'static [ParameterInfo] {
         match self {
             Self::SensorMass => SENSOR_MASS,
@@ -500,17 +500,7 @@ impl EffectId {
         match self {
             Self::JointMass => &["mass", "inertia"],
             Self::Fixture => &["ratio"],
-            Self::SensorMass | Self::AddedMass => &["mass"],
-            Self::SensorCable => &["stiffness"],
-            Self::CrossCoupling => &["coupling"],
-            Self::JointNonlinearity => &["ratio"],
-            Self::JointDamping => &["loss_factor"],
-            Self::JointDrift => &["std"],
-            Self::Modulus | Self::Length | Self::Timebase => &["relative"],
-            Self::LocalCrack => &["compliance"],
-            Self::AxialLoad => &["force"],
-            Self::ShearRotary => &["factor"],
-            Self::Resolution => &["offset"],
+            _ => std::slice::from_ref(&self.parameters()[0].name),
         }
     }
 }

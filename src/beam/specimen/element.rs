@@ -488,8 +488,9 @@ impl HingedElement {
         node: usize,
         hinges: Vec<ElementHinge>,
     ) -> Result<Self, StructureError> {
+        let element = &section.element;
         let kinks = kinks_per_end_motion(section, &hinges)?;
-        let mut stiffness = section.element.stiffness();
+        let mut stiffness = element.stiffness();
         for (kink, hinge) in kinks.iter().zip(&hinges) {
             for (row, moment) in stiffness.iter_mut().zip(section.moment(hinge.within)) {
                 for (entry, turn) in row.iter_mut().zip(kink) {
@@ -497,35 +498,30 @@ impl HingedElement {
                 }
             }
         }
-        let mut element = Self {
+        let mut hinged = Self {
             node,
             hinges,
             kinks,
             stiffness,
             mass: [[0.0; 4]; 4],
         };
-        element.integrate(section);
-        Ok(element)
-    }
-
-    /// Mass and stiffness of the axial force, piece by piece between the kinks.
-    fn integrate(&mut self, section: &Section) {
-        let element = &section.element;
-        for (x, weight) in self.gauss_points() {
+        // Mass and stiffness of the axial force, piece by piece between the kinks.
+        for (x, weight) in hinged.gauss_points() {
             let scale = weight * element.length;
             let mut weights = section.weights(x);
-            self.add_weights(section, x, &mut weights);
-            let slope = self.slopes(section, x);
+            hinged.add_weights(section, x, &mut weights);
+            let slope = hinged.slopes(section, x);
             let (w, t) = (weights.displacement, weights.rotation);
             for i in 0..4 {
                 for j in 0..4 {
-                    self.mass[i][j] += scale
+                    hinged.mass[i][j] += scale
                         * (element.mass_per_length * w[i] * w[j]
                             + element.rotary_inertia * t[i] * t[j]);
-                    self.stiffness[i][j] += scale * section.axial_force * slope[i] * slope[j];
+                    hinged.stiffness[i][j] += scale * section.axial_force * slope[i] * slope[j];
                 }
             }
         }
+        Ok(hinged)
     }
 
     /// Places (0 to 1) and weights that integrate exactly to the seventh power between the kinks.

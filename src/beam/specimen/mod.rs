@@ -14,7 +14,7 @@ pub(crate) mod model;
 pub(crate) mod modes;
 
 pub use crate::joint::Joint;
-use crate::{Assembly, Beam, BeamTheory, StructureError};
+use crate::{Assembly, Beam, BeamTheory, STIFFNESS_RULE, StructureError, require};
 pub use modes::{BeamModes, SpecimenModes};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -282,16 +282,10 @@ impl Specimen {
         not_negative("shear and rotary inertia", self.shear_rotary)?;
         not_negative("joint mass", self.joint_mass.mass)?;
         not_negative("joint inertia", self.joint_mass.inertia)?;
-        if !self.axial_force.is_finite() {
-            return Err(unphysical(
-                "axial force",
-                self.axial_force,
-                "give a finite force in N",
-            ));
-        }
+        let (force, rule) = (self.axial_force, ": give a finite force in N");
+        require(force.is_finite(), "axial force", force, rule)?;
         self.check_attachments()?;
-        self.check_joint()?;
-        self.check_base()
+        self.check_joint_and_base()
     }
 
     fn check_attachments(&self) -> Result<(), StructureError> {
@@ -311,11 +305,10 @@ impl Specimen {
         if let Some(overlap) = &self.overlap {
             not_negative("length of the overlap", overlap.length)?;
             not_negative("mass of the overlap", overlap.mass)?;
-            let shorter = self.body.beams().iter().map(|beam| beam.length);
-            if 0.5 * overlap.length > shorter.fold(f64::INFINITY, f64::min) {
-                let remedy = "half of it must fit on either side of the joint";
-                return Err(unphysical("length of the overlap", overlap.length, remedy));
-            }
+            let mut halves = self.body.beams().iter();
+            let fits = halves.all(|beam| 0.5 * overlap.length <= beam.length);
+            let rule = ": half of it must fit on either side of the joint";
+            require(fits, "length of the overlap", overlap.length, rule)?;
         }
         Ok(())
     }
@@ -330,72 +323,43 @@ impl Specimen {
         }
     }
 
-    fn check_joint(&self) -> Result<(), StructureError> {
-        let Some(Joint { kt, kr, coupling }) = self.joint else {
-            return Ok(());
-        };
+    fn check_joint_and_base(&self) -> Result<(), StructureError> {
+        let is_lap = matches!(self.body, Body::Joined(_));
+        let [kt, kr] = self.joint_stiffnesses();
         for (quantity, value) in [("kt", kt), ("kr", kr)] {
-            if value.is_nan() || value < 0.0 {
-                return Err(StructureError::Stiffness { quantity, value });
-            }
+            let is_possible = value >= 0.0;
+            require(is_possible, quantity, value, STIFFNESS_RULE)?;
         }
-        if coupling == 0.0 {
-            return Ok(());
-        }
-        if coupling.is_nan() || coupling.abs() >= 1.0 {
-            let remedy = "it must lie between -1 and 1, or the joint releases energy";
-            return Err(unphysical("coupling of the joint", coupling, remedy));
-        }
-        if matches!(self.body, Body::Joined(_)) {
+        let coupling = self.joint.map_or(0.0, |joint| joint.coupling);
+        let rule = ": it must lie between -1 and 1, or the joint releases energy";
+        require(
+            coupling.abs() < 1.0,
+            "coupling of the joint",
+            coupling,
+            rule,
+        )?;
+        if coupling != 0.0 && is_lap {
             return Err(StructureError::NoCoupling {
                 assembly: "lap joint",
                 cross_compliance: coupling,
             });
         }
-        Ok(())
-    }
-
-    fn check_base(&self) -> Result<(), StructureError> {
-        let Some(base) = &self.base else {
+        let Some(Base { frequency, ratio }) = self.base else {
             return Ok(());
         };
-        if !(base.frequency > 0.0 && base.frequency.is_finite()) {
-            let remedy = "it must be positive and finite";
-            return Err(unphysical("frequency of the base", base.frequency, remedy));
-        }
-        not_negative("stiffness ratio of the base", base.ratio)?;
-        let [_, kr] = self.joint_stiffnesses();
-        if base.ratio == 0.0 {
-            return Ok(());
-        }
-        if matches!(self.body, Body::Joined(_)) || !(kr > 0.0 && kr.is_finite()) {
-            let remedy = "a flexible base needs a cantilever whose joint has a finite kr above 0";
-            return Err(unphysical(
-                "stiffness ratio of the base",
-                base.ratio,
-                remedy,
-            ));
-        }
-        Ok(())
-    }
-}
-
-fn unphysical(quantity: &'static str, value: f64, remedy: &'static str) -> StructureError {
-    StructureError::Unphysical {
-        quantity,
-        value,
-        remedy,
+        let is_positive = frequency > 0.0 && frequency.is_finite();
+        let rule = ": it must be positive and finite";
+        require(is_positive, "frequency of the base", frequency, rule)?;
+        let quantity = "stiffness ratio of the base";
+        not_negative(quantity, ratio)?;
+        let carries = ratio == 0.0 || !is_lap && kr > 0.0 && kr.is_finite();
+        let rule = ": a flexible base needs a cantilever whose joint has a finite kr above 0";
+        require(carries, quantity, ratio, rule)
     }
 }
 
 fn not_negative(quantity: &'static str, value: f64) -> Result<(), StructureError> {
-    if value >= 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(unphysical(
-            quantity,
-            value,
-            "it must be finite and at least 0",
-        ))
-    }
+    let is_possible = value >= 0.0 && value.is_finite();
+    let rule = ": it must be finite and at least 0";
+    require(is_possible, quantity, value, rule)
 }

@@ -8,7 +8,7 @@ use super::element::{
 };
 use super::{Body, Joint, Specimen};
 use crate::StructureError;
-use crate::banded::BandedMatrix;
+use crate::eigen::BandedMatrix;
 use std::f64::consts::PI;
 
 /// Equation of a motion that does not exist; larger than the number of any that does.
@@ -48,7 +48,18 @@ impl Numbering {
             }
             Body::Joined(_) => {
                 numbering.add_nodes(elements[0]);
-                numbering.add_lap_joint(rigid);
+                // The two nodes of the joint.
+                let mut left = [HELD; 2];
+                for shared in [false, true] {
+                    for motion in (0..2).filter(|&motion| rigid[motion] == shared) {
+                        left[motion] = numbering.next();
+                    }
+                }
+                let mut right = left;
+                for motion in (0..2).filter(|&motion| !rigid[motion]) {
+                    right[motion] = numbering.next();
+                }
+                numbering.nodes.extend([left, right]);
                 numbering.add_nodes(elements[1]);
             }
         }
@@ -65,25 +76,6 @@ impl Numbering {
             let node = [self.next(), self.next()];
             self.nodes.push(node);
         }
-    }
-
-    /// The two nodes of a lap joint.
-    fn add_lap_joint(&mut self, rigid: [bool; 2]) {
-        let mut left = [HELD; 2];
-        for shared in [false, true] {
-            for motion in [0, 1] {
-                if rigid[motion] == shared {
-                    left[motion] = self.next();
-                }
-            }
-        }
-        let mut right = left;
-        for motion in [0, 1] {
-            if !rigid[motion] {
-                right[motion] = self.next();
-            }
-        }
-        self.nodes.extend([left, right]);
     }
 }
 
@@ -241,7 +233,17 @@ impl Model {
                 section: Section::new(beam, elements, shear_rotary, axial_force, &units),
             });
         }
-        let base = rotating_base(specimen, &units);
+        // The base where it gives: k = Kr/ratio, and the inertia that has its frequency on that spring.
+        let base = specimen
+            .base
+            .filter(|base| base.ratio > 0.0 && beams.len() == 1);
+        let base = base.map(|base| {
+            let [_, kr] = specimen.joint_stiffnesses();
+            let stiffness = kr / units.rotational_stiffness() / base.ratio;
+            let omega = 2.0 * PI * base.frequency / units.omega;
+            let inertia = stiffness / (omega * omega);
+            RotatingBase { inertia, stiffness }
+        });
         let mut model = Self {
             numbering: Numbering::new(specimen, elements, base.is_some()),
             runs,
@@ -259,13 +261,15 @@ impl Model {
     /// Adds what is fastened to the beams: hinges first, which change the shape by which the others
     /// move.
     fn attach(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
-        for hinge in specimen
-            .hinges
-            .iter()
-            .filter(|hinge| hinge.compliance > 0.0)
-        {
+        for hinge in specimen.hinges.iter().filter(|one| one.compliance > 0.0) {
             let compliance = hinge.compliance * self.units.rotational_stiffness();
-            self.add_hinge(hinge.position, compliance)?;
+            let (run, index, within) = self.locate(hinge.position);
+            let node = self.runs[run].first_node + index;
+            let known = self.hinged.iter().position(|hinged| hinged.node == node);
+            let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
+            hinges.push(ElementHinge { within, compliance });
+            let section = &self.runs[run].section;
+            self.hinged.push(HingedElement::new(section, node, hinges)?);
         }
         for item in &specimen.masses {
             self.add_mass(self.place(item.position), item.mass, item.inertia);
@@ -275,8 +279,9 @@ impl Model {
             Body::One(_) => self.add_mass(self.place_in(0, 0, 0.0), mass, inertia),
             Body::Joined(_) => {
                 let last = self.runs[0].elements - 1;
-                self.add_mass(self.place_in(0, last, 1.0), 0.5 * mass, 0.5 * inertia);
-                self.add_mass(self.place_in(1, 0, 0.0), 0.5 * mass, 0.5 * inertia);
+                for place in [self.place_in(0, last, 1.0), self.place_in(1, 0, 0.0)] {
+                    self.add_mass(place, 0.5 * mass, 0.5 * inertia);
+                }
             }
         }
         for item in specimen.overlap_masses() {
@@ -291,26 +296,13 @@ impl Model {
         Ok(())
     }
 
-    fn add_hinge(&mut self, position: f64, compliance: f64) -> Result<(), StructureError> {
-        let (run, index, within) = self.locate(position);
-        let node = self.runs[run].first_node + index;
-        let known = self.hinged.iter().position(|hinged| hinged.node == node);
-        let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
-        hinges.push(ElementHinge { within, compliance });
-        let section = &self.runs[run].section;
-        self.hinged.push(HingedElement::new(section, node, hinges)?);
-        Ok(())
-    }
-
     /// Adds a mass (kg) and its inertia (kg m2).
     fn add_mass(&mut self, place: Place, mass: f64, inertia: f64) {
         if mass == 0.0 && inertia == 0.0 {
             return;
         }
-        let right = self
-            .runs
-            .iter()
-            .rposition(|run| run.first_node <= place.node);
+        let mut runs = self.runs.iter();
+        let right = runs.rposition(|run| run.first_node <= place.node);
         let section = &self.runs[right.unwrap_or(0)].section;
         self.masses.push(AttachedMass {
             compliance: section.inner_compliance(place.within, place.within),
@@ -339,12 +331,8 @@ impl Model {
     }
 
     fn place_in(&self, run: usize, index: usize, within: f64) -> Place {
-        let Run {
-            first_node,
-            section,
-            ..
-        } = &self.runs[run];
-        let node = first_node + index;
+        let section = &self.runs[run].section;
+        let node = self.runs[run].first_node + index;
         let mut weights = section.weights(within);
         let mut inner = [0.0; 4];
         match self.hinged_at(node) {
@@ -376,10 +364,8 @@ impl Model {
 
     /// Magnitude of the highest omega^2: that of an element's end alone.
     pub(super) fn highest_square(&self) -> f64 {
-        let ratios = self
-            .runs
-            .iter()
-            .map(|run| run.section.stiffness[0][0] / run.section.mass[0][0]);
+        let sections = self.runs.iter().map(|run| &run.section);
+        let ratios = sections.map(|section| section.stiffness[0][0] / section.mass[0][0]);
         ratios.fold(0.0, f64::max)
     }
 
@@ -394,8 +380,7 @@ impl Model {
         let (mut stiffness, mut mass) = (BandedMatrix::zeros(size), BandedMatrix::zeros(size));
         for run in &self.runs {
             for node in run.first_node..run.first_node + run.elements {
-                let hinged = self.hinged_at(node);
-                let (of_stiffness, of_mass) = match hinged {
+                let (of_stiffness, of_mass) = match self.hinged_at(node) {
                     Some(hinged) => (&hinged.stiffness, &hinged.mass),
                     None => (&run.section.stiffness, &run.section.mass),
                 };
@@ -404,10 +389,7 @@ impl Model {
             }
         }
         for item in &self.masses {
-            let Weights {
-                displacement: w,
-                rotation: t,
-            } = item.place.weights;
+            let (w, t) = (item.place.weights.displacement, item.place.weights.rotation);
             let matrix = std::array::from_fn(|i| {
                 std::array::from_fn(|j| item.mass * w[i] * w[j] + item.inertia * t[i] * t[j])
             });
@@ -453,12 +435,10 @@ impl Model {
         let nodes = &self.numbering.nodes;
         if let [left, right] = self.runs.as_slice() {
             let (before, after) = (nodes[left.elements], nodes[right.first_node]);
-            return vec![
-                (before[0], 0, -1.0),
-                (before[1], 1, -1.0),
-                (after[0], 0, 1.0),
-                (after[1], 1, 1.0),
-            ];
+            let ends = [(before, -1.0), (after, 1.0)].into_iter();
+            return ends
+                .flat_map(|(rows, sign)| [(rows[0], 0, sign), (rows[1], 1, sign)])
+                .collect();
         }
         let mut ends = vec![(nodes[0][0], 0, 1.0), (nodes[0][1], 1, 1.0)];
         if let Some(base) = self.numbering.base {
@@ -637,19 +617,4 @@ fn joint_matrix(joint: Option<Joint>, units: &Units) -> [[f64; 2]; 2] {
     let rest = 1.0 - coupling * coupling;
     let cross = coupling * (kx * ky).sqrt() / rest;
     [[kx / rest, cross], [cross, ky / rest]]
-}
-
-/// The base where it gives: k = Kr/ratio, and the inertia that has its frequency on that spring.
-fn rotating_base(specimen: &Specimen, units: &Units) -> Option<RotatingBase> {
-    let base = specimen.base.filter(|base| base.ratio > 0.0)?;
-    if matches!(specimen.body, Body::Joined(_)) {
-        return None;
-    }
-    let [_, kr] = specimen.joint_stiffnesses();
-    let stiffness = kr / units.rotational_stiffness() / base.ratio;
-    let omega = 2.0 * PI * base.frequency / units.omega;
-    Some(RotatingBase {
-        stiffness,
-        inertia: stiffness / (omega * omega),
-    })
 }

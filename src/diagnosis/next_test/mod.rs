@@ -9,19 +9,18 @@ mod predicted_data;
 mod proposals;
 
 use crate::compare::ModelComparison;
-use crate::posterior::Candidate;
 use crate::result::{NextTest, Proposal, Verdict};
-use crate::thresholds::{
+use crate::settings::{
     LEAST_COMPARED, LEAST_INFORMATION, LISTED_INFORMATION, MOST_COMPARED, MOST_LISTED,
     MOST_PROPOSED,
 };
+use crate::verdict::Candidate;
 use nalgebra::DMatrix;
 use predicted_data::{Posterior, PredictedData, distances, expected_information};
 use proposals::{PlannedTests, TestedStructure, sentence};
 use rayon::prelude::*;
-
-/// Standard gravity (m/s2).
-const GRAVITY: f64 = 9.80665;
+use std::collections::BTreeSet;
+use tapjoint_numerics::quantity::STANDARD_GRAVITY;
 
 /// Returns the tests that would decide between hypotheses, those with most information per cost first; and last how a
 /// named cause can be seen directly, where none of these shows it as well.
@@ -55,7 +54,7 @@ fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
     if compared.candidates.len() < 2 {
         return Vec::new();
     }
-    let weight = GRAVITY * dataset.nominal.beam_mass();
+    let weight = STANDARD_GRAVITY * dataset.nominal.beam_mass();
     let posteriors: Vec<Option<Posterior>> = compared
         .candidates
         .iter()
@@ -75,7 +74,13 @@ fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
         });
         tests.extend(compared.judge(&test.proposal, of_test.collect()));
     }
-    ranked(tests)
+    tests.retain(|test| test.expected_information >= LEAST_INFORMATION);
+    tests.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
+    // The best test of each kind.
+    let mut kinds = BTreeSet::new();
+    tests.retain(|test| kinds.insert(test.proposal.id()));
+    tests.truncate(MOST_PROPOSED);
+    tests
 }
 
 /// Hypotheses that are compared.
@@ -145,21 +150,6 @@ impl<'a> Compared<'a> {
             expected_information: share * expected_information(&probabilities, &apart),
         })
     }
-}
-
-/// Returns the best test of each kind, the one with most information per cost first.
-fn ranked(mut tests: Vec<NextTest>) -> Vec<NextTest> {
-    tests.retain(|test| test.expected_information >= LEAST_INFORMATION);
-    tests.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
-    let mut best: Vec<NextTest> = Vec::new();
-    for test in tests {
-        let mut known = best.iter();
-        if known.all(|other| other.proposal.id() != test.proposal.id()) {
-            best.push(test);
-        }
-    }
-    best.truncate(MOST_PROPOSED);
-    best
 }
 
 /// Returns the hypotheses that a test separates: members of the pairs that contribute most.

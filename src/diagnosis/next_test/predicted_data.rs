@@ -5,8 +5,8 @@ use crate::dataset::{Dataset, Observable};
 use crate::forward::Forward;
 use crate::optimum::{Model, Optimum, log_determinant};
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
-use crate::posterior::Candidate;
 use crate::result::Proposal;
+use crate::verdict::Candidate;
 use nalgebra::{DMatrix, DVector};
 use tapjoint_beam::effects::EffectId;
 
@@ -220,10 +220,8 @@ impl Posterior {
         for (k, &column) in columns.iter().enumerate() {
             slopes.set_column(column, &model.slopes.column(k));
         }
-        if let (Some(turned), Some(column)) = (
-            planned.turned,
-            self.size(&planned.whole, EffectId::AxialLoad),
-        ) {
+        let column = self.size(&planned.whole, EffectId::AxialLoad);
+        if let (Some(turned), Some(column)) = (planned.turned, column) {
             let factor = self.turning(column);
             for (row, observable) in observables.iter().enumerate() {
                 if observable.configuration == turned {

@@ -4,8 +4,8 @@ use crate::compare::MORE_MODES;
 use crate::dataset::{Dataset, Observable};
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
+use crate::settings::MOVED_SENSOR;
 use crate::structure::{Arrangement, ROTATION};
-use crate::thresholds::MOVED_SENSOR;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
 
@@ -43,15 +43,18 @@ impl TestedStructure {
         match self {
             TestedStructure::Whole => true,
             TestedStructure::Unbiased => effect.effect != EffectId::Resolution,
-            TestedStructure::Bare => matches!(
-                effect.effect,
-                EffectId::Modulus
-                    | EffectId::Length
-                    | EffectId::Timebase
-                    | EffectId::AddedMass
-                    | EffectId::LocalCrack
-                    | EffectId::ShearRotary
-            ),
+            TestedStructure::Bare => {
+                use EffectId::{AddedMass, Length, LocalCrack, Modulus, ShearRotary, Timebase};
+                let shown = [
+                    Modulus,
+                    Length,
+                    Timebase,
+                    AddedMass,
+                    LocalCrack,
+                    ShearRotary,
+                ];
+                shown.contains(&effect.effect)
+            }
         }
     }
 }
@@ -112,10 +115,7 @@ impl PlannedTests {
             bare: None,
             turned: None,
         };
-        if dataset.modes + MORE_MODES <= dataset.settings.highest_mode {
-            planned.read_higher(dataset);
-        }
-        planned.read_finer(dataset);
+        planned.read_again(dataset);
         planned.tap_again(dataset);
         planned.move_sensor(dataset);
         planned.fasten_mass(dataset);
@@ -138,33 +138,35 @@ impl PlannedTests {
         });
     }
 
-    /// Plans to read higher modes.
-    fn read_higher(&mut self, dataset: &Dataset) {
+    /// Plans to read the recordings again: higher modes, and on finer lines.
+    fn read_again(&mut self, dataset: &Dataset) {
         let (first, last) = (dataset.modes + 1, dataset.modes + MORE_MODES);
-        let mut planned = Vec::new();
-        for configuration in 0..self.whole.arrangements.len() {
-            planned.extend(frequencies_of(dataset, configuration, first..=last));
-        }
-        let proposal = Proposal::HigherModes {
-            first,
-            last,
-            is_recorded: dataset.arrangements.iter().any(|one| one.is_recorded),
-        };
-        self.propose(proposal, TestedStructure::Whole, planned);
-    }
-
-    /// Plans to read on finer lines.
-    fn read_finer(&mut self, dataset: &Dataset) {
-        if let Some(bias) = dataset.nominal.reading_bias {
-            let planned = observed_modes(dataset).map(|mode| {
-                (
-                    Observable::frequency(0, mode),
-                    std_without_bias(dataset, mode, bias),
-                )
-            });
-            let proposal = Proposal::FinerLines {
-                spacing: 2.0 * FIT_BIAS * bias,
+        if last <= dataset.settings.highest_mode {
+            let configurations = 0..self.whole.arrangements.len();
+            let planned = configurations.flat_map(|one| frequencies_of(dataset, one, first..=last));
+            let proposal = Proposal::HigherModes {
+                first,
+                last,
+                is_recorded: dataset.arrangements.iter().any(|one| one.is_recorded),
             };
+            self.propose(proposal, TestedStructure::Whole, planned.collect());
+        }
+        if let Some(bias) = dataset.nominal.reading_bias {
+            let modes = observed_modes(dataset);
+            let planned = modes.map(|mode| {
+                let mut std = std_of(dataset, mode);
+                let mut frequencies = dataset.frequencies();
+                let own = frequencies.find(|&row| dataset.observables[row].mode == mode);
+                // Without the part of reading on lines, b/sqrt 3.
+                if let Some(own) = own {
+                    let line = bias / 3.0_f64.sqrt() / dataset.data[own].value.exp();
+                    let rest = (std * std - line * line).max(0.0);
+                    std = (rest + (FIT_BIAS * line).powi(2)).sqrt();
+                }
+                (Observable::frequency(0, mode), std)
+            });
+            let spacing = 2.0 * FIT_BIAS * bias;
+            let proposal = Proposal::FinerLines { spacing };
             self.propose(proposal, TestedStructure::Unbiased, planned.collect());
         }
     }
@@ -327,18 +329,6 @@ fn std_of(dataset: &Dataset, mode: usize) -> f64 {
     known.map_or(1e-3, |mut stds| median(&mut stds))
 }
 
-/// Returns that uncertainty without the part of reading on lines with this bias (Hz), b/sqrt 3.
-fn std_without_bias(dataset: &Dataset, mode: usize, bias: f64) -> f64 {
-    let std = std_of(dataset, mode);
-    let mut frequencies = dataset.frequencies();
-    let Some(own) = frequencies.find(|&row| dataset.observables[row].mode == mode) else {
-        return std;
-    };
-    let line = bias / 3.0_f64.sqrt() / dataset.data[own].value.exp();
-    let rest = (std * std - line * line).max(0.0);
-    (rest + (FIT_BIAS * line).powi(2)).sqrt()
-}
-
 /// Returns 1, 1.5, 2, 3, 5 or 7 times a power of ten, the nearest to a mass (kg).
 fn round_mass(mass: f64) -> f64 {
     let decade = 10.0_f64.powf(mass.log10().floor());
@@ -387,11 +377,15 @@ pub fn sentence(proposal: &Proposal) -> String {
         Proposal::MoveSensor { name, position } => format!(
             "move {name} to {position:.3} m, leave everything else untouched, and tap again"
         ),
-        Proposal::KnownMass { mass, position } => format!(
-            "fasten {0} at {position:.3} m, leave everything else untouched, tap again, and describe that \
-             [[recording]] with mass = [{{ position = {position:.3}, mass = \"{0}\" }}]",
-            weight(*mass)
-        ),
+        Proposal::KnownMass { mass, position } => {
+            // As "15 g" or "1.5 kg".
+            let (size, unit) = if *mass < 1.0 { (1e3 * mass, "g") } else { (*mass, "kg") };
+            let size = (1e3 * size).round() / 1e3;
+            format!(
+                "fasten {size} {unit} at {position:.3} m, leave everything else untouched, tap again, and \
+                 describe that [[recording]] with mass = [{{ position = {position:.3}, mass = \"{size} {unit}\" }}]"
+            )
+        }
         Proposal::Confirm { effect } => confirming(*effect),
         Proposal::Retighten => {
             "loosen the joint, tighten it as before, and repeat the first recording".into()
@@ -450,16 +444,6 @@ fn confirming(effect: EffectId) -> String {
         EffectId::Resolution => "read the frequencies by a curve fit, or on closer lines",
     };
     text.into()
-}
-
-/// Returns a mass (kg) as "15 g" or "1.5 kg".
-fn weight(mass: f64) -> String {
-    let (value, unit) = if mass < 1.0 {
-        (1e3 * mass, "g")
-    } else {
-        (mass, "kg")
-    };
-    format!("{} {unit}", (1e3 * value).round() / 1e3)
 }
 
 #[cfg(test)]

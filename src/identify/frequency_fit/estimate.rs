@@ -1,31 +1,18 @@
 //! The whole estimate: the fit, its uncertainty, its test, and what it cannot tell.
 
 use super::estimator::ConsistentEstimator;
-use super::model::{JointedStructure, Parameter, Point, beam_at, log_nondimensional};
+use super::model::{Parameter, Point, beam_at, log_nondimensional};
 use super::problem::{
     Covariance, Evaluation, LOG_STIFFNESS, MISFIT, Minimum, NOTHING_KNOWN, Problem, along, dot,
     value_along,
 };
-use super::result::{
-    ConsistentEstimate, Correlation, EstimatedQuantity, ExtraMode, FittedMode, FlatDirection,
-    Goodness, Identifiability, NeededAccuracy, OtherMinimum, Quantity, joint_at, limit_of,
+use super::{
+    ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, FlatDirection, Goodness,
+    Identifiability, OtherMinimum, Quantity, ResidualWeights, joint_at, limit_of,
 };
-use super::{ConsistentSettings, Intervals, ResidualWeights};
-use crate::{IdentifyError, MeasuredMode};
+use crate::IdentifyError;
 use nalgebra::{DMatrix, SVD};
-use tapjoint_numerics::stats::{NORMAL_95, median, root_mean_square, student};
-
-/// Estimates a joint from the frequencies of these modes.
-///
-/// # Errors
-/// As [`ConsistentEstimator::new`].
-pub fn estimate_consistently(
-    structure: &JointedStructure,
-    modes: &[MeasuredMode],
-    settings: &ConsistentSettings,
-) -> Result<ConsistentEstimate, IdentifyError> {
-    ConsistentEstimator::new(structure, modes, settings)?.estimate()
-}
+use tapjoint_numerics::stats::{NORMAL_95, root_mean_square, student};
 
 /// A finished fit with what its report needs.
 struct Finished<'a> {
@@ -45,12 +32,9 @@ impl ConsistentEstimator {
     pub fn estimate(&self) -> Result<ConsistentEstimate, IdentifyError> {
         let frequencies = self.frequencies();
         let (renewed, minima) = self.solve(&frequencies);
-        let model = renewed.as_ref().unwrap_or(&self.model);
-        let mut problem = self.problem(model, &frequencies);
+        let problem = self.problem(renewed.as_ref().unwrap_or(&self.model), &frequencies);
         let mut minima = minima.into_iter();
         let best = minima.next().ok_or(IdentifyError::NothingToEstimate)?;
-        // A robust loss without stated uncertainties was fitted in units of the usual misfit.
-        self.rescale(&mut problem, &[best.state.point]);
         let directions = self.directions();
         let finished = Finished {
             estimator: self,
@@ -65,7 +49,6 @@ impl ConsistentEstimator {
             modes_used: self.modes.iter().map(|mode| mode.mode).collect(),
             fit: self.settings.fit.clone(),
             quantities: finished.quantities(),
-            covariance: finished.covariance_matrix(),
             stiffness_covariance: finished.stiffness_covariance(),
             correlations: finished.correlations(),
             goodness: finished.goodness,
@@ -84,7 +67,6 @@ impl ConsistentEstimator {
             .clone()
             .map(|(datum, found)| (found.frequency - datum.frequency) / datum.frequency)
             .collect();
-        // The plain sum of squares, whatever the loss: only its distribution is known.
         let modes: f64 = pairs
             .map(|(datum, found)| ((found.frequency - datum.frequency) / datum.std).powi(2))
             .sum();
@@ -112,21 +94,14 @@ impl Finished<'_> {
         if self.measured() {
             self.goodness.uncertainty_factor()
         } else {
-            // The covariance is in units of the weights' relative deviation, 1 unless a loss rescaled it.
-            let unit = self.problem.data.first().map(|d| d.std / d.frequency)?;
-            self.goodness.misfit_per_freedom.map(|misfit| misfit / unit)
+            self.goodness.misfit_per_freedom
         }
     }
 
     fn quantities(&self) -> Vec<EstimatedQuantity> {
-        let nuisances = self
-            .estimator
-            .nuisances
-            .iter()
-            .map(|(parameter, _)| *parameter);
-        let parameters = self.estimator.settings.fit.iter().copied().chain(nuisances);
-        parameters
-            .flat_map(|parameter| Quantity::of(parameter).iter())
+        let parameters = self.estimator.free_parameters();
+        let quantities = parameters.flat_map(|parameter| Quantity::of(parameter).iter());
+        quantities
             .map(|quantity| match quantity {
                 Quantity::Kz | Quantity::Ktr => self.cross_stiffness(*quantity),
                 _ => self.quantity(*quantity),
@@ -157,20 +132,13 @@ impl Finished<'_> {
             ends.map(|coordinate| self.quantity_at(quantity, coordinate))
                 .into()
         });
-        let intervals = Some(self.estimator.settings.intervals).filter(|_| self.measured());
-        let ends = match intervals {
-            None => [None; 2],
-            Some(Intervals::Linear) => {
-                [-NORMAL_95, NORMAL_95].map(|factor| unit.map(|std| now + factor * std))
-            }
-            Some(Intervals::Profile) => {
-                [-1.0, 1.0].map(|sign| Profile::new(self, quantity, sign).end())
-            }
-        };
-        let [low, high] =
-            ends.map(|end| end.map(|coordinate| self.quantity_at(quantity, coordinate)));
+        let [low, high] = [-1.0, 1.0].map(|sign| {
+            let profile = self
+                .measured()
+                .then(|| Profile::new(self, quantity, sign))?;
+            Some(self.quantity_at(quantity, profile.end()?))
+        });
         // Where one end of a profile is missing the other is all that is known.
-        let profiled = intervals == Some(Intervals::Profile);
         EstimatedQuantity {
             quantity,
             value,
@@ -179,8 +147,8 @@ impl Finished<'_> {
             low,
             high,
             scaled,
-            at_least: low.filter(|_| profiled && high.is_none()),
-            at_most: high.filter(|_| profiled && low.is_none()),
+            at_least: low.filter(|_| high.is_none()),
+            at_most: high.filter(|_| low.is_none()),
             limit: limit_of(quantity, point),
         }
     }
@@ -237,19 +205,13 @@ impl Finished<'_> {
 
     fn modes(&self) -> Vec<FittedMode> {
         let rows = self.problem.data.iter().zip(&self.best.state.responses);
-        rows.zip(&self.best.state.jacobian)
-            .map(|((datum, found), slopes)| FittedMode {
-                mode: datum.mode,
-                measured: datum.frequency,
-                predicted: found.frequency,
-                error_percent: 100.0 * (found.frequency - datum.frequency) / datum.frequency,
-                standardised: self
-                    .measured()
-                    .then_some((found.frequency - datum.frequency) / datum.std),
-                // The diagonal of J (J^T J)^-1 J^T.
-                leverage: self.covariance.between(slopes, slopes),
-            })
-            .collect()
+        rows.map(|(datum, found)| FittedMode {
+            mode: datum.mode,
+            measured: datum.frequency,
+            predicted: found.frequency,
+            error_percent: 100.0 * (found.frequency - datum.frequency) / datum.frequency,
+        })
+        .collect()
     }
 
     fn other(&self, other: &Minimum) -> OtherMinimum {
@@ -275,15 +237,6 @@ impl Finished<'_> {
 // Covariances and correlations of the estimate's numbers.
 
 impl Finished<'_> {
-    /// Factor from the covariance's unit to a variance: the misfit's where no uncertainty is stated.
-    fn variance_unit(&self) -> Option<f64> {
-        if self.measured() {
-            Some(1.0)
-        } else {
-            Some(self.scale()?.powi(2))
-        }
-    }
-
     /// Returns the covariance of ln Kx and ln Ky, where both are estimated and neither is at its limit.
     fn stiffness_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let both = [Quantity::Kx, Quantity::Ky];
@@ -294,27 +247,18 @@ impl Finished<'_> {
                 && limit_of(*quantity, point).is_none()
                 && self.covariance.std(&quantity.gradient()).is_some()
         });
-        let factor = self.variance_unit().filter(|_| is_open)?;
+        // From the covariance's unit to a variance: the misfit's where no uncertainty is stated.
+        let factor = if self.measured() {
+            1.0
+        } else {
+            self.scale()?.powi(2)
+        };
         let gradients = both.map(Quantity::gradient);
-        Some(
+        is_open.then(|| {
             gradients.map(|first| {
                 gradients.map(|second| factor * self.covariance.between(&first, &second))
-            }),
-        )
-    }
-
-    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
-        let factor = self.variance_unit()?;
-        let directions = &self.directions[..self.estimator.settings.fit.len()];
-        let mut rows = Vec::with_capacity(directions.len());
-        for first in directions {
-            let row = directions.iter();
-            rows.push(
-                row.map(|second| factor * self.covariance.between(first, second))
-                    .collect(),
-            );
-        }
-        Some(rows)
+            })
+        })
     }
 
     fn correlations(&self) -> Vec<Correlation> {
@@ -503,8 +447,6 @@ const DEAD: f64 = 1.0;
 /// Relative accuracy of the usual reading where none is stated: half a line of 800 in a band whose
 /// middle the mode is in.
 const USUAL_ACCURACY: f64 = 1e-3;
-/// A stiffness counts as measurable when its standard uncertainty is this part of it.
-const MEASURABLE: f64 = 0.1;
 /// Shares below this part of the largest are left out of a sentence.
 const NEGLIGIBLE: f64 = 0.05;
 
@@ -518,7 +460,19 @@ impl Finished<'_> {
         };
         let rows = self.best.state.jacobian.iter();
         let jacobian: Vec<Point> = rows.map(|row| row.map(|slope| unit * slope)).collect();
-        let (singular_values, directions) = decompose(&jacobian, fit);
+        // Singular values, descending, and their directions in parameter space.
+        let count = jacobian.len().max(fit.len());
+        let matrix = DMatrix::from_fn(count, fit.len(), |row, column| {
+            let slopes = jacobian.get(row);
+            slopes.map_or(0.0, |slopes| slopes[fit[column].index()])
+        });
+        let found = SVD::try_new(matrix, false, true, f64::EPSILON, 1000);
+        let found = found.and_then(|svd| Some((svd.singular_values, svd.v_t?)));
+        let (singular_values, directions) =
+            found.map_or_else(Default::default, |(values, rows)| {
+                let rows = rows.row_iter().map(|row| row.iter().copied().collect());
+                (values.as_slice().to_vec(), rows.collect::<Vec<Vec<f64>>>())
+            });
         let (largest, smallest) = (singular_values.first(), singular_values.last());
         let dead = fit.iter().filter(|parameter| {
             let column = parameter.index();
@@ -537,95 +491,9 @@ impl Finished<'_> {
             dead: dead.copied().collect(),
             flat: flat(&singular_values, &directions, fit),
             at_limit: at_limit.collect(),
-            extra_modes: self.extra_modes(&jacobian, unit),
-            needed: self.needed(),
             singular_values,
         }
     }
-
-    fn extra_modes(&self, jacobian: &[Point], unit: f64) -> Vec<ExtraMode> {
-        let data = &self.problem.data;
-        let highest = data.iter().map(|datum| datum.mode).max().unwrap_or(0);
-        let mut relative: Vec<f64> = data
-            .iter()
-            .map(|datum| datum.std / datum.frequency / unit)
-            .collect();
-        let relative_std = median(&mut relative);
-        let covariance = Covariance::new(jacobian, &self.directions);
-        let mut found = Vec::new();
-        for mode in 1..=highest + 1 {
-            if data.iter().any(|datum| datum.mode == mode) {
-                continue;
-            }
-            let guess = mode as f64 * std::f64::consts::PI;
-            let response = (self.problem.model).response(&self.best.state.point, mode, guess);
-            let slopes = response.sensitivity.map(|slope| slope / relative_std);
-            let fit = self.estimator.settings.fit.iter();
-            let stds = fit.map(|parameter| {
-                let variance = covariance.variance_with(&along(*parameter), &slopes);
-                Some(variance.max(0.0).sqrt()).filter(|std| *std < NOTHING_KNOWN)
-            });
-            found.push(ExtraMode {
-                mode,
-                frequency: response.frequency,
-                relative_std,
-                stds: stds.collect(),
-            });
-        }
-        found
-    }
-
-    /// Returns the accuracy that each parameter needs. With all frequencies known equally well, a
-    /// parameter's uncertainty is proportional to theirs.
-    fn needed(&self) -> Vec<NeededAccuracy> {
-        let at = &self.best.state;
-        let rows = at.jacobian.iter().zip(&at.responses);
-        let relative: Vec<Point> = (self.problem.data.iter().zip(rows))
-            .map(|(datum, (row, found))| row.map(|slope| slope * datum.std / found.frequency))
-            .collect();
-        let fit = &self.estimator.settings.fit;
-        let directions = &self.directions[..fit.len()];
-        let covariance = Covariance::new(&relative, directions);
-        fit.iter()
-            .zip(directions)
-            .map(|(&parameter, direction)| {
-                let slope = match parameter {
-                    Parameter::Coupling => 1.0 - at.point[parameter.index()].tanh().powi(2),
-                    _ => 1.0,
-                };
-                let std = slope * covariance.std_or_infinite(direction);
-                NeededAccuracy {
-                    parameter,
-                    // An accuracy that no clock has is none.
-                    relative_std: Some(MEASURABLE / std).filter(|needed| *needed > 1e-9),
-                }
-            })
-            .collect()
-    }
-}
-
-/// Singular values, descending, and their directions in parameter space.
-fn decompose(jacobian: &[Point], fit: &[Parameter]) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let rows = jacobian.len().max(fit.len());
-    let matrix = DMatrix::from_fn(rows, fit.len(), |row, column| {
-        jacobian
-            .get(row)
-            .map_or(0.0, |slopes| slopes[fit[column].index()])
-    });
-    let Some(svd) = SVD::try_new(matrix, false, true, f64::EPSILON, 1000) else {
-        return (Vec::new(), Vec::new());
-    };
-    let Some(vectors) = svd.v_t else {
-        return (Vec::new(), Vec::new());
-    };
-    let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
-    order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
-    let directions = order
-        .iter()
-        .map(|&row| vectors.row(row).iter().copied().collect())
-        .collect();
-    let values = order.iter().map(|&i| svd.singular_values[i]).collect();
-    (values, directions)
 }
 
 fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatDirection> {

@@ -1,15 +1,13 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
-use super::initial_guesses::{everywhere, promising};
-use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
+use super::model::{FrequencyModel, JointedStructure, Parameter, Point};
 use super::problem::{
-    Covariance, Datum, Evaluation, FULL, MISFIT, Minimum, Prior, Problem, ROUGH, along,
-    value_along, within_bounds,
+    Covariance, Datum, Evaluation, FULL, MISFIT, Minimum, Prior, Problem, ROUGH, along, everywhere,
+    promising, within_bounds,
 };
-use super::result::{Limit, Quantity, joint_at, limit_of};
-use super::{ConsistentSettings, ResidualWeights};
+use super::{ConsistentSettings, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
-use crate::perturbation::{MonteCarlo, Spread};
+use crate::perturbation::MonteCarlo;
 use crate::{IdentifyError, MeasuredMode, Stiffnesses};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,9 +15,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use tapjoint_beam::interface::LAST_STEP;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::Body;
-use tapjoint_beam::{Assembly, Beam, JointStiffness};
-use tapjoint_numerics::least_squares::{Loss, StopReason};
+use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_numerics::least_squares::StopReason;
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
@@ -32,18 +29,16 @@ pub struct ConsistentEstimator {
     pub(super) nuisances: Vec<(Parameter, f64)>,
 }
 
-/// A fit without its intervals: what the repetitions of a Monte Carlo need.
+/// A fit without its intervals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointFit {
     /// Point of least misfit.
     pub point: Point,
-    /// Sum of the loss over all residuals there.
+    /// Sum of the squared residuals there; infinite where no start leads to a minimum.
     pub misfit: f64,
     /// Standard deviations of the estimated coordinates (1, logarithms and atanh), in the order of
     /// the fit; `None` where nothing is known.
     pub stds: Vec<Option<f64>>,
-    /// Predicted frequencies (Hz).
-    pub frequencies: Vec<f64>,
     /// Reason for which the search ended.
     pub stop: StopReason,
 }
@@ -131,11 +126,15 @@ impl ConsistentEstimator {
         self.modes.iter().map(|mode| mode.frequency).collect()
     }
 
-    /// Returns the free directions: first what is estimated, then the beam's uncertain properties.
-    pub(super) fn directions(&self) -> Vec<Point> {
+    /// Returns what is free: first what is estimated, then the beam's uncertain properties.
+    pub(super) fn free_parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
         let nuisances = self.nuisances.iter().map(|(parameter, _)| *parameter);
-        let free = self.settings.fit.iter().copied().chain(nuisances);
-        free.map(along).collect()
+        self.settings.fit.iter().copied().chain(nuisances)
+    }
+
+    /// Returns the unit vectors of [`Self::free_parameters`].
+    pub(super) fn directions(&self) -> Vec<Point> {
+        self.free_parameters().map(along).collect()
     }
 
     pub(super) fn problem<'a>(
@@ -152,53 +151,18 @@ impl ConsistentEstimator {
                 ResidualWeights::Relative => frequency,
             },
         });
+        let nominal = self.model.nominal();
+        let priors = self.nuisances.iter().map(|&(parameter, std)| Prior {
+            parameter,
+            value: nominal[parameter.index()],
+            std,
+        });
         Problem {
             model,
             data: data.collect(),
-            priors: self.priors(),
-            loss: self.settings.loss,
+            priors: priors.collect(),
             last_step: LAST_STEP,
         }
-    }
-
-    fn priors(&self) -> Vec<Prior> {
-        let nominal = self.model.nominal();
-        let mut priors: Vec<Prior> = self
-            .nuisances
-            .iter()
-            .map(|&(parameter, std)| Prior {
-                gradient: along(parameter),
-                value: nominal[parameter.index()],
-                std,
-            })
-            .collect();
-        if let Some((mass, std)) = self.settings.weighed_mass {
-            let mut gradient = [0.0; PARAMETERS];
-            for part in [
-                Parameter::Density,
-                Parameter::Length,
-                Parameter::Width,
-                Parameter::Thickness,
-            ] {
-                gradient[part.index()] = 1.0;
-            }
-            // Every piece's mass rises by the same factor as rho L b h of the described beam, of which
-            // unequal halves together are another multiple.
-            let JointedStructure {
-                beam,
-                assembly,
-                lap,
-                ..
-            } = self.model.structure();
-            let body = Body::of(beam, *assembly, lap);
-            let described: f64 = body.beams().iter().map(Beam::mass).sum();
-            priors.push(Prior {
-                gradient,
-                value: value_along(&gradient, &nominal) + (mass / described).ln(),
-                std: std / mass,
-            });
-        }
-        priors
     }
 
     /// Returns the least misfit over all joints, from the pair regression's estimate and from wherever the
@@ -209,9 +173,7 @@ impl ConsistentEstimator {
 
     /// Fits other frequencies (Hz) of the same modes.
     pub fn fit_frequencies(&self, frequencies: &[f64]) -> PointFit {
-        let (model, minima) = self.solve(frequencies);
-        let model = model.as_ref().unwrap_or(&self.model);
-        self.summary(&self.problem(model, frequencies), minima)
+        self.deepest(self.solve(frequencies).1)
     }
 
     /// Returns the points from which repetitions of the estimate start: all minima of this one.
@@ -227,21 +189,8 @@ impl ConsistentEstimator {
     /// neighbourhood, renewed where the beam moves far from it.
     pub fn refit(&self, frequencies: &[f64], near: &Neighbourhood) -> PointFit {
         let model = near.model.as_ref().unwrap_or(&self.model);
-        let minima = self.refit_in(model, frequencies, &near.starts);
-        let (renewed, minima) = self.renew(model, frequencies, minima);
-        let model = renewed.as_ref().unwrap_or(model);
-        self.summary(&self.problem(model, frequencies), minima)
-    }
-
-    pub(super) fn refit_in(
-        &self,
-        model: &FrequencyModel,
-        frequencies: &[f64],
-        starts: &[Point],
-    ) -> Vec<Minimum> {
-        let mut problem = self.problem(model, frequencies);
-        self.rescale(&mut problem, starts);
-        self.minima(&problem, starts)
+        let minima = self.minima(&self.problem(model, frequencies), &near.starts);
+        self.deepest(self.renew(model, frequencies, minima).1)
     }
 
     /// Returns the non-dimensional stiffnesses as a function of the frequencies (Hz), for
@@ -273,30 +222,25 @@ impl ConsistentEstimator {
         }
     }
 
-    fn summary(&self, problem: &Problem<'_>, minima: Vec<Minimum>) -> PointFit {
-        let Some(best) = minima.into_iter().next() else {
-            // Without a single start there is the nominal point.
-            let at = problem.evaluate(&self.base, &problem.measured_lambdas(&self.base));
-            return PointFit {
-                point: at.point,
-                misfit: at.cost,
-                stds: Vec::new(),
-                frequencies: at.responses.iter().map(|found| found.frequency).collect(),
-                stop: StopReason::NothingFree,
-            };
-        };
-        let directions = self.directions();
-        let covariance = Covariance::new(&best.state.jacobian, &directions);
-        let fitted = directions.iter().take(self.settings.fit.len());
-        PointFit {
-            point: best.state.point,
-            misfit: best.state.cost,
-            stds: fitted.map(|direction| covariance.std(direction)).collect(),
-            frequencies: (best.state.responses.iter())
-                .map(|found| found.frequency)
-                .collect(),
-            stop: best.stop,
-        }
+    /// Returns the first of these minima; without a single one the nominal point.
+    fn deepest(&self, minima: Vec<Minimum>) -> PointFit {
+        let best = minima.into_iter().next().map(|best| {
+            let directions = self.directions();
+            let covariance = Covariance::new(&best.state.jacobian, &directions);
+            let fitted = directions.iter().take(self.settings.fit.len());
+            PointFit {
+                point: best.state.point,
+                misfit: best.state.cost,
+                stds: fitted.map(|direction| covariance.std(direction)).collect(),
+                stop: best.stop,
+            }
+        });
+        best.unwrap_or(PointFit {
+            point: self.base,
+            misfit: f64::INFINITY,
+            stds: Vec::new(),
+            stop: StopReason::NothingFree,
+        })
     }
 }
 
@@ -323,10 +267,9 @@ fn check(
     if fit.is_empty() || no_joint && fit.iter().any(|fitted| Parameter::JOINT.contains(fitted)) {
         return Err(IdentifyError::NothingToEstimate);
     }
-    let known = modes.len() + usize::from(settings.weighed_mass.is_some());
-    if known < settings.fit.len() {
+    if modes.len() < fit.len() {
         return Err(IdentifyError::TooFewFrequencies {
-            unknowns: settings.fit.len(),
+            unknowns: fit.len(),
             found: modes.len(),
         });
     }
@@ -350,10 +293,9 @@ const RENEWALS: usize = 6;
 impl ConsistentEstimator {
     /// Returns all minima, the deepest first, and the model renewed where the beam has moved far.
     pub(super) fn solve(&self, frequencies: &[f64]) -> (Option<FrequencyModel>, Vec<Minimum>) {
-        let mut problem = self.problem(&self.model, frequencies);
+        let problem = self.problem(&self.model, frequencies);
         let mut starts = promising(&problem, &self.base, &self.settings.fit);
         starts.extend(self.pairs_guess(&problem));
-        self.rescale(&mut problem, &starts);
         let mut minima = self.minima(&problem, &starts);
         // A misfit below three times what it should be, or, without stated uncertainties, below what any
         // reading achieves leaves no room for another minimum.
@@ -373,7 +315,7 @@ impl ConsistentEstimator {
 
     /// Follows the beam where the deepest minimum has moved it far from the one that the model was built
     /// for. Returns the model built anew, if it was, and the minima by it.
-    pub(super) fn renew(
+    fn renew(
         &self,
         model: &FrequencyModel,
         frequencies: &[f64],
@@ -392,7 +334,7 @@ impl ConsistentEstimator {
                 break;
             };
             let starts: Vec<Point> = minima.iter().map(|minimum| minimum.state.point).collect();
-            minima = self.refit_in(&built, frequencies, &starts);
+            minima = self.minima(&self.problem(&built, frequencies), &starts);
             renewed = Some(built);
         }
         (renewed, minima)
@@ -428,7 +370,7 @@ impl ConsistentEstimator {
     }
 
     /// Follows every start down roughly, keeps different minima, and finishes each.
-    pub(super) fn minima(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
+    fn minima(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
         let directions = self.directions();
         // A last step of 1e-4 leaves 1e-8: enough to tell minima apart, and half the work.
         let rough = Problem {
@@ -463,8 +405,7 @@ impl ConsistentEstimator {
 
     /// Returns true for two points that no free coordinate tells apart.
     fn is_same(&self, first: &Evaluation, second: &Evaluation) -> bool {
-        let nuisances = self.nuisances.iter().map(|(parameter, _)| parameter);
-        self.settings.fit.iter().chain(nuisances).all(|parameter| {
+        self.free_parameters().all(|parameter| {
             let index = parameter.index();
             (first.point[index] - second.point[index]).abs() < SAME_MINIMUM
         })
@@ -498,30 +439,6 @@ impl ConsistentEstimator {
             }
         }
     }
-
-    /// Finds out, with relative weights, what a usual misfit is, for a robust loss needs to know: that of
-    /// the least squares, by its median, for as many misfits as there is freedom.
-    pub(super) fn rescale(&self, problem: &mut Problem<'_>, starts: &[Point]) {
-        let relative = self.settings.weights == ResidualWeights::Relative;
-        if !relative || problem.loss == Loss::Squares {
-            return;
-        }
-        let loss = std::mem::take(&mut problem.loss);
-        let (data, free) = (problem.data.len(), self.settings.fit.len());
-        if let Some(best) = self.minima(problem, starts).first() {
-            let mut sizes: Vec<f64> = best.state.residuals.iter().map(|r| r.abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let median = sizes[(data - 1) / 2];
-            let share = (data as f64 / (data.saturating_sub(free)).max(1) as f64).sqrt();
-            // 1.4826 median = standard deviation of a normal distribution. Exact frequencies have
-            // no usual misfit; rounding is the least there is.
-            let scale = (1.4826 * median * share).max(1e-12);
-            for datum in &mut problem.data {
-                datum.std = scale * datum.frequency;
-            }
-        }
-        problem.loss = loss;
-    }
 }
 
 // Random errors of the frequencies carried through the estimate by repetition.
@@ -530,118 +447,53 @@ impl ConsistentEstimator {
 /// not on how many threads work on it.
 const CHUNK: usize = 256;
 
-/// Distribution of one quantity over the repetitions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct QuantitySpread {
-    /// The quantity.
-    pub quantity: Quantity,
-    /// Median, in the quantity's unit.
-    pub median: f64,
-    /// 2.5 % point.
-    pub low: f64,
-    /// 97.5 % point.
-    pub high: f64,
-}
-
-/// Estimates from randomly disturbed frequencies.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ConsistentMonteCarlo {
-    /// Repetitions.
-    pub samples: usize,
-    /// Number of repetitions that did not converge.
-    pub failed: usize,
-    /// Every estimated quantity but Kz and Ktr, which a coupling near zero makes infinite.
-    pub spreads: Vec<QuantitySpread>,
-    /// The non-dimensional stiffnesses, Kz by way of its reciprocal.
-    pub joint: MonteCarlo,
-}
-
 impl ConsistentEstimator {
     /// Repeats the estimate `samples` times with independent normal errors of the frequencies of
     /// their stated standard deviations, and of the properties of the beam that have a tolerance of
-    /// theirs, each repetition from every minimum of the first estimate. The body is that of the first
-    /// estimate: what a repetition moves of the beam is followed to first order, which leaves less
-    /// than a thousandth of a standard deviation. The same seed gives the same answer on any number
-    /// of threads.
+    /// theirs, each repetition from every minimum of the first estimate, its
+    /// [`ConsistentEstimator::neighbourhood`]. The body is that of the first estimate: what a repetition moves
+    /// of the beam is followed to first order, which leaves less than a thousandth of a standard deviation.
+    /// The same seed gives the same answer on any number of threads. Repetitions that do not converge count
+    /// as failed.
     ///
     /// # Errors
     /// [`IdentifyError::NoUncertainty`] where a mode has no standard uncertainty.
     pub fn monte_carlo(
         &self,
-        samples: usize,
-        seed: u64,
-    ) -> Result<ConsistentMonteCarlo, IdentifyError> {
-        self.monte_carlo_near(&self.neighbourhood(), samples, seed)
-    }
-
-    /// Repeats the estimate from a [`ConsistentEstimator::neighbourhood`] that is known already.
-    ///
-    /// # Errors
-    /// As [`ConsistentEstimator::monte_carlo`].
-    pub fn monte_carlo_near(
-        &self,
         near: &Neighbourhood,
         samples: usize,
         seed: u64,
-    ) -> Result<ConsistentMonteCarlo, IdentifyError> {
+    ) -> Result<MonteCarlo, IdentifyError> {
         let mut errors = Vec::with_capacity(self.modes.len());
         for mode in &self.modes {
             let std = mode.std.filter(|std| std.is_finite());
             let std = std.ok_or(IdentifyError::NoUncertainty { mode: mode.mode })?;
             errors.push((mode.frequency, std));
         }
-        let chunks: Vec<Vec<Option<Point>>> = (0..samples.div_ceil(CHUNK))
+        let chunks: Vec<Vec<Stiffnesses>> = (0..samples.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
+                let mut random = ChaCha8Rng::seed_from_u64(seed);
+                random.set_stream(chunk as u64);
                 let count = CHUNK.min(samples - chunk * CHUNK);
-                self.repeat(seed, chunk as u64, count, &errors, near)
+                self.repeat(random, count, &errors, near)
             })
             .collect();
-        let found: Vec<Point> = chunks.into_iter().flatten().flatten().collect();
-        let mut spreads = Vec::new();
-        for &quantity in self
-            .settings
-            .fit
-            .iter()
-            .flat_map(|&fitted| Quantity::of(fitted))
-        {
-            if matches!(quantity, Quantity::Kz | Quantity::Ktr) {
-                continue;
-            }
-            let values = found.iter().filter_map(|point| quantity.value(point));
-            if let Some(Spread { median, low, high }) = Spread::of(values) {
-                spreads.push(QuantitySpread {
-                    quantity,
-                    median,
-                    low,
-                    high,
-                });
-            }
-        }
-        let joints: Vec<Stiffnesses> = found.iter().map(|at| self.stiffnesses_at(at)).collect();
-        Ok(ConsistentMonteCarlo {
-            joint: MonteCarlo::of(samples, &joints),
-            samples,
-            failed: samples - found.len(),
-            spreads,
-        })
+        Ok(MonteCarlo::of(samples, &chunks.concat()))
     }
 
-    /// Returns the point of each of `count` repetitions, `None` where it did not converge.
+    /// Returns the stiffnesses of those of `count` repetitions that converge.
     fn repeat(
         &self,
-        seed: u64,
-        stream: u64,
+        random: ChaCha8Rng,
         count: usize,
         errors: &[(f64, f64)],
         near: &Neighbourhood,
-    ) -> Vec<Option<Point>> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(stream);
+    ) -> Vec<Stiffnesses> {
         let model = near.model.as_ref().unwrap_or(&self.model);
         let stated = self.problem(model, &self.frequencies());
-        let mut normal = StandardNormal.sample_iter(&mut random);
-        let mut points = Vec::with_capacity(count);
+        let mut normal = StandardNormal.sample_iter(random);
+        let mut found = Vec::with_capacity(count);
         for _ in 0..count {
             let mut problem = stated.clone();
             let read = problem.data.iter_mut().zip(errors);
@@ -653,15 +505,12 @@ impl ConsistentEstimator {
             for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {
                 prior.value += prior.std * error;
             }
-            if problem.data.iter().any(|datum| datum.frequency <= 0.0) {
-                points.push(None);
-                continue;
+            if problem.data.iter().all(|datum| datum.frequency > 0.0) {
+                let best = self.minima(&problem, &near.starts).into_iter().next();
+                let converged = best.filter(|best| best.stop.converged());
+                found.extend(converged.map(|best| self.stiffnesses_at(&best.state.point)));
             }
-            self.rescale(&mut problem, &near.starts);
-            let best = self.minima(&problem, &near.starts).into_iter().next();
-            let converged = best.filter(|best| best.stop.converged());
-            points.push(converged.map(|best| best.state.point));
         }
-        points
+        found
     }
 }

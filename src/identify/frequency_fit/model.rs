@@ -246,9 +246,24 @@ impl FrequencyModel {
                 JointedBody::Joined(halves)
             }
         };
-        let free = match structure.assembly {
-            Assembly::Free => Some(free_lambdas(&body, highest)?),
-            Assembly::Cantilever | Assembly::Lap => None,
+        let free = match (structure.assembly, &body) {
+            (Assembly::Cantilever | Assembly::Lap, _) => None,
+            (Assembly::Free, JointedBody::Rooted(slenderness)) => {
+                let joint = JointStiffness::FREE;
+                let modes = natural_modes(Assembly::Free, &joint, slenderness, highest)?;
+                Some(modes.iter().map(|mode| mode.lambda).collect())
+            }
+            (Assembly::Free, JointedBody::Elements(modes))
+                if modes.free_squares().len() >= highest =>
+            {
+                let squares = modes.free_squares().iter().take(highest);
+                Some(squares.map(|square| square.powf(0.25)).collect())
+            }
+            (Assembly::Free, _) => {
+                return Err(StructureError::FiniteElements {
+                    reason: "it has fewer modes than were measured; divide finer".to_owned(),
+                });
+            }
         };
         Ok(Self {
             structure: structure.clone(),
@@ -422,21 +437,5 @@ pub(super) fn beam_at(beam: &Beam, point: &Point) -> Beam {
         width,
         thickness,
         poisson: beam.poisson,
-    }
-}
-
-fn free_lambdas(body: &JointedBody, highest: usize) -> Result<Vec<f64>, StructureError> {
-    match body {
-        JointedBody::Rooted(slenderness) => {
-            let modes = natural_modes(Assembly::Free, &JointStiffness::FREE, slenderness, highest)?;
-            Ok(modes.iter().map(|mode| mode.lambda).collect())
-        }
-        JointedBody::Elements(modes) if modes.free_squares().len() >= highest => {
-            let squares = modes.free_squares().iter().take(highest);
-            Ok(squares.map(|square| square.powf(0.25)).collect())
-        }
-        _ => Err(StructureError::FiniteElements {
-            reason: "it has fewer modes than were measured; divide finer".to_owned(),
-        }),
     }
 }

@@ -1,5 +1,5 @@
-//! The misfit of a joint's frequencies: residuals and their derivatives at a point, the way to the nearest
-//! minimum, and the first-order uncertainty there.
+//! The misfit of a joint's frequencies: initial guesses, residuals and their derivatives at a point, the way to
+//! the nearest minimum, and the first-order uncertainty there.
 //!
 //! The search solves its linearised problem by reflections, never by the normal equations, which would
 //! square the condition number: it is for stiffnesses that the frequencies hardly feel.
@@ -8,7 +8,9 @@ use super::model::{
     FrequencyModel, ModeResponse, PARAMETERS, Parameter, Point, beam_at, log_nondimensional,
 };
 use nalgebra::{DMatrix, DVector};
-use tapjoint_numerics::least_squares::{self, Linearised, Loss, Settings, minimise};
+use std::f64::consts::{LN_10, PI};
+use tapjoint_beam::interface::{InterfaceFunctions, JointWeights};
+use tapjoint_numerics::least_squares::{self, Linearised, Settings, minimise};
 
 /// End of a search.
 pub(super) type Minimum = least_squares::Minimum<Evaluation>;
@@ -58,10 +60,10 @@ pub(super) struct Datum {
     pub(super) std: f64,
 }
 
-/// A linear function of the point that is known beforehand, with its standard deviation.
+/// A coordinate of the point that is known beforehand, with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Prior {
-    pub(super) gradient: Point,
+    pub(super) parameter: Parameter,
     pub(super) value: f64,
     pub(super) std: f64,
 }
@@ -72,7 +74,6 @@ pub(super) struct Problem<'a> {
     pub(super) model: &'a FrequencyModel,
     pub(super) data: Vec<Datum>,
     pub(super) priors: Vec<Prior>,
-    pub(super) loss: Loss,
     /// Relative step of lambda that ends the search for a root.
     pub(super) last_step: f64,
 }
@@ -81,11 +82,11 @@ pub(super) struct Problem<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Evaluation {
     pub(super) point: Point,
-    /// Sum of the loss over all residuals.
+    /// Sum of the squares of all residuals.
     pub(super) cost: f64,
-    /// Standardised residuals, times the root of their weight.
+    /// Standardised residuals.
     pub(super) residuals: Vec<f64>,
-    /// Their derivatives with the point, times the same.
+    /// Their derivatives with the point.
     pub(super) jacobian: Vec<Point>,
     /// Prediction for every mode.
     pub(super) responses: Vec<ModeResponse>,
@@ -102,18 +103,13 @@ impl Evaluation {
             there[1] - here[1],
             point[2] - self.point[2],
         ];
-        let mut guesses = Vec::with_capacity(self.responses.len());
-        for response in &self.responses {
+        let responses = self.responses.iter().map(|response| {
             // lambda changes with the joint alone, half as much as the frequency. A rigid joint stays.
-            let changes = response
-                .sensitivity
-                .iter()
-                .zip(moved)
-                .map(|(s, moved)| s * moved);
+            let changes = response.sensitivity.iter().zip(moved).map(|(s, m)| s * m);
             let change: f64 = changes.filter(|change| change.is_finite()).sum();
-            guesses.push(response.lambda * (1.0 + (0.5 * change).clamp(-FARTHEST, FARTHEST)));
-        }
-        guesses
+            response.lambda * (1.0 + (0.5 * change).clamp(-FARTHEST, FARTHEST))
+        });
+        responses.collect()
     }
 }
 
@@ -132,19 +128,19 @@ impl Problem<'_> {
         for (datum, guess) in self.data.iter().zip(guesses) {
             let response = model.response(datum.mode, *guess);
             let residual = (response.frequency - datum.frequency) / datum.std;
-            let root = self.loss.weight(residual).sqrt();
-            let scale = root * response.frequency / datum.std;
-            result.cost += self.loss.of(residual);
-            result.residuals.push(root * residual);
+            let scale = response.frequency / datum.std;
+            result.cost += residual * residual;
+            result.residuals.push(residual);
             let slopes = response.sensitivity.map(|slope| scale * slope);
             result.jacobian.push(slopes);
             result.responses.push(response);
         }
         for prior in &self.priors {
-            let residual = (value_along(&prior.gradient, point) - prior.value) / prior.std;
+            let residual = (point[prior.parameter.index()] - prior.value) / prior.std;
             result.cost += residual * residual;
             result.residuals.push(residual);
-            result.jacobian.push(prior.gradient.map(|g| g / prior.std));
+            let slopes = along(prior.parameter).map(|slope| slope / prior.std);
+            result.jacobian.push(slopes);
         }
         result
     }
@@ -199,12 +195,10 @@ impl least_squares::Problem for Descent<'_> {
 
     fn linearise(&self, _: &[f64], at: &mut Evaluation) -> Option<Linearised> {
         let (rows, columns) = (at.jacobian.len(), self.directions.len());
-        Some(Linearised::Rows {
-            jacobian: DMatrix::from_fn(rows, columns, |row, column| {
-                dot(&at.jacobian[row], &self.directions[column])
-            }),
-            residuals: DVector::from_column_slice(&at.residuals),
-        })
+        let jacobian = DMatrix::from_fn(rows, columns, |row, column| {
+            dot(&at.jacobian[row], &self.directions[column])
+        });
+        Some(Linearised::of_rows(jacobian, &at.residuals))
     }
 
     /// Returns the point one step on, within bounds and not too far.
@@ -306,21 +300,148 @@ impl Covariance {
         factors.map(|f| dot(first, f) * dot(second, f)).sum()
     }
 
-    /// Returns the standard deviation of a linear function of the point, however large it is.
-    pub(super) fn std_or_infinite(&self, gradient: &Point) -> f64 {
-        self.between(gradient, gradient).sqrt()
-    }
-
     /// Returns the standard deviation of a linear function of the point; `None` where nothing is known of
     /// it.
     pub(super) fn std(&self, gradient: &Point) -> Option<f64> {
-        Some(self.std_or_infinite(gradient)).filter(|std| *std < NOTHING_KNOWN)
+        Some(self.between(gradient, gradient).sqrt()).filter(|std| *std < NOTHING_KNOWN)
+    }
+}
+
+// Initial guesses: every joint of a grid where the frequency equation nearly holds.
+//
+// With the body's functions at the measured frequencies in hand, one Newton step tells about how
+// far each predicted frequency would be from its measured one, for the price of a few products.
+// A grid over all joints is cheaper that way than one exact prediction.
+
+/// Decades of Kx and Ky tried: below the first a joint is hardly one, above the last hardly one
+/// mode feels that it gives.
+const TRANSLATION_DECADES: [f64; 6] = [0.5, 1.5, 2.5, 3.5, 4.5, 6.0];
+const ROTATION_DECADES: [f64; 6] = [-1.0, 0.0, 1.0, 2.0, 3.0, 4.5];
+/// Couplings tried, as atanh: tanh 1 is 0.76.
+const COUPLINGS: [f64; 3] = [-1.0, 0.0, 1.0];
+/// Factors of the stiffness or mass of the beam where one of them is estimated.
+const BEAM_FACTORS: [f64; 3] = [1.0, 0.75, 1.33];
+/// So many of the most promising joints are followed down.
+const FOLLOWED: usize = 4;
+
+/// Joints that are tried on one beam.
+struct Grid {
+    beam: Point,
+    /// Coordinates of Kt, Kr and the coupling: one alone where it is held.
+    axes: [Vec<f64>; 3],
+}
+
+impl Grid {
+    fn new(beam: &Point, fit: &[Parameter]) -> Self {
+        let [log_kx, log_ky] = log_nondimensional(beam);
+        let units = [beam[0] - log_kx, beam[1] - log_ky];
+        let mut axes = [
+            TRANSLATION_DECADES.map(|d| d * LN_10 + units[0]).to_vec(),
+            ROTATION_DECADES.map(|d| d * LN_10 + units[1]).to_vec(),
+            COUPLINGS.to_vec(),
+        ];
+        for (axis, parameter) in axes.iter_mut().zip(Parameter::JOINT) {
+            if !fit.contains(&parameter) {
+                *axis = vec![beam[parameter.index()]];
+            }
+        }
+        Self { beam: *beam, axes }
     }
 
-    /// Returns the variance of `gradient` when one more residual of these slopes is known:
-    /// C - C j j^T C/(1 + j^T C j).
-    pub(super) fn variance_with(&self, gradient: &Point, slopes: &Point) -> f64 {
-        let shared = self.between(gradient, slopes);
-        self.between(gradient, gradient) - shared * shared / (1.0 + self.between(slopes, slopes))
+    /// Returns the indices of all joints, the last axis changing fastest.
+    fn indices(&self) -> impl Iterator<Item = [usize; 3]> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.axes[axis].len());
+        (0..x * y * z).map(move |n| [n / (y * z), n / z % y, n % z])
     }
+
+    fn point(&self, index: [usize; 3]) -> Point {
+        let mut point = self.beam;
+        for (axis, values) in self.axes.iter().enumerate() {
+            point[axis] = values[index[axis]];
+        }
+        point
+    }
+
+    /// Returns the joints of which no neighbour has a smaller misfit, with their approximate misfit.
+    fn minima(&self, problem: &Problem<'_>) -> Vec<(f64, Point)> {
+        let lambdas = problem.measured_lambdas(&self.beam);
+        let functions: Vec<InterfaceFunctions> = lambdas
+            .iter()
+            .map(|lambda| problem.model.body.functions(*lambda))
+            .collect();
+        let points: Vec<Point> = self.indices().map(|index| self.point(index)).collect();
+        let costs: Vec<f64> = points
+            .iter()
+            .map(|point| approximate_cost(problem, &functions, point))
+            .collect();
+        let mut strides = [1; 3];
+        for axis in [1, 0] {
+            strides[axis] = strides[axis + 1] * self.axes[axis + 1].len();
+        }
+        let mut minima = Vec::new();
+        for (n, index) in self.indices().enumerate() {
+            let is_minimum = (0..3).all(|axis| {
+                let is_first = index[axis] == 0;
+                let is_last = index[axis] + 1 == self.axes[axis].len();
+                (is_first || costs[n] <= costs[n - strides[axis]])
+                    && (is_last || costs[n] <= costs[n + strides[axis]])
+            });
+            if is_minimum {
+                minima.push((costs[n], points[n]));
+            }
+        }
+        minima
+    }
+}
+
+/// Returns a guess for every minimum there may be: every second joint of the grid.
+pub(super) fn everywhere(nominal: &Point, fit: &[Parameter]) -> Vec<Point> {
+    let grid = Grid::new(nominal, fit);
+    let few = grid.axes[0].len() * grid.axes[1].len() < 10;
+    let indices = grid.indices().filter(|[i, j, _]| few || (i + j) % 2 == 0);
+    indices.map(|index| grid.point(index)).collect()
+}
+
+/// Returns the most promising joints of the grid, the best first; no two of them are neighbours.
+pub(super) fn promising(problem: &Problem<'_>, nominal: &Point, fit: &[Parameter]) -> Vec<Point> {
+    if !fit.iter().any(|fitted| Parameter::JOINT.contains(fitted)) {
+        return vec![*nominal];
+    }
+    let beam = [Parameter::Modulus, Parameter::Density];
+    let fitted = beam.into_iter().find(|parameter| fit.contains(parameter));
+    let mut found = Vec::new();
+    for factor in BEAM_FACTORS {
+        let mut at = *nominal;
+        match fitted {
+            Some(parameter) => at[parameter.index()] += factor.ln(),
+            None if factor != 1.0 => continue,
+            None => {}
+        }
+        found.extend(Grid::new(&at, fit).minima(problem));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(FOLLOWED);
+    found.into_iter().map(|(_, point)| point).collect()
+}
+
+/// Returns the sum of squared misfits of a joint, by one Newton step from each measured frequency.
+fn approximate_cost(problem: &Problem<'_>, functions: &[InterfaceFunctions], point: &Point) -> f64 {
+    let joint = JointWeights::from_compliances(problem.model.compliances(point));
+    let uncounted = problem.model.body.uncounted();
+    let mut cost = 0.0;
+    for (datum, at) in problem.data.iter().zip(functions) {
+        let (value, slope) = at.equation(&joint);
+        // Neighbouring roots are about pi apart in lambda; f grows as its square.
+        let spacing = 2.0 * PI / at.lambda;
+        let (number, count) = (datum.mode + uncounted, at.count(&joint, value));
+        let modes_off = if count >= number {
+            count - number
+        } else {
+            number - 1 - count
+        };
+        let newton = 2.0 * (at.newton_step(value, slope) / at.lambda).abs();
+        let miss = newton.min(0.5 * spacing) + modes_off as f64 * spacing;
+        cost += (miss * datum.frequency / datum.std).powi(2);
+    }
+    cost
 }

@@ -1,17 +1,18 @@
-//! The joint that suits an assignment best, and how probable the frequencies are over all joints.
+//! The joint that suits an assignment best, how probable the frequencies are over all joints, and how well
+//! measured shapes suit it.
 
-use std::f64::consts::{LN_10, PI};
-
-use nalgebra::{DMatrix, DVector};
-
-use super::{MeasuredPeak, PairingSettings};
+use super::{MeasuredPeak, MissingCause, MissingMode, PairingSettings, ShapeAt};
 use crate::frequency_fit::{FrequencyModel, Parameter, Point};
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeSet;
+use std::f64::consts::{LN_10, PI};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_numerics::least_squares::{Linearised, Loss, Problem, Settings, minimise};
+use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
+use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
+use tapjoint_numerics::stats::student;
 
-/// The model's discrepancy has tails in which one mode may lie far off.
-const LOSS: Loss = Loss::StudentT(4.0);
+/// Degrees of freedom of Student's t: the model's discrepancy has tails in which one mode may lie far off.
+const FREEDOM: f64 = 4.0;
 /// Density of Student's t with that many at its middle: 3/8.
 const DENSITY: f64 = 0.375;
 /// Prior means of ln Kx, ln Ky and atanh of the coupling, and their standard deviations: joints of
@@ -31,7 +32,7 @@ const STRONGEST: f64 = 0.999;
 /// Peaks and the model they are compared with.
 pub(super) struct JointSearch<'a> {
     model: &'a FrequencyModel,
-    pub(super) peaks: &'a [MeasuredPeak],
+    pub peaks: &'a [MeasuredPeak],
     settings: &'a PairingSettings,
     units: StiffnessUnits,
     /// 1/Kz (1) of a coupling that is held; 0 without one.
@@ -67,20 +68,9 @@ impl<'a> JointSearch<'a> {
         }
     }
 
-    pub fn model(&self) -> &FrequencyModel {
-        self.model
-    }
-
-    pub fn log_frequencies(&self) -> Vec<f64> {
-        self.peaks.iter().map(|peak| peak.frequency.ln()).collect()
-    }
-
     pub fn in_band(&self, frequency: f64) -> bool {
-        let bands = &self.settings.bands;
-        bands.is_empty()
-            || bands
-                .iter()
-                .any(|&(low, high)| (low..=high).contains(&frequency))
+        let mut bands = self.settings.bands.iter();
+        bands.len() == 0 || bands.any(|&(low, high)| (low..=high).contains(&frequency))
     }
 
     fn is_free(&self, index: usize) -> bool {
@@ -168,12 +158,6 @@ impl<'a> JointSearch<'a> {
         }
     }
 
-    /// Returns the scale of a peak's relative error: its own uncertainty and what the model misses.
-    fn scale(&self, peak: &MeasuredPeak) -> f64 {
-        let own = peak.std.unwrap_or(0.0) / peak.frequency;
-        self.settings.discrepancy.hypot(own)
-    }
-
     /// Returns the joint that suits these pairs of peak and mode best, looked for downhill of `start`.
     ///
     /// Laplace: the probability over all joints is the one at the best times the square root of the inverse
@@ -195,23 +179,12 @@ impl<'a> JointSearch<'a> {
             gain: 1e-9,
             ..Settings::default()
         };
-        match minimise(&assigned, &start, &settings) {
-            None => JointFit {
-                place: start,
-                cost: f64::INFINITY,
-            },
-            Some(found) => JointFit {
-                place: found.state.place,
-                cost: found.state.cost
-                    + 0.5
-                        * found
-                            .state
-                            .curvature
-                            .determinant()
-                            .max(f64::MIN_POSITIVE)
-                            .ln(),
-            },
-        }
+        let found = minimise(&assigned, &start, &settings).map(|found| found.state);
+        let (place, cost) = found.map_or((start, f64::INFINITY), |at| {
+            let determinant = at.curvature.determinant().max(f64::MIN_POSITIVE);
+            (at.place, at.cost + 0.5 * determinant.ln())
+        });
+        JointFit { place, cost }
     }
 }
 
@@ -246,11 +219,13 @@ impl Problem for Assigned<'_> {
         };
         for &(peak, mode) in self.pairs {
             let peak = &self.search.peaks[peak];
-            let scale = self.search.scale(peak);
+            // Its own uncertainty, and what the model misses.
+            let own = peak.std.unwrap_or(0.0) / peak.frequency;
+            let scale = self.search.settings.discrepancy.hypot(own);
             let (predicted, slopes) = self.search.response(place, mode);
             let residual = (predicted - peak.frequency.ln()) / scale;
-            let weight = LOSS.weight(residual);
-            at.cost += 0.5 * LOSS.of(residual) + (scale / DENSITY).ln();
+            let weight = student::weight(residual, FREEDOM);
+            at.cost += 0.5 * student::loss(residual, FREEDOM) + (scale / DENSITY).ln();
             for (i, a) in slopes.iter().enumerate() {
                 at.gradient[i] += weight * residual * a / scale;
                 for (j, b) in slopes.iter().enumerate() {
@@ -289,5 +264,179 @@ impl Problem for Assigned<'_> {
     fn moved(&self, place: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
         let moved = [0, 1, 2].map(|i| place[i] + step[i].clamp(-LARGEST, LARGEST));
         Some(self.search.coupled(moved).to_vec())
+    }
+}
+
+// Measured shapes against those of a joint, and where a mode cannot be seen.
+
+/// Standard deviation of the angle between a measured shape and its model (rad): positions, axes and
+/// calibrations of sensors, and the closed form without masses.
+const ANGLE: f64 = 0.25;
+/// A share of the shapes is nothing like their model: another direction of motion, a loose sensor.
+const UNLIKE: f64 = 0.1;
+/// A sign contradicts its model in this share of the cases.
+const WRONG_SIGN: f64 = 0.05;
+/// A mode is at its node where it moves less than this share of what the modes usually do there.
+const AT_NODE: f64 = 0.12;
+/// Values that together are no more than this many of their standard deviations have neither sign nor
+/// direction.
+const CLEAR: f64 = 3.0;
+
+/// Predicted shapes of one joint, where they can be had.
+pub(super) struct View {
+    shapes: Vec<ModeShape>,
+    /// Places of sensors and taps at which any peak was seen.
+    places: Vec<(f64, Option<f64>)>,
+}
+
+impl View {
+    pub fn new(search: &JointSearch<'_>, fit: &JointFit) -> Self {
+        let mut places = Vec::new();
+        for at in search.peaks.iter().flat_map(|peak| &peak.shape) {
+            if !places.contains(&(at.sensor, at.tap)) {
+                places.push((at.sensor, at.tap));
+            }
+        }
+        let structure = search.model.structure();
+        let mut shapes = Vec::new();
+        // The closed form has equal halves only.
+        let known = structure.lap.position.is_none() && structure.lap.right.is_none();
+        if known && !places.is_empty() {
+            let (beam, joint) = (&structure.beam, search.joint(fit.place));
+            let found = mode_shapes(beam, structure.assembly, &joint, search.highest);
+            shapes = found.unwrap_or_default();
+        }
+        View { shapes, places }
+    }
+
+    /// Returns the product of a mode's shapes at sensor and tap (1/kg), or the shape at the sensor
+    /// (kg^-1/2).
+    fn at(shape: &ModeShape, sensor: f64, tap: Option<f64>) -> f64 {
+        shape.displacement(sensor) * tap.map_or(1.0, |tap| shape.displacement(tap))
+    }
+
+    /// Returns a mode without a peak, and why.
+    pub fn missing(&self, search: &JointSearch<'_>, fit: &JointFit, mode: usize) -> MissingMode {
+        let frequency = search.predict(fit.place)[mode - 1].exp();
+        let own = self.shapes.get(mode - 1);
+        let at_node = own.filter(|_| !self.places.is_empty()).is_some_and(|own| {
+            self.places.iter().all(|&(sensor, tap)| {
+                let all = self.shapes.iter();
+                let squares: f64 = all.map(|shape| Self::at(shape, sensor, tap).powi(2)).sum();
+                let usual = (squares / self.shapes.len() as f64).sqrt();
+                Self::at(own, sensor, tap).abs() < AT_NODE * usual
+            })
+        });
+        let cause = if !search.in_band(frequency) {
+            MissingCause::OutsideBand
+        } else if at_node {
+            MissingCause::AtNode
+        } else {
+            MissingCause::Unknown
+        };
+        MissingMode {
+            mode,
+            frequency,
+            cause,
+        }
+    }
+
+    /// Returns the negative logarithm of the shapes' probability over that of shapes in any direction.
+    pub fn cost(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> f64 {
+        let seen = search.peaks.iter().flat_map(|peak| &peak.shape);
+        let groups: BTreeSet<usize> = seen.map(|at| at.group).collect();
+        let mut total = 0.0;
+        for group in groups {
+            let (mut cost, mut signs) = (0.0, [0usize; 2]);
+            for &(peak, mode) in pairs {
+                let Some(shape) = self.shapes.get(mode - 1) else {
+                    continue;
+                };
+                let seen = search.peaks[peak].shape.iter();
+                let seen: Vec<&ShapeAt> = seen.filter(|at| at.group == group).collect();
+                let products = Products::new(&seen, shape);
+                cost -= products.likeness();
+                // The size that the modes usually show at these places.
+                let squares = self.shapes.iter().flat_map(|shape| {
+                    let sizes = seen.iter().map(|at| Self::at(shape, at.sensor, at.tap));
+                    sizes.map(|size| size.powi(2))
+                });
+                let count = (self.shapes.len() * seen.len()).max(1) as f64;
+                let usual = (squares.sum::<f64>() / count).sqrt();
+                let is_tapped = seen.iter().all(|at| at.tap.is_some());
+                if let Some(positive) = products.sign(usual).filter(|_| is_tapped) {
+                    signs[usize::from(positive)] += 1;
+                }
+            }
+            // Signs agree in all modes or, the sensor mounted the other way, in none. Either polarity is as likely as
+            // the other.
+            let (right, wrong) = ((2.0 * (1.0 - WRONG_SIGN)).ln(), (2.0 * WRONG_SIGN).ln());
+            let [no, yes] = signs.map(|count| count as f64);
+            let (a, b) = (yes * right + no * wrong, no * right + yes * wrong);
+            let most = a.max(b);
+            total += cost - (most + (0.5 * ((a - most).exp() + (b - most).exp())).ln());
+        }
+        total
+    }
+}
+
+/// Returns true where any group of sensors shows a direction.
+pub(super) fn is_clear(shape: &[ShapeAt]) -> bool {
+    shape.iter().any(|one| {
+        let group = shape.iter().filter(|at| at.group == one.group);
+        let (measured, noise) = group.fold((0.0, 0.0), |(measured, noise), at| {
+            (measured + at.value.powi(2), noise + at.std.powi(2))
+        });
+        measured > CLEAR.powi(2) * noise
+    })
+}
+
+/// A measured shape and that of a model: their product, and the squares of them and of the uncertainties.
+struct Products {
+    count: usize,
+    product: f64,
+    measured: f64,
+    model: f64,
+    noise: f64,
+}
+
+impl Products {
+    fn new(seen: &[&ShapeAt], shape: &ModeShape) -> Self {
+        let predicted = seen.iter().map(|at| View::at(shape, at.sensor, at.tap));
+        let pairs = seen.iter().zip(predicted.clone());
+        Products {
+            count: seen.len(),
+            product: pairs.map(|(at, p)| at.value * p).sum(),
+            measured: seen.iter().map(|at| at.value.powi(2)).sum(),
+            model: predicted.map(|p| p * p).sum(),
+            noise: seen.iter().map(|at| at.std.powi(2)).sum(),
+        }
+    }
+
+    /// Returns ln of the density of the angle between the shapes over that of any direction: a normal one of width
+    /// s has pi/(s sqrt(2 pi)) of it in a plane, 1/s^2 in space (half a circle, half a sphere); more
+    /// dimensions count as three.
+    fn likeness(&self) -> f64 {
+        let (measured, model) = (self.measured, self.model);
+        if self.count < 2 || !(measured > CLEAR.powi(2) * self.noise && model > 0.0) {
+            return 0.0;
+        }
+        let width = ANGLE.hypot((self.noise / measured).sqrt());
+        let cosine = self.product.abs() / (measured * model).sqrt();
+        let peak = match self.count {
+            2 => PI / (width * (2.0 * PI).sqrt()),
+            _ => width.powi(-2),
+        };
+        let normal = peak * (-0.5 * (cosine.min(1.0).acos() / width).powi(2)).exp();
+        ((1.0 - UNLIKE) * normal + UNLIKE).ln()
+    }
+
+    /// Returns true where measured and predicted signs agree; `None` where either has none.
+    fn sign(&self, usual: f64) -> Option<bool> {
+        let [measured, model, noise] = [self.measured, self.model, self.noise].map(f64::sqrt);
+        // Near a node, or across it, the model's own sign is not certain.
+        let clear =
+            measured > CLEAR * noise && model > AT_NODE * usual * (self.count as f64).sqrt();
+        (clear && self.product.abs() > 0.5 * measured * model).then_some(self.product > 0.0)
     }
 }

@@ -1,10 +1,16 @@
-//! The estimated joint: errors of the predicted frequencies, and the estimates under changed frequencies.
+//! The estimated joint.
+//!
+//! Charts of the errors of predicted frequencies, of estimates under changed frequencies, and of mode shapes with the
+//! places of sensors and taps.
 
-use super::super::chart::axis::{Axis, extent, padded};
-use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
-use super::super::document::{Document, EstimateSection, PredictionSection};
-use super::super::format::{rounded_to, signed, signed_percent, significant};
-use super::super::tables::reading_bound;
+use std::collections::BTreeMap;
+
+use crate::document::{Document, EstimateMethod, PredictionSection};
+use crate::format::{rounded_to, signed, signed_percent, significant};
+use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
+use crate::tables::reading_bound;
+use tapjoint_analysis::SampledShape;
+use tapjoint_beam::Assembly;
 
 /// Most modes whose frequencies fit under the picture side by side, and with their words.
 const MOST_WITH_NUMBERS: usize = 10;
@@ -46,7 +52,20 @@ pub fn frequencies(document: &Document) -> Option<Chart> {
     }
     let count = errors.len();
     let names = errors.iter().enumerate();
-    let names = names.map(|(at, error)| (at as f64, tick_words(error.prediction, count)));
+    let names = names.map(|(at, error)| {
+        // The number of a mode, and as far as there is room what was measured and predicted.
+        let mut words = error.prediction.mode.to_string();
+        let rows = [
+            ("measured ", error.prediction.measured),
+            ("predicted ", error.prediction.predicted),
+        ];
+        for (name, value) in rows.iter().filter(|_| count <= MOST_WITH_NUMBERS) {
+            let name = if count <= MOST_WITH_WORDS { name } else { "" };
+            let value = value.map_or(String::new(), |value| significant(value, 5));
+            words.push_str(&format!("\n{name}{value} Hz"));
+        }
+        (at as f64, words)
+    });
     let x = Axis::linear(-0.5, count as f64 - 0.5)
         .of("mode", "")
         .named(names);
@@ -79,24 +98,6 @@ pub fn frequencies(document: &Document) -> Option<Chart> {
     })
 }
 
-/// The number of a mode, and as far as there is room what was measured and predicted.
-fn tick_words(prediction: &PredictionSection, modes: usize) -> String {
-    let mut words = prediction.mode.to_string();
-    if modes > MOST_WITH_NUMBERS {
-        return words;
-    }
-    let rows = [
-        ("measured ", prediction.measured),
-        ("predicted ", prediction.predicted),
-    ];
-    for (name, value) in rows {
-        let name = if modes <= MOST_WITH_WORDS { name } else { "" };
-        let value = value.map_or(String::new(), |value| significant(value, 5));
-        words.push_str(&format!("\n{name}{value} Hz"));
-    }
-    words
-}
-
 fn error_series(errors: &[FrequencyError<'_>], used: bool, bounded: bool) -> Series {
     let (name, color, mark) = if used {
         ("mode used in the estimate", Color::Blue, Mark::Dot(5.0))
@@ -117,7 +118,17 @@ fn error_series(errors: &[FrequencyError<'_>], used: bool, bounded: bool) -> Ser
             series.low.push(error.percent - bound);
             series.high.push(error.percent + bound);
         }
-        series.words.push(frequency_words(error.prediction));
+        // "mode 1, measured 16.5524 Hz, predicted 16.7220 Hz".
+        let mut words = format!("mode {}", error.prediction.mode);
+        for (name, value) in [
+            ("measured", error.prediction.measured),
+            ("predicted", error.prediction.predicted),
+        ] {
+            if let Some(value) = value {
+                words.push_str(&format!(", {name} {} Hz", significant(value, 6)));
+            }
+        }
+        series.words.push(words);
         // Thousandths of a percent.
         let said = rounded_to(error.percent, error.bound, -3).joined();
         series.said.push(said + " %");
@@ -127,20 +138,6 @@ fn error_series(errors: &[FrequencyError<'_>], used: bool, bounded: bool) -> Ser
         }
     }
     series
-}
-
-/// "mode 1, measured 16.5524 Hz, predicted 16.7220 Hz".
-fn frequency_words(prediction: &PredictionSection) -> String {
-    let mut words = format!("mode {}", prediction.mode);
-    for (name, value) in [
-        ("measured", prediction.measured),
-        ("predicted", prediction.predicted),
-    ] {
-        if let Some(value) = value {
-            words.push_str(&format!(", {name} {} Hz", significant(value, 6)));
-        }
-    }
-    words
 }
 
 /// The estimates of one method, as pairs of Kx and Ky.
@@ -161,8 +158,8 @@ struct Cloud {
 /// The estimates under changed frequencies, a panel for each method; `None` where there are none.
 pub fn cloud(document: &Document) -> Option<Chart> {
     let methods = [
-        ("consistent", "Consistent estimate"),
-        ("pairs", "Pair regression"),
+        (EstimateMethod::Consistent, "Consistent estimate"),
+        (EstimateMethod::Pairs, "Pair regression"),
     ];
     let mut panels = Vec::new();
     let mut drawn = 0;
@@ -213,13 +210,13 @@ fn trials(document: &Document, drawn: usize) -> String {
 }
 
 impl Cloud {
-    fn of(document: &Document, method: &str) -> Cloud {
+    fn of(document: &Document, method: EstimateMethod) -> Cloud {
         let spans = document.resolution_span.iter().flatten();
-        let spans = spans.filter(|span| span.method.name() == method);
+        let spans = spans.filter(|span| span.method == method);
         let random = document.monte_carlo.iter().flatten();
-        let random = random.filter(|found| found.method.name() == method);
+        let random = random.filter(|found| found.method == method);
         let rows = document.perturbation.iter().flatten();
-        let rows = rows.filter(|row| row.percent != 0.0 && row.method.name() == method);
+        let rows = rows.filter(|row| row.percent != 0.0 && row.method == method);
         let shifted = rows.filter_map(|row| Some((row.percent, (row.kx?, row.ky?))));
         let mut cloud = Cloud {
             patterns: finite(spans.flat_map(|span| &span.cloud)),
@@ -232,8 +229,16 @@ impl Cloud {
             .shifted
             .sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
         if let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) {
-            cloud.estimate = estimate_by(estimate, method);
-            if estimate.method.name() == method {
+            let place = match &estimate.pairs {
+                Some(pairs) if method == EstimateMethod::Pairs => pairs.kx.zip(pairs.ky),
+                _ if estimate.method == method => estimate
+                    .kx
+                    .zip(estimate.ky)
+                    .map(|(kx, ky)| (kx.value, ky.value)),
+                _ => None,
+            };
+            cloud.estimate = place.filter(is_finite);
+            if estimate.method == method {
                 let covariance = cloud.estimate.zip(estimate.log_covariance);
                 let region = covariance.map(|((kx, ky), covariance)| ellipse(kx, ky, covariance));
                 cloud.ellipse = region.unwrap_or_default();
@@ -291,18 +296,6 @@ fn finite<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Vec<(f64, f64)> {
     places.filter(is_finite).collect()
 }
 
-/// The estimate by this method.
-fn estimate_by(estimate: &EstimateSection, method: &str) -> Option<(f64, f64)> {
-    let place = match &estimate.pairs {
-        Some(pairs) if method == "pairs" => (pairs.kx?, pairs.ky?),
-        _ if estimate.method.name() == method => {
-            (estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value)
-        }
-        _ => return None,
-    };
-    is_finite(&place).then_some(place)
-}
-
 /// All places (ln Kx, ln Ky) with d^T C^-1 d = 5.99 about the estimate: with L L^T = C they are
 /// L (cos t, sin t) times the root of that. Empty where they do not exist.
 fn ellipse(kx: f64, ky: f64, covariance: [[f64; 2]; 2]) -> Vec<(f64, f64)> {
@@ -344,5 +337,111 @@ fn stiffness_axis(values: impl Iterator<Item = f64>) -> Axis {
         Axis::logarithmic(low / 1.3, high * 1.3)
     } else {
         padded((low, high), 0.1)
+    }
+}
+
+/// Shapes in a row.
+const ACROSS: usize = 3;
+/// Most shapes drawn: a dozen fits a page.
+const MOST_SHAPES: usize = 12;
+
+/// Shapes of the predicted modes; `None` without any.
+pub fn shapes(document: &Document) -> Option<Chart> {
+    let shapes = document.mode_shapes.as_deref().unwrap_or_default();
+    let (mut sensors, mut taps) = (BTreeMap::<&str, Vec<f64>>::new(), Vec::new());
+    for recording in document.recordings.iter().flatten() {
+        for (name, place) in &recording.conditions.sensor_positions {
+            let places = sensors.entry(name).or_default();
+            if !places.contains(place) {
+                places.push(*place);
+            }
+        }
+        taps.extend(recording.conditions.tap.filter(|tap| !taps.contains(tap)));
+    }
+    let kind = document.kind();
+    let mut panels = Vec::new();
+    for shape in shapes.iter().take(MOST_SHAPES) {
+        panels.push(shape_panel(shape, &sensors, &taps, kind));
+    }
+    (!panels.is_empty()).then(|| Chart {
+        kind: "mode-shapes",
+        title: "Mode shapes".to_owned(),
+        subtitle: "displacement over the position along the beam, each relative to its largest".to_owned(),
+        caption: "Shapes of the predicted modes, of the described beam on the estimated joint with what sits \
+                  on it. A sensor or a tap near a node hardly sees the mode."
+            .to_owned(),
+        blocks: vec![Block::new(ACROSS, panels)],
+        ..Chart::default()
+    })
+}
+
+fn shape_panel(
+    shape: &SampledShape,
+    sensors: &BTreeMap<&str, Vec<f64>>,
+    taps: &[f64],
+    kind: Option<Assembly>,
+) -> Panel {
+    let end = 1e3 * shape.positions.last().copied().unwrap_or(1.0);
+    let x = Axis::linear(0.0, end).of("position", "mm");
+    let y = Axis::linear(-1.2, 1.2).of("displacement", "");
+    let points = shape.positions.iter().zip(&shape.displacements);
+    let points: Vec<(f64, f64)> = points.map(|(at, y)| (1e3 * at, *y)).collect();
+    let mut series = Vec::new();
+    // A lap joint's halves end at one place and need not meet.
+    for half in points.chunk_by(|before, after| before.0 < after.0) {
+        let half = half.iter().copied();
+        let mut curve = Series::points("mode shape", Color::Blue, Mark::Curve(2.5), half);
+        let said = curve.y.iter().map(|value| significant(*value, 2));
+        curve.said = said.map(|value| value + " of its largest").collect();
+        series.push(curve);
+    }
+    let lap = points.windows(2).find(|pair| pair[0].0 == pair[1].0);
+    let joint = match lap {
+        Some(pair) => Some(pair[0].0),
+        None => (kind == Some(Assembly::Cantilever)).then_some(0.0),
+    };
+    let joint = joint.map(|at| (at, 0.0));
+    series.push(Series::points(
+        "joint",
+        Color::Soft,
+        Mark::Square(5.0),
+        joint,
+    ));
+    let mut tapped = Series::new("tap", Color::Vermilion, Mark::Cross(6.0));
+    for place in taps {
+        tapped.push(1e3 * place, displacement(shape, *place));
+        tapped.words.push(format!("mode {}", shape.mode));
+    }
+    series.push(tapped);
+    for (name, places) in sensors {
+        let mut sensed = Series::new("sensor", Color::Orange, Mark::Dot(5.0));
+        for place in places {
+            sensed.push(1e3 * place, displacement(shape, *place));
+            sensed.words.push(format!("{name}: mode {}", shape.mode));
+            sensed.labels.push((*name).to_owned());
+        }
+        series.push(sensed);
+    }
+    let title = format!(
+        "mode {}, {} Hz",
+        shape.mode,
+        significant(shape.frequency, 4)
+    );
+    let panel = Panel::new(128.0, x, y).titled(title);
+    panel.with_zero().with(series)
+}
+
+/// Displacement at a place, between the points next to it.
+fn displacement(shape: &SampledShape, place: f64) -> f64 {
+    let after = shape.positions.partition_point(|x| *x < place);
+    let points = shape.positions.iter().zip(&shape.displacements);
+    let mut near = points.skip(after.saturating_sub(1));
+    match (near.next(), near.next()) {
+        (Some((x0, y0)), Some((x1, y1))) if after > 0 && x1 > x0 => {
+            y0 + (y1 - y0) * (place - x0) / (x1 - x0)
+        }
+        (Some(_), Some((_, y))) if after > 0 => *y,
+        (Some((_, y)), _) => *y,
+        (None, _) => 0.0,
     }
 }

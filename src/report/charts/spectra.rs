@@ -1,15 +1,21 @@
-//! Averaged spectra and frequency response functions of a recording, with their resonances.
+//! The contents of a recording.
+//!
+//! Charts of averaged spectra and frequency response functions with their resonances, and of the signal with its taps.
 
 use num_complex::Complex64;
-use tapjoint_analysis::{Frf, MeasuredSpectra, RecordingResult};
-use tapjoint_description::SensorKind;
-use tapjoint_signal::modal::ModeReading;
-use tapjoint_signal::spectral::{FrfEstimator, Lines};
 
-use super::super::chart::axis::{extent, nice_step};
-use super::super::chart::{Axis, Block, Chart, Color, InPage, Mark, Panel, Rule, Series};
-use super::super::format::{significant, trimmed, unit_words};
-use super::HIGH;
+use crate::format::{significant, trimmed, unit_words};
+use crate::picture::{
+    Axis, Block, Chart, Color, Event, InPage, Mark, Panel, Places, Rule, Series, extent, nice_step,
+    padded,
+};
+use tapjoint_analysis::{CloseUp, Frf, MeasuredSpectra, RecordingResult};
+use tapjoint_description::SensorKind;
+use tapjoint_signal::spectral::{FrfEstimator, Lines};
+use tapjoint_signal::taps::Tap;
+
+/// Height of a panel that stands alone (pixels).
+pub(super) const HIGH: f64 = 340.0;
 
 /// Smallest magnitude shown, relative to the largest: 140 dB.
 const DEEPEST: f64 = 1e-7;
@@ -213,6 +219,11 @@ fn scale_to_magnitudes(panels: &mut [Panel]) {
     }
 }
 
+/// Returns a unit as print has it, also where none was stated.
+pub(super) fn unit_of(unit: &Option<String>) -> String {
+    unit_words(unit.as_deref().unwrap_or("unit of the file"))
+}
+
 /// Returns the unit of a transform: that of the signal times seconds.
 fn unit_of_transform(unit: &Option<String>) -> String {
     match unit {
@@ -222,7 +233,7 @@ fn unit_of_transform(unit: &Option<String>) -> String {
 }
 
 /// Returns a curve over the spectral lines.
-pub(super) fn over_lines(lines: &Lines, name: &str, color: Color, values: Vec<f64>) -> Series {
+fn over_lines(lines: &Lines, name: &str, color: Color, values: Vec<f64>) -> Series {
     Series::even(name, color, lines.frequency(0), lines.spacing, values)
 }
 
@@ -315,30 +326,28 @@ fn decibels(ratio: f64) -> f64 {
 pub(super) fn rules(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<Rule> {
     let read = spectra.readings.iter().zip(&recording.mode_numbers);
     let known = read.filter(|(reading, _)| reading.frequency.is_finite());
-    known.map(|(reading, mode)| rule(reading, *mode)).collect()
-}
-
-fn rule(reading: &ModeReading, mode: Option<usize>) -> Rule {
-    // One digit more than the half-line bound.
-    let bound = reading.half_line / 5.0;
-    let decimals = if bound > 0.0 {
-        (-bound.log10().floor()).clamp(0.0, 5.0) as usize
-    } else {
-        2
-    };
-    Rule {
-        at: reading.frequency,
-        line: reading.line_frequency,
-        half: reading.half_line,
-        name: match (mode, reading.label) {
-            (Some(mode), _) => format!("mode {mode}"),
-            (None, Some(label)) => label.to_string(),
-            (None, None) => "no mode".to_owned(),
-        },
-        words: format!("{:.decimals$} Hz", reading.frequency),
-        mode: mode.is_some(),
-        prominence: reading.prominence_db.unwrap_or(0.0),
-    }
+    let rules = known.map(|(reading, mode)| {
+        // One digit more than the half-line bound.
+        let bound = reading.half_line / 5.0;
+        let decimals = match bound > 0.0 {
+            true => (-bound.log10().floor()).clamp(0.0, 5.0) as usize,
+            false => 2,
+        };
+        Rule {
+            at: reading.frequency,
+            line: reading.line_frequency,
+            half: reading.half_line,
+            name: match (mode, reading.label) {
+                (Some(mode), _) => format!("mode {mode}"),
+                (None, Some(label)) => label.to_string(),
+                (None, None) => "no mode".to_owned(),
+            },
+            words: format!("{:.decimals$} Hz", reading.frequency),
+            mode: mode.is_some(),
+            prominence: reading.prominence_db.unwrap_or(0.0),
+        }
+    });
+    rules.collect()
 }
 
 /// Returns close-ups of the modes: the single lines, the bound of the reading, and the frequency between the lines.
@@ -397,4 +406,97 @@ fn close_up(spectra: &MeasuredSpectra, rule: &Rule) -> Panel {
         ]);
     }
     panel
+}
+
+/// Most reasons written under the picture; the table of taps has them all.
+const MOST_REASONS: usize = 6;
+
+/// Returns the recording over time; `None` for a recording without samples.
+pub fn taps(recording: &RecordingResult, name: &str) -> Option<Chart> {
+    let overview = recording.overview.as_ref()?;
+    let count = overview.low.len().min(overview.high.len());
+    if count == 0 {
+        return None;
+    }
+    let (low, high) = (&overview.low[..count], &overview.high[..count]);
+    let taps = &recording.measurement.taps.taps;
+    let peaks = taps.iter().map(|tap| tap.peak);
+    let range = extent(low.iter().chain(high).copied().chain(peaks)).unwrap_or((-1.0, 1.0));
+    let (label, unit) = match recording.responses.first() {
+        _ if recording.has_hammer => ("force".to_owned(), unit_of(&recording.tap_unit)),
+        Some(first) => (format!("response {}", first.name), unit_of(&first.unit)),
+        None => ("response".to_owned(), String::new()),
+    };
+    let seconds = overview.step * count as f64;
+    // Room at the start: a recording may begin with a tap, whose mark would lie on the frame.
+    let x = Axis::linear(-0.015 * seconds, seconds).of("time", "s");
+    // Room above the tallest tap for its number.
+    let y = padded(range, 0.14).of(label, &unit);
+    let signal = Series {
+        x: Places::even(0.5 * overview.step, overview.step, count),
+        low: low.to_vec(),
+        high: high.to_vec(),
+        ..Series::new(&y.title(), Color::Data, Mark::Band)
+    };
+    let mut panel = Panel::new(262.0, x, y).with([signal]);
+    for (index, tap) in taps.iter().enumerate() {
+        let close_up = overview.close_ups.get(index);
+        panel.events.push(event(tap, &unit, recording, close_up));
+    }
+    let found = match taps.len() {
+        1 => "1 tap".to_owned(),
+        count => format!("{count} taps"),
+    };
+    let used = taps.iter().filter(|tap| tap.accepted()).count();
+    let rejected = taps.len() - used;
+    // "tap 3 at 6.21 s: double hit".
+    let mut reasons = Vec::new();
+    for (index, tap) in taps.iter().enumerate() {
+        if let Some(reason) = &tap.rejection {
+            reasons.push(format!("tap {} at {:.2} s: {reason}", index + 1, tap.time));
+        }
+    }
+    let more = reasons.len().saturating_sub(MOST_REASONS);
+    reasons.truncate(MOST_REASONS);
+    if more > 0 {
+        reasons.push(format!("and {more} more, see the table of taps"));
+    }
+    Some(Chart {
+        kind: "taps",
+        title: format!("Taps, {name}"),
+        subtitle: format!("{found} found \u{b7} {used} used \u{b7} {rejected} rejected"),
+        caption: format!("{name} over time; numbers count the taps."),
+        blocks: vec![Block::new(1, vec![panel])],
+        footnotes: reasons,
+        ..Chart::default()
+    })
+}
+
+fn event(tap: &Tap, unit: &str, recording: &RecordingResult, found: Option<&CloseUp>) -> Event {
+    let mut close_up = Vec::new();
+    if let Some(found) = found {
+        let force = found.force.as_ref();
+        let force = force.map(|values| ("force".to_owned(), &recording.tap_unit, values));
+        let response = recording.responses.first().zip(found.response.as_ref());
+        let response =
+            response.map(|(one, values)| (format!("response {}", one.name), &one.unit, values));
+        for (label, unit, values) in force.into_iter().chain(response) {
+            let (start, step) = (1e3 * found.start, 1e3 * found.step);
+            let series = Series::even(&label, Color::Soft, start, step, values.clone());
+            let x = Axis::linear(0.0, 1.0).of("time from the trigger", "ms");
+            let y = Axis::linear(0.0, 1.0).of(label, unit_of(unit));
+            close_up.push(Panel::new(190.0, x, y).with([series]));
+        }
+    }
+    let place = format!("{:.3} s, {} {unit}", tap.time, significant(tap.peak, 3));
+    Event {
+        at: tap.time,
+        peak: tap.peak,
+        words: match &tap.rejection {
+            None => format!("used, {place}"),
+            Some(reason) => format!("rejected, {place}: {reason}"),
+        },
+        used: tap.accepted(),
+        close_up,
+    }
 }

@@ -4,10 +4,9 @@
 //! rotation about z, so that every spring acts on the degrees of freedom that the theory knows, with
 //! its signs.
 
-mod abaqus;
-mod nastran;
+mod formats;
 
-use super::text_table::lines_of;
+use crate::text::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Hinge, Joint, Specimen};
@@ -15,8 +14,7 @@ use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use tapjoint_description::TestDescription;
 use tapjoint_identify::consistent::JointedStructure;
 
-pub use abaqus::render_abaqus;
-pub use nastran::render_nastran;
+pub use formats::{render_abaqus, render_nastran};
 
 /// Elements along the beam: with cubic elements and consistent mass ten modes are then right to 1e-5.
 const ELEMENTS: usize = 120;
@@ -297,40 +295,31 @@ impl Deck {
         }
     }
 
-    /// Returns the remarks at the head of both formats.
-    fn remarks(&self) -> Vec<String> {
+    /// Returns the remarks at the head of both formats, each behind the sign of a comment.
+    fn remarks(&self, sign: &str) -> String {
+        let name: String = ascii(&self.name).chars().take(40).collect();
         let mut lines = vec![
-            format!(
-                "{}: beam with its joint, written by tapjoint",
-                ascii(&self.name).chars().take(40).collect::<String>()
-            ),
+            format!("{name}: beam with its joint, written by tapjoint"),
             format!("joint: {}", self.origin),
         ];
         let doubts = self.doubts.iter();
         let doubts = doubts.flat_map(|doubt| lines_of(&doubt.replace('\u{a0}', " "), LONGEST, 0));
         lines.extend(doubts.map(|line| ascii(&line)));
-        lines.push(
-            "units: m, kg, s, N, rad; the beam lies along x, w is along y, theta about z"
-                .to_owned(),
-        );
+        let units = "units: m, kg, s, N, rad; the beam lies along x, w is along y, theta about z";
+        lines.push(units.to_owned());
         if self.joint.is_some_and(|joint| joint.cross != 0.0) {
-            lines.push(
-                "the spring between w and theta couples metres and radians: in other units invert the"
-                    .to_owned(),
-            );
-            lines.push(
-                "compliance anew, a conversion of the three springs one by one is wrong".to_owned(),
-            );
+            let caution = [
+                "the spring between w and theta couples metres and radians: in other units invert the",
+                "compliance anew, a conversion of the three springs one by one is wrong",
+            ];
+            lines.extend(caution.map(str::to_owned));
         }
-        let list: Vec<String> = self
-            .frequencies
-            .iter()
-            .map(|hz| format!("{hz:.6}"))
-            .collect();
-        for some in list.chunks(6) {
+        for some in self.frequencies.chunks(6) {
+            let some: Vec<String> = some.iter().map(|hz| format!("{hz:.6}")).collect();
             lines.push(format!("predicted frequencies (Hz): {}", some.join(" ")));
         }
-        lines
+        let lines = lines.iter().map(|line| format!("{sign}{line}\n"));
+        lines.collect()
     }
 }
 
@@ -361,13 +350,29 @@ pub fn deck_with_effects(
     frequencies: &[f64],
 ) -> Result<Deck, DeckError> {
     let mut deck = Deck::new(name, origin, theory_of(specimen)?, frequencies);
-    let cracks = cracks_of(specimen);
+    // Cracks that lie within a beam, from left to right.
+    let beams = specimen.body.beams();
+    let length: f64 = beams.iter().map(|beam| beam.length).sum();
+    let mut cracks = specimen.hinges.clone();
+    cracks
+        .retain(|crack| crack.position > 0.0 && crack.position < length && crack.compliance > 0.0);
+    cracks.sort_by(|a, b| a.position.total_cmp(&b.position));
     let masses = specimen.masses.iter().map(|mass| mass.position);
     let springs = specimen.springs.iter().map(|spring| spring.position);
     let places: Vec<f64> = masses.chain(springs).collect();
-    deck.mesh(&cut(specimen.body.beams(), &cracks), &places);
-    let joint = joint_of(&deck, specimen)?;
-    deck.joint = joint;
+    deck.mesh(&cut(beams, &cracks), &places);
+    if let Some(Joint { kt, kr, coupling }) = specimen.joint {
+        // At the left end, or between the halves.
+        let node = match &specimen.body {
+            Body::One(_) => 0,
+            Body::Joined([left, _]) => deck.first_beyond(left.length),
+        };
+        let cross = match coupling {
+            0.0 => 0.0,
+            coupling => coupling / (kt * kr).sqrt(),
+        };
+        deck.joint = Some(scalar_springs(kt, kr, cross, node)?);
+    }
     for crack in &cracks {
         let node = deck.first_beyond(crack.position);
         deck.hinges.push(DeckJoint {
@@ -388,12 +393,9 @@ pub fn deck_with_effects(
     }
     let moving = &specimen.joint_mass;
     if moving.mass != 0.0 || moving.inertia != 0.0 {
-        let sides = joint.map_or_else(Vec::new, |joint| {
-            [Some(joint.node), joint.other]
-                .into_iter()
-                .flatten()
-                .collect()
-        });
+        let joint = deck.joint.iter();
+        let sides = joint.flat_map(|joint| [Some(joint.node), joint.other]);
+        let sides: Vec<usize> = sides.flatten().collect();
         let share = 1.0 / sides.len().max(1) as f64;
         deck.masses.extend(sides.iter().map(|&node| DeckMass {
             node,
@@ -422,16 +424,6 @@ fn theory_of(specimen: &Specimen) -> Result<BeamTheory, DeckError> {
     Err(DeckError::NoElement { what })
 }
 
-/// Cracks that lie within a beam, from left to right.
-fn cracks_of(specimen: &Specimen) -> Vec<Hinge> {
-    let length: f64 = specimen.body.beams().iter().map(|beam| beam.length).sum();
-    let mut cracks = specimen.hinges.clone();
-    cracks
-        .retain(|hinge| hinge.position > 0.0 && hinge.position < length && hinge.compliance > 0.0);
-    cracks.sort_by(|a, b| a.position.total_cmp(&b.position));
-    cracks
-}
-
 /// The beams, cut at the cracks.
 fn cut(beams: &[Beam], cracks: &[Hinge]) -> Vec<Beam> {
     let mut pieces = Vec::new();
@@ -450,22 +442,6 @@ fn cut(beams: &[Beam], cracks: &[Hinge]) -> Vec<Beam> {
         from = to;
     }
     pieces
-}
-
-/// The specimen's joint: at the left end, or between the halves.
-fn joint_of(deck: &Deck, specimen: &Specimen) -> Result<Option<DeckJoint>, DeckError> {
-    let Some(Joint { kt, kr, coupling }) = specimen.joint else {
-        return Ok(None);
-    };
-    let node = match &specimen.body {
-        Body::One(_) => 0,
-        Body::Joined([left, _]) => deck.first_beyond(left.length),
-    };
-    let cross = match coupling {
-        0.0 => 0.0,
-        coupling => coupling / (kt * kr).sqrt(),
-    };
-    scalar_springs(kt, kr, cross, node).map(Some)
 }
 
 impl Deck {

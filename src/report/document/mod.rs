@@ -3,32 +3,28 @@
 //! Units are SI, frequencies Hz. A value that does not exist is `null`, never 0. `low` and `high`
 //! are 95 % limits, `null` where unbounded or unknown.
 
-mod estimate;
-mod frf;
-mod gap;
-mod modes;
-mod recordings;
+mod measured;
+mod model;
 
-pub use estimate::{
-    EstimateSection, FreeBeamSection, IdentifiabilitySection, MisfitSection, PairsSection,
-    PredictionSection,
+pub use measured::{
+    AmplitudeSection, ChannelSection, DatasetSection, FitSection, FrfSection, ModeSection,
+    RecordingSection, TapSection, datasets_of, frf_document, method_name,
 };
-pub use frf::{FrfSection, frf_document};
-pub use gap::{
-    Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection, gap_section,
+pub use model::{
+    Baseline, BaselineSection, EstimateSection, FreeBeamSection, GapPlaceSection, GapSection,
+    IdentifiabilitySection, MisfitSection, PairsSection, PredictionSection, UpdatedModelSection,
+    gap_section,
 };
-pub use modes::{AmplitudeSection, FitSection, ModeSection, method_name};
-pub use recordings::{ChannelSection, DatasetSection, RecordingSection, TapSection, datasets_of};
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
-    AverageSection, Conditions, EstimateMethod as Method, FrfResonance as FrfResonanceSection,
-    MonteCarloSection, PerturbationSection, ResolutionSpanSection, SensitivitySection,
+    AverageSection, Conditions, EstimateMethod, FrfResonance, MonteCarloSection,
+    PerturbationSection, ResolutionSpanSection, SensitivitySection,
 };
-pub use tapjoint_identify::Uncertain as ValueSection;
+pub use tapjoint_identify::Uncertain;
 pub use tapjoint_signal::modal::ReadBy;
 
-use super::format::with_minus_signs;
-use estimate::{estimate_section, prediction_section};
+use crate::format::with_minus_signs;
+use model::estimate_section;
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_analysis::{
@@ -127,15 +123,10 @@ pub struct WarningSection {
     pub beside: bool,
 }
 
-/// Returns the warnings that concern the result itself.
-pub fn of_the_result(warnings: &[WarningSection]) -> Vec<&WarningSection> {
-    warnings.iter().filter(|warning| !warning.beside).collect()
-}
-
 impl WarningSection {
     fn of(warning: &Warning, beside: bool) -> Self {
         WarningSection {
-            code: warning.code().to_string(),
+            code: warning.code.to_string(),
             text: with_minus_signs(&warning.to_string()),
             beside,
         }
@@ -161,7 +152,7 @@ impl Document {
 
     /// The warnings that concern the result itself.
     pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
-        of_the_result(&self.warnings).into_iter()
+        self.warnings.iter().filter(|warning| !warning.beside)
     }
 
     /// The warnings that concern only the pair regression beside the result.
@@ -185,7 +176,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
     let has_better = identification.is_some_and(|found| found.consistent.is_some());
     let warnings = analysis.warnings.iter();
     let warnings =
-        warnings.map(|warning| WarningSection::of(warning, has_better && warning.is_of_pairs()));
+        warnings.map(|warning| WarningSection::of(warning, has_better && warning.of_pairs));
     let mut document = Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
@@ -193,8 +184,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
         modes: Some(modes.collect()),
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
-        prediction: identification
-            .map(|found| found.prediction.iter().map(prediction_section).collect()),
+        prediction: identification.map(|found| predictions(&found.prediction)),
         mode_shapes: (!shapes.is_empty()).then_some(shapes),
         quality: (!analysis.verdicts.is_empty()).then(|| analysis.verdicts.clone()),
         warnings: warnings.collect(),
@@ -230,7 +220,7 @@ pub fn prediction_of(name: &str, structure: &TestedStructure, modes: &[Predicted
     Document {
         version: VERSION,
         test: Some(test_section(name, Some(structure))),
-        prediction: Some(modes.iter().map(prediction_section).collect()),
+        prediction: Some(predictions(modes)),
         ..Document::default()
     }
 }
@@ -248,6 +238,18 @@ pub fn lambdas_of(modes: &[NaturalMode]) -> Document {
         prediction: Some(rows.collect()),
         ..Document::default()
     }
+}
+
+fn predictions(modes: &[PredictedMode]) -> Vec<PredictionSection> {
+    let rows = modes.iter().map(|mode| PredictionSection {
+        mode: mode.mode,
+        measured: mode.measured,
+        predicted: Some(mode.predicted),
+        lambda: Some(mode.lambda),
+        error_percent: mode.error_percent,
+        used: mode.used,
+    });
+    rows.collect()
 }
 
 fn test_section(name: &str, structure: Option<&TestedStructure>) -> TestSection {

@@ -1,12 +1,12 @@
-//! Tables of the joint: parameters, the pair regression.
+//! Tables of the joint: parameters, the pair regression, and how far the estimate moves when the frequencies do.
 
-use super::super::document::{Document, EstimateSection, Method, ValueSection};
-use super::super::format::{
-    MISSING, RIGID, Rounded, capital, last_place, optional, or_missing, prefix, rounded_to,
-    signed_percent, significant, unit_words,
+use super::{Cell, Table, listed, mode_of, number, page_number, words};
+use crate::document::{Document, EstimateMethod, EstimateSection, SensitivitySection, Uncertain};
+use crate::format::{
+    MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
+    rounded_to, signed, signed_percent, significant, trimmed, unit_words,
 };
-use super::uncertainty::stiffness;
-use super::{Table, number, words};
+use tapjoint_identify::consistent::Parameter as Fitted;
 
 /// Most significant digits of an estimate.
 const MOST_DIGITS: i32 = 5;
@@ -22,7 +22,7 @@ pub struct Parameter<'a> {
     /// SI unit; "1" for a number.
     pub unit: &'static str,
     /// The value.
-    pub value: &'a ValueSection,
+    pub value: &'a Uncertain,
 }
 
 /// Returns the estimated quantities, those with SI units first.
@@ -134,57 +134,54 @@ pub fn parameters(document: &Document) -> Option<Table> {
     let stated = !misses || list.iter().any(|p| p.value.std.is_some());
     let mut rows = Vec::new();
     for parameter in &list {
-        let [value, std, mut low, mut high, unit] = parameter.written();
+        let [value, std, low, high, unit] = parameter.written();
         let name = parameter.symbol.to_owned();
         let meaning = parameter.meaning.to_owned();
         let scaled = parameter.written_scaled();
         let limits = parameter.written_scaled_limits();
-        let [from, to] = limits.unwrap_or_else(|| [MISSING.to_owned(), MISSING.to_owned()]);
-        // Without any uncertainty of the frequencies these are the limits that there are.
-        if !stated {
-            (low, high) = (from.clone(), to.clone());
-        }
+        // With a misfit, limits from the readings alone would be too narrow.
+        let [from, to] = limits.unwrap_or_else(|| match misses {
+            true => [MISSING.to_owned(), MISSING.to_owned()],
+            false => [low.clone(), high.clone()],
+        });
         rows.push(vec![
             name, meaning, value, unit, std, scaled, low, high, from, to,
         ]);
     }
-    let modes: Vec<String> = estimate.modes_used.iter().map(usize::to_string).collect();
     let scaled_note = match (misses, stated) {
         (false, _) => "",
         (true, true) => {
-            " Std and limits stand for the frequencies' uncertainty alone; the model misses the \
-             frequencies by more than their uncertainty, and the scaled std takes the misfit for it, and so do the \
-             scaled 95 % limits, by Student's distribution."
+            " The model misses the frequencies by more than their uncertainty. So the scaled std and the 95 % limits take \
+             the misfit for the uncertainty, by Student's distribution. Std and the limits from the readings stand for \
+             the frequencies' uncertainty alone."
         }
         (true, false) => {
-            " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
-             misfit for it, and so do the 95 % limits, by Student's distribution."
+            " Not every frequency has an uncertainty, so all weigh alike. The scaled std and the 95 % limits take the \
+             misfit for the uncertainty, by Student's distribution."
         }
     };
-    let table = Table {
-        caption: format!("Estimated parameters, method: {}", estimate.method.name()),
-        columns: vec![
-            words("Parameter"),
-            words("Meaning").on_page_if(misses),
-            number("Value"),
-            words("Unit"),
-            number("Std"),
-            number("Scaled std"),
-            number("95 % low"),
-            number("95 % high"),
-            number("Scaled low").on_page(),
-            number("Scaled high").on_page(),
-        ],
-        rows,
-        note: format!(
-            "From modes {}. Std and limits are in the value's unit; \u{2013} means unknown or \
-             unbounded.{scaled_note}",
-            modes.join(", "),
-        ),
-    };
+    let heads = [
+        words("Parameter", ""),
+        words("Meaning", "").on_page_if(misses),
+        number("Value", ""),
+        words("Unit", ""),
+        number("Std", ""),
+        number("Scaled std", ""),
+        page_number("Readings low", ""),
+        page_number("Readings high", ""),
+        number("95 % low", ""),
+        number("95 % high", ""),
+    ];
+    let caption = format!("Estimated parameters, method: {}", estimate.method.name());
+    let note = format!(
+        "From modes {}. Std and limits are in the value's unit; \u{2013} means unknown or \
+         unbounded.{scaled_note}",
+        listed(&estimate.modes_used)
+    );
+    let table = Table::with_heads(caption, heads, rows, note);
     Some(match (misses, stated) {
-        (false, _) => table.without_columns(&["Scaled std", "Scaled low", "Scaled high"]),
-        (true, false) => table.without_columns(&["Scaled low", "Scaled high"]),
+        (false, _) => table.without_columns(&["Scaled std", "Readings low", "Readings high"]),
+        (true, false) => table.without_columns(&["Readings low", "Readings high"]),
         (true, true) => table,
     })
 }
@@ -192,36 +189,24 @@ pub fn parameters(document: &Document) -> Option<Table> {
 /// Correlations of the estimates; `None` where fewer than two parameters were estimated.
 pub fn correlations(document: &Document) -> Option<Table> {
     let estimate = document.estimate.as_ref()?.as_ref()?;
-    let rows: Vec<Vec<String>> = estimate
-        .correlations
-        .iter()
-        .map(|found| {
-            let pair = format!("{} and {}", symbol(found.first), symbol(found.second));
-            // Near 1 the distance from 1 is what counts: two digits of it.
-            let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
-            vec![pair, significant(found.value, digits)]
-        })
-        .collect();
-    (!rows.is_empty()).then(|| Table {
-        caption: "Correlations".to_owned(),
-        columns: vec![words("Parameters"), number("Correlation (1)")],
-        rows,
-        note: "Near 1 or \u{2212}1 the frequencies tell a combination of the two rather than each; of the \
-               logarithms of the values."
-            .to_owned(),
-    })
-}
-
-/// The symbol of a parameter.
-fn symbol(parameter: tapjoint_identify::consistent::Parameter) -> &'static str {
-    use tapjoint_identify::consistent::Parameter as Fitted;
-    match parameter {
-        Fitted::Kt => "Kt",
-        Fitted::Kr => "Kr",
-        Fitted::Modulus => "E",
-        Fitted::Density => "\u{3c1}",
-        other => other.name(),
-    }
+    let rows = estimate.correlations.iter().map(|found| {
+        let [first, second] = [found.first, found.second].map(|parameter| match parameter {
+            Fitted::Kt => "Kt",
+            Fitted::Kr => "Kr",
+            Fitted::Modulus => "E",
+            Fitted::Density => "\u{3c1}",
+            other => other.name(),
+        });
+        // Near 1 the distance from 1 is what counts: two digits of it.
+        let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
+        [
+            words("Parameters", format!("{first} and {second}")),
+            number("Correlation (1)", significant(found.value, digits)),
+        ]
+    });
+    let note = "Near 1 or \u{2212}1 the frequencies tell a combination of the two rather than each; of the \
+                logarithms of the values.";
+    (!estimate.correlations.is_empty()).then(|| Table::of("Correlations", rows, note))
 }
 
 /// The consistent estimate beside the pair regression; `None` where there is only one of them.
@@ -230,7 +215,7 @@ pub fn methods(document: &Document) -> Option<Table> {
     let pairs = estimate
         .pairs
         .as_ref()
-        .filter(|_| estimate.method != Method::Pairs)?;
+        .filter(|_| estimate.method != EstimateMethod::Pairs)?;
     let mut rows = Vec::new();
     for (name, own, pairs) in [
         ("Kx", &estimate.kx, pairs.kx),
@@ -238,33 +223,25 @@ pub fn methods(document: &Document) -> Option<Table> {
         ("Kz", &estimate.kz, pairs.kz),
     ] {
         let own = own.as_ref().map(|value| value.value);
-        if own.is_none() && pairs.is_none() {
-            continue;
+        if own.is_some() || pairs.is_some() {
+            rows.push(vec![
+                name.to_owned(),
+                stiffness(own),
+                optional(pairs, 5),
+                signed_percent(change(pairs, own)),
+            ]);
         }
-        let change = own.zip(pairs);
-        let change = change.map(|(own, pairs)| 100.0 * (pairs - own) / own);
-        rows.push(vec![
-            name.to_owned(),
-            stiffness(own),
-            optional(pairs, 5),
-            signed_percent(change),
-        ]);
     }
-    Some(Table {
-        caption: "Methods side by side".to_owned(),
-        columns: vec![
-            words("Parameter (1)"),
-            number("Consistent"),
-            number("Pairs"),
-            number("Pairs differ (%)"),
-        ],
-        rows,
-        note:
-            "The consistent estimate satisfies its own frequency equation, and takes shear, sensor \
-               masses and known stiffnesses into account where they are described; the pair regression \
-               does none of this."
-                .to_owned(),
-    })
+    let heads = [
+        words("Parameter (1)", ""),
+        number("Consistent", ""),
+        number("Pairs", ""),
+        number("Pairs differ (%)", ""),
+    ];
+    let note = "The consistent estimate satisfies its own frequency equation, and takes shear, sensor \
+                masses and known stiffnesses into account where they are described; the pair regression \
+                does none of this.";
+    Some(Table::with_heads("Methods side by side", heads, rows, note))
 }
 
 /// The pair regression's values; `None` where it was not done.
@@ -287,10 +264,289 @@ pub fn pairs(document: &Document) -> Option<Table> {
     for warning in document.warnings_beside() {
         note.push_str(&format!(" {}.", capital(&warning.text)));
     }
-    Some(Table {
-        caption: "Pair regression".to_owned(),
-        columns: vec![words("Quantity"), number("Value"), words("Unit")],
+    let heads = [
+        words("Quantity", ""),
+        number("Value", ""),
+        words("Unit", ""),
+    ];
+    Some(Table::with_heads("Pair regression", heads, rows, note))
+}
+
+/// Returns the non-dimensional values that changes are counted from.
+fn base(document: &Document, method: EstimateMethod) -> [Option<f64>; 3] {
+    let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) else {
+        return [None; 3];
+    };
+    match &estimate.pairs {
+        Some(pairs) if method == EstimateMethod::Pairs => [pairs.kx, pairs.ky, pairs.kz],
+        _ => [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| Some(value.as_ref()?.value)),
+    }
+}
+
+/// Returns the cell of a method, shown where there are several.
+fn by_method(method: EstimateMethod, all: &[EstimateMethod]) -> Cell {
+    let several = all.iter().any(|other| Some(other) != all.first());
+    words("Method", method.name()).on_page_if(!several)
+}
+
+/// Rows of several methods, those about the same thing side by side: the consistent estimate first, in
+/// the order of the things as they come.
+fn side_by_side<T: Copy, K: PartialEq>(
+    rows: impl Iterator<Item = T>,
+    thing: impl Fn(T) -> K,
+    method: impl Fn(T) -> EstimateMethod,
+) -> Vec<T> {
+    let mut things: Vec<K> = Vec::new();
+    let mut placed: Vec<(usize, EstimateMethod, T)> = Vec::new();
+    for row in rows {
+        let key = thing(row);
+        let known = things.iter().position(|other| *other == key);
+        let place = known.unwrap_or(things.len());
+        if known.is_none() {
+            things.push(key);
+        }
+        placed.push((place, method(row), row));
+    }
+    placed.sort_by_key(|(place, method, _)| (*place, *method));
+    placed.into_iter().map(|(_, _, row)| row).collect()
+}
+
+/// Returns a stiffness in five digits; "rigid" beyond all bounds.
+fn stiffness(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value.is_infinite() => RIGID.to_owned(),
+        value => optional(value, 5),
+    }
+}
+
+/// Returns the difference from a base (%).
+fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
+    let (value, base) = value.zip(base)?;
+    Some(100.0 * (value - base) / base)
+}
+
+/// Non-dimensional stiffnesses.
+const NAMES: [&str; 3] = ["Kx", "Ky", "Kz"];
+
+/// Estimates with all frequencies changed by the same percentage; `None` where not computed.
+pub fn perturbation(document: &Document) -> Option<Table> {
+    let list = document.perturbation.as_deref().filter(|p| !p.is_empty())?;
+    let shown = if list.iter().any(|row| row.kz.is_some()) {
+        3
+    } else {
+        2
+    };
+    let methods: Vec<EstimateMethod> = list.iter().map(|row| row.method).collect();
+    let ordered = side_by_side(list.iter(), |row| row.percent.to_bits(), |row| row.method);
+    let rows = ordered.into_iter().map(|row| {
+        let mut cells = vec![
+            number("Frequencies (%)", signed(row.percent)),
+            by_method(row.method, &methods),
+        ];
+        let values = [row.kx, row.ky, row.kz]
+            .into_iter()
+            .zip(base(document, row.method));
+        for ((value, base), name) in values.zip(&NAMES[..shown]) {
+            cells.push(number(&format!("{name} (1)"), stiffness(value)));
+            cells.push(number("change (%)", signed_percent(change(value, base))));
+        }
+        cells
+    });
+    Some(Table::of(
+        "All frequencies changed by the same percentage",
         rows,
-        note,
-    })
+        "Change: against the estimate by the same method. \u{2013}: the changed frequencies leave \
+         no estimate.",
+    ))
+}
+
+/// Average errors under changed frequencies, as the paper's tables state them; `None` where not
+/// computed.
+pub fn averages(document: &Document) -> Option<Table> {
+    let averages = document.perturbation_averages.as_deref();
+    let list = averages.filter(|list| !list.is_empty())?;
+    let methods: Vec<EstimateMethod> = list.iter().map(|row| row.method).collect();
+    let ordered = side_by_side(list.iter(), |row| row.percent.to_bits(), |row| row.method);
+    let rows = ordered.into_iter().map(|row| {
+        [
+            number(
+                "Frequencies (%)",
+                format!("\u{b1}{}", trimmed(row.percent, 4)),
+            ),
+            by_method(row.method, &methods),
+            number("Kx off by (%)", optional(row.kx_percent, 3)),
+            number("Ky off by (%)", optional(row.ky_percent, 3)),
+            number("Kz off by (%)", optional(row.kz_percent, 3)),
+            number("mean Kx off by (%)", optional(row.kx_of_mean_percent, 3)),
+            number("mean Ky off by (%)", optional(row.ky_of_mean_percent, 3)),
+            number("mean Kz off by (%)", optional(row.kz_of_mean_percent, 3)),
+        ]
+    });
+    let note = "Off by: mean size of the changes of the table above, up and down. Mean off by: the error of the mean of \
+                the two estimates, which is less, because opposite changes cancel.";
+    Some(Table::of("Average errors of the stiffnesses", rows, note).without_empty_columns())
+}
+
+/// Median and 95 % interval under random errors of the frequencies; `None` where not computed.
+pub fn monte_carlo(document: &Document) -> Option<Table> {
+    let list = document.monte_carlo.as_deref().filter(|l| !l.is_empty())?;
+    let methods: Vec<EstimateMethod> = list.iter().map(|found| found.method).collect();
+    let parameters = list.iter().flat_map(|found| {
+        let values = [found.kx, found.ky, found.kz];
+        (0..3).filter_map(move |index| Some((index, found, values[index]?)))
+    });
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method);
+    let rows = ordered.into_iter().map(|(index, found, value)| {
+        let base = base(document, found.method)[index];
+        [
+            words("Parameter (1)", NAMES[index]),
+            by_method(found.method, &methods),
+            number("Estimate", stiffness(base)),
+            number("Median", stiffness(Some(value.value))),
+            number("95 % low", optional(value.low, 5)),
+            number("95 % high", optional(value.high, 5)),
+            number("down (%)", signed_percent(change(value.low, base))),
+            number("up (%)", signed_percent(change(value.high, base))),
+        ]
+    });
+    let failed = list.iter().map(|found| (found.method, found.failed));
+    let mut note = format!(
+        "{} draws, each frequency with its own standard deviation.{}",
+        list.first().map_or(0, |found| found.samples),
+        failures(&failed.collect::<Vec<_>>(), " and are left out")
+    );
+    if methods.contains(&EstimateMethod::Consistent) {
+        note.push_str(
+            " The consistent estimate draws the beam's properties that have a tolerance as well.",
+        );
+    }
+    let caption = "Random errors of the frequencies (Monte Carlo)";
+    Some(Table::of(caption, rows, note).without_empty_columns())
+}
+
+/// Returns how many repetitions left no estimate, by each method, and what follows from that.
+fn failures(failed: &[(EstimateMethod, usize)], consequence: &str) -> String {
+    let mut words = String::new();
+    for (method, count) in failed.iter().filter(|(_, count)| *count > 0) {
+        let by = match failed.len() {
+            1 => String::new(),
+            _ => format!(" by the method {}", method.name()),
+        };
+        words.push_str(&format!(
+            " {count} of them leave no estimate{by}{consequence}."
+        ));
+    }
+    words
+}
+
+/// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
+pub fn spans(document: &Document) -> Option<Table> {
+    let list = document.resolution_span.as_deref()?;
+    let methods: Vec<EstimateMethod> = list.iter().map(|span| span.method).collect();
+    let parameters = list.iter().flat_map(|span| {
+        let ranges = [span.kx, span.ky, span.kz];
+        (0..3).filter_map(move |index| Some((index, span, ranges[index]?)))
+    });
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method);
+    let rows = ordered.into_iter().map(|(index, span, [low, high])| {
+        let base = base(document, span.method)[index];
+        vec![
+            NAMES[index].to_owned(),
+            span.method.name().to_owned(),
+            stiffness(Some(low)),
+            stiffness(base),
+            stiffness(Some(high)),
+            signed_percent(change(Some(low), base)),
+            signed_percent(change(Some(high), base)),
+        ]
+    });
+    let heads = [
+        words("Parameter (1)", ""),
+        by_method(EstimateMethod::default(), &methods),
+        number("Smallest", ""),
+        number("Estimate", ""),
+        number("Largest", ""),
+        number("down (%)", ""),
+        number("up (%)", ""),
+    ];
+    let failed = list.iter().map(|span| (span.method, span.failed));
+    let note = format!(
+        "{} sign patterns tried.{}",
+        list.first().map_or(0, |span| span.patterns),
+        failures(&failed.collect::<Vec<_>>(), ": the span is open")
+    );
+    let caption = "Every mode at one end of its bound or the other";
+    Some(Table::with_heads(caption, heads, rows.collect(), note))
+}
+
+/// Change of each parameter by each mode's bound; `None` where not computed.
+pub fn sensitivity(document: &Document) -> Option<Table> {
+    let list = document.resolution_span.as_deref()?;
+    let methods: Vec<EstimateMethod> = list.iter().map(|span| span.method).collect();
+    let all = list
+        .iter()
+        .flat_map(|span| span.sensitivity.iter().map(move |row| (span, row)));
+    let ordered = side_by_side(all, |row| row.1.mode, |row| row.0.method);
+    if ordered.is_empty() {
+        return None;
+    }
+    let with_kz = ordered.iter().any(|(_, row)| row.kz_percent.is_some());
+    let names = if with_kz { &NAMES[..] } else { &NAMES[..2] };
+    let rows = ordered.into_iter().map(|(span, row)| {
+        let mode = mode_of(document, row.mode).filter(|mode| mode.frequency > 0.0);
+        let percent = mode.map(|mode| 100.0 * row.half_line / mode.frequency);
+        let mut cells = vec![
+            number("Mode", row.mode.to_string()),
+            by_method(span.method, &methods),
+            number("Bound (Hz)", significant(row.half_line, 3)),
+            number("Bound (%)", or_missing(percent.map(bound_percent))),
+        ];
+        let moves = [row.kx_percent, row.ky_percent, row.kz_percent];
+        for (name, percent) in names.iter().zip(moves) {
+            cells.push(number(
+                &format!("{name} moves (%)"),
+                signed_percent(percent),
+            ));
+        }
+        cells
+    });
+    let mut notes = Vec::new();
+    for span in list {
+        let drivers = drivers(&span.sensitivity, names);
+        if !drivers.is_empty() {
+            notes.push(match list.len() {
+                1 => drivers.join(", ") + ".",
+                _ => format!(
+                    "By the method {}: {}.",
+                    span.method.name(),
+                    drivers.join(", ")
+                ),
+            });
+        }
+    }
+    Some(Table::of(
+        "Which mode drives which parameter",
+        rows,
+        notes.join(" "),
+    ))
+}
+
+/// Returns "Kx depends most on mode 4" and "Ky on mode 1"; empty where nothing depends on any.
+fn drivers(list: &[SensitivitySection], names: &[&str]) -> Vec<String> {
+    let mut drivers: Vec<String> = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        let strengths = list.iter().map(|row| {
+            let percent = [row.kx_percent, row.ky_percent, row.kz_percent][index];
+            (percent.map_or(0.0, f64::abs), row.mode)
+        });
+        let strengths = strengths.filter(|(strength, _)| *strength > 0.0);
+        if let Some((_, mode)) = strengths.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let depends = match drivers.is_empty() {
+                true => " depends most",
+                false => "",
+            };
+            drivers.push(format!("{name}{depends} on mode {mode}"));
+        }
+    }
+    drivers
 }

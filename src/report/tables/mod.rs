@@ -1,25 +1,25 @@
 //! The report's tables as words, for the page and for the terminal.
 
-mod gap;
+mod diagnosis;
 mod joint;
 mod modes;
-mod quality;
 mod recordings;
-mod uncertainty;
 
-pub use gap::{hypotheses, next_tests};
-pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
+pub use diagnosis::{hypotheses, next_tests};
+pub use joint::{
+    Parameter, averages, correlations, estimated, methods, monte_carlo, pairs, parameters,
+    perturbation, sensitivity, spans,
+};
 pub use modes::{
     fitted_to, frfs, mode_details, modes, modes_from, prediction, reading_details, readings,
 };
-pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use recordings::{
-    channels, conditions, datasets, peak_unit, recordings, rejected_taps, taps, taps_used,
+    channels, conditions, datasets, quality, quality_all, quality_count, quality_doubts,
+    recordings, rejected_taps, taps, taps_used,
 };
-pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 
-use super::document::{Document, ModeSection, ReadBy};
-use super::format::MISSING;
+use crate::document::{Document, ModeSection, ReadBy};
+use crate::format::MISSING;
 use tapjoint_identify::observation::UNPAIRED;
 
 /// A table of words.
@@ -40,26 +40,10 @@ pub struct Table {
 pub struct Column {
     /// Name, with the unit in round brackets.
     pub name: String,
-    /// Numbers are aligned right, words left.
-    pub kind: Kind,
+    /// True for numbers, which are aligned right; words are aligned left.
+    pub is_number: bool,
     /// Outputs that show it.
     pub place: Place,
-}
-
-/// Kind of cells of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Numbers.
-    Number,
-    /// Words.
-    Words,
-}
-
-impl Kind {
-    /// True for a column of numbers.
-    pub fn is_number(self) -> bool {
-        self == Kind::Number
-    }
 }
 
 /// Outputs that show a column.
@@ -73,25 +57,85 @@ pub enum Place {
     Page,
 }
 
-/// A column of numbers shown everywhere.
-pub(crate) fn number(name: &str) -> Column {
-    Column {
-        name: name.to_owned(),
-        kind: Kind::Number,
-        place: Place::Everywhere,
+/// A cell with the head of its column.
+pub(crate) struct Cell {
+    column: Column,
+    text: String,
+}
+
+/// A cell of a column of numbers shown everywhere.
+pub(crate) fn number(name: &str, text: impl Into<String>) -> Cell {
+    Cell {
+        column: Column {
+            name: name.to_owned(),
+            is_number: true,
+            place: Place::Everywhere,
+        },
+        text: text.into(),
     }
 }
 
-/// A column of words shown everywhere.
-fn words(name: &str) -> Column {
-    Column {
-        name: name.to_owned(),
-        kind: Kind::Words,
-        place: Place::Everywhere,
+/// A cell of a column of words shown everywhere.
+pub(crate) fn words(name: &str, text: impl Into<String>) -> Cell {
+    let mut cell = number(name, text);
+    cell.column.is_number = false;
+    cell
+}
+
+/// A cell of a column of numbers on the page.
+fn page_number(name: &str, text: impl Into<String>) -> Cell {
+    number(name, text).on_page_if(true)
+}
+
+/// A cell of a column of words on the page.
+fn page_words(name: &str, text: impl Into<String>) -> Cell {
+    words(name, text).on_page_if(true)
+}
+
+impl Cell {
+    /// Returns the cell, its column on the page only where a condition holds.
+    fn on_page_if(mut self, crowded: bool) -> Cell {
+        if crowded {
+            self.column.place = Place::Page;
+        }
+        self
     }
 }
 
 impl Table {
+    /// A table of these rows, whose cells bring their heads along; without rows it has no columns.
+    pub(crate) fn of<R: IntoIterator<Item = Cell>>(
+        caption: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+        note: impl Into<String>,
+    ) -> Table {
+        let mut table = Table {
+            caption: caption.into(),
+            note: note.into(),
+            ..Table::default()
+        };
+        for row in rows {
+            let cells = row.into_iter().map(|cell| (cell.column, cell.text));
+            let (columns, texts) = cells.unzip();
+            table.columns = columns;
+            table.rows.push(texts);
+        }
+        table
+    }
+
+    /// A table with the heads of these cells, also where it has no rows.
+    pub(crate) fn with_heads(
+        caption: impl Into<String>,
+        heads: impl IntoIterator<Item = Cell>,
+        rows: Vec<Vec<String>>,
+        note: impl Into<String>,
+    ) -> Table {
+        Table {
+            rows,
+            ..Table::of(caption, [heads], note)
+        }
+    }
+
     /// Returns the table without the columns of these names.
     fn without_columns(self, unwanted: &[&str]) -> Table {
         let names = self.columns.iter();
@@ -138,19 +182,6 @@ impl Column {
         ];
         LONG.contains(&self.name.as_str())
     }
-
-    /// Returns the column, on the page only.
-    fn on_page(self) -> Column {
-        Column {
-            place: Place::Page,
-            ..self
-        }
-    }
-
-    /// Returns the column, on the page only where a condition holds.
-    fn on_page_if(self, crowded: bool) -> Column {
-        if crowded { self.on_page() } else { self }
-    }
 }
 
 /// Bound of the best reading of a mode (Hz): half the interval of a fit, the bound of a reading between
@@ -178,6 +209,12 @@ pub fn bound_of(mode: &ModeSection) -> Option<f64> {
     own.or(mode.half_line)
         .or(mode.std.map(|std| 2.0 * std))
         .filter(|bound| bound.is_finite() && *bound > 0.0)
+}
+
+/// Returns "1, 2, 5".
+pub(crate) fn listed(modes: &[usize]) -> String {
+    let modes: Vec<String> = modes.iter().map(usize::to_string).collect();
+    modes.join(", ")
 }
 
 /// "4" or "mains 50 Hz", from a resonance's number and its label.

@@ -1,14 +1,15 @@
 //! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
-use super::super::document::{
-    Document, FrfSection, ModeSection, PredictionSection, ReadBy, method_name,
+use super::{
+    Cell, Place, Table, bound_of, coherence, mode_name, mode_of, number, page_number, page_words,
+    words,
 };
-use super::super::format::{
+use crate::document::{Document, ModeSection, ReadBy, method_name};
+use crate::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
     with_decimals_of,
 };
-use super::{Column, Place, Table, bound_of, coherence, mode_name, mode_of, number, words};
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
@@ -33,8 +34,7 @@ pub fn modes(document: &Document) -> Option<Table> {
     if let Some(from) = modes_from(document) {
         note = format!("{from} {note}");
     }
-    let table = table(caption, modes.iter().map(row).collect(), &note);
-    Some(table.without_columns(&DETAILS))
+    Some(table(caption, modes.iter(), &note).without_columns(&DETAILS))
 }
 
 /// "From soft.wav; hard.wav (8.8 times its tap level) enters the diagnosis alone."; `None` where every recording
@@ -76,15 +76,13 @@ pub fn mode_details(document: &Document) -> Option<Table> {
             "Coherence and random error: of the sensor that knows the mode best, on its line.",
         );
     }
-    let rows = modes.iter().map(row).collect();
-    details(table("How each was read", rows, &notes.join(" ")))
+    details(table("How each was read", modes.iter(), &notes.join(" ")))
 }
 
 /// Details of the reading of each resonance in each recording; `None` where there is at most one recording.
 pub fn reading_details(document: &Document) -> Option<Table> {
     let caption = "How each was read in each recording";
-    let table = table(caption, reading_rows(document)?, "");
-    details(table)
+    details(table(caption, own_readings(document)?, ""))
 }
 
 /// Columns that say how a resonance was read: beside the others they would need a page wider than a
@@ -156,59 +154,34 @@ const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, eac
 /// Each recording's own readings; `None` where there is at most one recording.
 pub fn readings(document: &Document) -> Option<Table> {
     let note = "The list of modes takes each from the recording that resolves it best.";
-    let table = table("Readings of each recording", reading_rows(document)?, note);
+    let table = table("Readings of each recording", own_readings(document)?, note);
     Some(table.without_columns(&DETAILS))
 }
 
-fn reading_rows(document: &Document) -> Option<Vec<Vec<String>>> {
+/// The resonances of each of several recordings, which name it; `None` without any.
+fn own_readings(document: &Document) -> Option<impl Iterator<Item = &ModeSection>> {
     let recordings = document.recordings.as_deref().filter(|r| r.len() > 1)?;
-    let mut rows = Vec::new();
-    for recording in recordings {
-        for mode in &recording.modes {
-            let mut mode = mode.clone();
-            mode.recording.get_or_insert_with(|| recording.file.clone());
-            rows.push(row(&mode));
-        }
-    }
-    (!rows.is_empty()).then_some(rows)
+    let mut modes = recordings
+        .iter()
+        .flat_map(|recording| &recording.modes)
+        .peekable();
+    modes.peek().is_some().then_some(modes)
 }
 
 /// The table; the recordings' column only where there are several.
-fn table(caption: &str, mut rows: Vec<Vec<String>>, note: &str) -> Table {
+fn table<'a>(caption: &str, modes: impl Iterator<Item = &'a ModeSection>, note: &str) -> Table {
+    let mut table = Table::of(caption, modes.map(row), note);
+    let rows = &mut table.rows;
     let first = rows.first().and_then(|row| row.last().cloned());
     if rows.iter().all(|row| row.last() == first.as_ref()) {
         for cell in rows.iter_mut().filter_map(|row| row.last_mut()) {
             cell.clear();
         }
     }
-    let table = Table {
-        caption: caption.to_owned(),
-        columns: vec![
-            words("Mode"),
-            number("Frequency (Hz)"),
-            words("Method").on_page(),
-            words("Interval from").on_page(),
-            number("Line (Hz)"),
-            number("Damping (%)"),
-            number("Tap deviation (Hz)").on_page(),
-            number("p").on_page(),
-            Column {
-                place: Place::Spacious,
-                ..number("\u{3bb} (1)")
-            },
-            number("Prominence (dB)").on_page(),
-            number("Above noise (dB)").on_page(),
-            number("Coherence").on_page(),
-            number("Random error (%)").on_page(),
-            words("Recording"),
-        ],
-        rows,
-        note: note.to_owned(),
-    };
     table.without_empty_columns()
 }
 
-fn row(mode: &ModeSection) -> Vec<String> {
+fn row(mode: &ModeSection) -> [Cell; 14] {
     // The highest line near a pole may be of another peak, and its bound says nothing of the pole then. A fit is taken
     // as off by three times its interval.
     let bounds = mode.half_line.zip(bound_of(mode));
@@ -222,26 +195,42 @@ fn row(mode: &ModeSection) -> Vec<String> {
         None => significant(line, 6),
     });
     let fit = mode.fit.as_ref();
+    let interval = fit.map_or(MISSING, |fit| match fit.uncertainty_from {
+        UncertaintySource::Residual => "residual",
+        UncertaintySource::TapScatter => "taps",
+    });
+    // The damping ratio (%) with its standard deviation.
+    let std = mode.damping_std.map(|std| 100.0 * std);
+    let damping = mode
+        .damping
+        .map(|ratio| rounded_digits(100.0 * ratio, std, DAMPING_DIGITS).joined());
+    // Lambda with the digits that the frequency supports: it grows with the frequency's square root.
+    let lambda = mode.lambda.map(|lambda| match bound_of(mode) {
+        Some(bound) if mode.frequency > 0.0 && lambda > 0.0 => {
+            let uncertainty = Some(0.5 * lambda * bound / mode.frequency);
+            rounded_to(lambda, uncertainty, last_place(lambda, LAMBDA_DIGITS)).value
+        }
+        _ => significant(lambda, 5),
+    });
+    let mut lambda = number("\u{3bb} (1)", or_missing(lambda));
+    lambda.column.place = Place::Spacious;
     let scatter = fit.and_then(|fit| fit.scatter_probability);
-    vec![
-        mode_name(mode.mode, mode.label.as_deref()),
-        reading(mode).joined(),
-        method_name(mode.method).to_owned(),
-        fit.map_or(MISSING, |fit| match fit.uncertainty_from {
-            UncertaintySource::Residual => "residual",
-            UncertaintySource::TapScatter => "taps",
-        })
-        .to_owned(),
-        or_missing(line),
-        damping(mode),
-        optional(tap_deviation(mode), 2),
-        optional(scatter, 2),
-        lambda(mode),
-        optional(mode.prominence_db, 2),
-        optional(mode.above_noise_db, 2),
-        coherence(mode.coherence),
-        optional(mode.random_error.map(|error| 100.0 * error), 2),
-        or_missing(mode.recording.clone()),
+    let random_error = mode.random_error.map(|error| 100.0 * error);
+    [
+        words("Mode", mode_name(mode.mode, mode.label.as_deref())),
+        number("Frequency (Hz)", reading(mode).joined()),
+        page_words("Method", method_name(mode.method)),
+        page_words("Interval from", interval),
+        number("Line (Hz)", or_missing(line)),
+        number("Damping (%)", or_missing(damping)),
+        page_number("Tap deviation (Hz)", optional(tap_deviation(mode), 2)),
+        page_number("p", optional(scatter, 2)),
+        lambda,
+        page_number("Prominence (dB)", optional(mode.prominence_db, 2)),
+        page_number("Above noise (dB)", optional(mode.above_noise_db, 2)),
+        page_number("Coherence", coherence(mode.coherence)),
+        page_number("Random error (%)", optional(random_error, 2)),
+        words("Recording", or_missing(mode.recording.as_ref())),
     ]
 }
 
@@ -256,15 +245,6 @@ fn tap_deviation(mode: &ModeSection) -> Option<f64> {
     deviations.max_by(f64::total_cmp)
 }
 
-/// The damping ratio (%) with its standard deviation.
-fn damping(mode: &ModeSection) -> String {
-    let std = mode.damping_std.map(|std| 100.0 * std);
-    mode.damping.map_or_else(
-        || MISSING.to_owned(),
-        |ratio| rounded_digits(100.0 * ratio, std, DAMPING_DIGITS).joined(),
-    )
-}
-
 /// The best frequency with its bound.
 pub fn reading(mode: &ModeSection) -> Rounded {
     match (mode.method, mode.half_line, bound_of(mode)) {
@@ -274,20 +254,6 @@ pub fn reading(mode: &ModeSection) -> Rounded {
             value: significant(mode.frequency, 6),
             uncertainty: None,
         },
-    }
-}
-
-/// Lambda with the digits that the frequency supports: it grows with the frequency's square root.
-fn lambda(mode: &ModeSection) -> String {
-    let Some(lambda) = mode.lambda else {
-        return MISSING.to_owned();
-    };
-    match bound_of(mode) {
-        Some(bound) if mode.frequency > 0.0 && lambda > 0.0 => {
-            let uncertainty = Some(0.5 * lambda * bound / mode.frequency);
-            rounded_to(lambda, uncertainty, last_place(lambda, LAMBDA_DIGITS)).value
-        }
-        _ => significant(lambda, 5),
     }
 }
 
@@ -308,22 +274,24 @@ pub fn frfs(document: &Document) -> Option<Table> {
         for found in &frf.resonances {
             let phase = found.phase;
             let phase = phase.map(|value| format!("{value:.1}").replace('-', "\u{2212}"));
-            rows.push(vec![
-                match several {
-                    true => frf.recording.clone(),
-                    false => String::new(),
-                },
-                frf.response.clone(),
-                mode_name(found.mode, found.label.as_deref()),
-                trimmed(found.frequency, 6),
-                optional(found.magnitude, 4),
-                match one_unit {
-                    true => String::new(),
-                    false => unit_words(&frf.unit),
-                },
-                or_missing(phase),
-                coherence(found.quality.coherence),
-                optional(found.quality.random_error.map(|error| 100.0 * error), 2),
+            let error = found.quality.random_error.map(|error| 100.0 * error);
+            let unit = match one_unit {
+                true => String::new(),
+                false => unit_words(&frf.unit),
+            };
+            rows.push([
+                words(
+                    "Recording",
+                    if several { frf.recording.as_str() } else { "" },
+                ),
+                words("Response", &frf.response),
+                words("Mode", mode_name(found.mode, found.label.as_deref())),
+                number("Frequency (Hz)", trimmed(found.frequency, 6)),
+                number(&magnitude, optional(found.magnitude, 4)),
+                words("Unit", unit),
+                number("Phase (\u{b0})", or_missing(phase)),
+                number("Coherence", coherence(found.quality.coherence)),
+                number("Error (%)", optional(error, 2)),
             ]);
         }
     }
@@ -337,115 +305,72 @@ pub fn frfs(document: &Document) -> Option<Table> {
         _ if least == most => format!("{estimator}, {least} taps averaged"),
         _ => format!("{estimator}, {least} to {most} taps averaged"),
     };
-    let table = Table {
-        caption: format!("Frequency response functions at the resonances, {made_by}"),
-        columns: vec![
-            words("Recording"),
-            words("Response"),
-            words("Mode"),
-            number("Frequency (Hz)"),
-            number(&magnitude),
-            words("Unit"),
-            number("Phase (\u{b0})"),
-            number("Coherence"),
-            number("Error (%)"),
-        ],
-        rows,
-        note: function_note(frfs, least),
-    };
-    Some(table.without_empty_columns())
-}
-
-fn function_note(frfs: &[FrfSection], least: usize) -> String {
-    let mut text = "On the line nearest to each resonance.".to_owned();
-    if least >= 2 {
-        text.push_str(" Error: random error of the magnitude (standard deviation).");
-    } else {
-        text.push_str(
-            " One average: no coherence; it would be 1 whatever the noise, and mean nothing.",
-        );
-    }
+    let mut note = "On the line nearest to each resonance.".to_owned();
+    note.push_str(match least >= 2 {
+        true => " Error: random error of the magnitude (standard deviation).",
+        false => " One average: no coherence; it would be 1 whatever the noise, and mean nothing.",
+    });
     if frfs.iter().any(|frf| frf.unit.contains("unit of the file")) {
-        text.push_str(
+        note.push_str(
             " The file states no unit for a channel: magnitudes are per unit of the file; give the \
              scales (SI units per unit of the file) to have them in SI units.",
         );
     }
     if let Some(decay) = frfs.iter().find_map(|frf| frf.window_decay) {
-        text.push_str(&format!(
+        note.push_str(&format!(
             " The exponential window adds a decay of {} 1/s to every pole, so peaks are lower than without.",
             trimmed(decay, 3)
         ));
     }
-    text
+    let caption = format!("Frequency response functions at the resonances, {made_by}");
+    Some(Table::of(caption, rows, note).without_empty_columns())
 }
 
 /// Measured beside predicted frequencies; `None` where nothing was predicted.
 pub fn prediction(document: &Document) -> Option<Table> {
-    let rows = document.prediction.as_deref().filter(|p| !p.is_empty())?;
-    let compared = rows.iter().any(|row| row.measured.is_some());
-    let mut cells = Vec::new();
-    for row in rows {
-        let [measured, predicted, reading] = compared_frequencies(document, row);
+    let predicted = document.prediction.as_deref().filter(|p| !p.is_empty())?;
+    let compared = predicted.iter().any(|row| row.measured.is_some());
+    let rows = predicted.iter().map(|row| {
+        let mode = mode_of(document, row.mode);
+        let bound = mode.and_then(bound_of);
+        // The digits of the list of modes, so that the same frequency reads the same.
+        let listed = mode
+            .filter(|_| bound.is_some())
+            .map(|mode| reading(mode).value);
+        let frequencies = [row.measured, row.predicted];
+        let [measured, predicted] = frequencies.map(|value| match (value, &listed) {
+            (Some(value), Some(listed)) => with_decimals_of(value, listed),
+            _ => optional(value, 6),
+        });
+        let percent = bound
+            .zip(row.measured)
+            .map(|(bound, hz)| 100.0 * bound / hz);
         let used = match (compared, row.used) {
             (false, _) => "",
             (true, true) => "yes",
             (true, false) => "no",
         };
-        cells.push(vec![
-            row.mode.to_string(),
-            measured,
-            predicted,
-            signed_percent(row.error_percent),
-            reading,
-            optional(row.lambda, 6),
-            used.to_owned(),
-        ]);
-    }
-    let (caption, note) = if compared {
-        (
+        [
+            number("Mode", row.mode.to_string()),
+            number("Measured (Hz)", measured),
+            number("Predicted (Hz)", predicted),
+            number("Error (%)", signed_percent(row.error_percent)),
+            number("Reading (%)", or_missing(percent.map(bound_percent))),
+            number("\u{3bb} (1)", optional(row.lambda, 6)),
+            words("Used", used),
+        ]
+    });
+    let (caption, note) = match compared {
+        true => (
             "Measured and predicted frequencies",
             "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
              frequency. Used: the mode entered the estimate; the others are true predictions.",
-        )
-    } else {
-        (
+        ),
+        false => (
             "Predicted frequencies",
             "\u{3bb}: non-dimensional frequency, \u{3bb}\u{2074} = (2\u{3c0}f)\u{b2} \u{3c1}A \
              L\u{2074}/(EI).",
-        )
+        ),
     };
-    let table = Table {
-        caption: caption.to_owned(),
-        columns: vec![
-            number("Mode"),
-            number("Measured (Hz)"),
-            number("Predicted (Hz)"),
-            number("Error (%)"),
-            number("Reading (%)"),
-            number("\u{3bb} (1)"),
-            words("Used"),
-        ],
-        rows: cells,
-        note: note.to_owned(),
-    };
-    Some(table.without_empty_columns())
-}
-
-/// Measured and predicted frequency to the same digit, and the bound of the reading in percent.
-fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String; 3] {
-    let mode = mode_of(document, row.mode);
-    let bound = mode.and_then(bound_of);
-    // The digits of the list of modes, so that the same frequency reads the same.
-    let listed = mode
-        .filter(|_| bound.is_some())
-        .map(|mode| reading(mode).value);
-    let [measured, predicted] = [row.measured, row.predicted].map(|value| match (value, &listed) {
-        (Some(value), Some(listed)) => with_decimals_of(value, listed),
-        _ => optional(value, 6),
-    });
-    let percent = bound
-        .zip(row.measured)
-        .map(|(bound, hz)| 100.0 * bound / hz);
-    [measured, predicted, or_missing(percent.map(bound_percent))]
+    Some(Table::of(caption, rows, note).without_empty_columns())
 }

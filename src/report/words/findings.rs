@@ -1,10 +1,10 @@
 //! The findings: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::super::chart::axis::extent;
-use super::super::document::{Document, EstimateSection, ModeSection, PredictionSection, ReadBy};
-use super::super::format::{bound_percent, capital, signed_or_below, significant, trimmed};
-use super::super::tables::{Parameter, estimated, quality_count, reading_bound};
-use super::gap::{gap_in_short, gap_story, joint_with, listed, missing, shows_gap};
+use super::diagnosis::{gap_in_short, gap_story, joint_with, listed, missing, shows_gap};
+use crate::document::{Document, EstimateSection, PredictionSection, ReadBy};
+use crate::format::{bound_percent, capital, signed_or_below, significant, trimmed};
+use crate::picture::extent;
+use crate::tables::{Parameter, estimated, quality_count, reading_bound};
 use tapjoint_diagnosis::Verdict;
 use tapjoint_identify::observation::UNPAIRED;
 
@@ -15,19 +15,39 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
         Some(channels) => format!("{taps}. {channels}"),
         None => taps,
     });
+    let model = most_missed(document).and_then(|worst| {
+        let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+            let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
+            let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
+            format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
+        });
+        Some(format!(
+            "largest frequency error of the model {} % (mode {}){gap}",
+            signed_or_below(worst.error_percent?),
+            worst.mode
+        ))
+    });
+    let warnings = match document.main_warnings().count() {
+        0 if document.modes.is_none() => {
+            "no warnings about the files; the spectra are not checked here".to_owned()
+        }
+        0 => "no warnings".to_owned(),
+        1 => "1 warning, see above".to_owned(),
+        count => format!("{count} warnings, see above"),
+    };
+    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
+    // Where nothing was computed there is nothing to doubt.
+    let computed = document.modes.is_some() || document.recordings.is_some();
+    let sought = match document.has_joint() {
+        true => "Joint",
+        false => "Beam",
+    };
     let lines = [
         ("Taps", taps_and_channels),
         ("Modes", modes_in_short(document)),
-        (
-            if document.has_joint() {
-                "Joint"
-            } else {
-                "Beam"
-            },
-            joint(document),
-        ),
-        ("Model", model(document)),
-        ("Doubts", doubts(document)),
+        (sought, joint(document)),
+        ("Model", model),
+        ("Doubts", computed.then_some(warnings + &checks)),
         ("Next", described(document)),
     ];
     lines
@@ -91,7 +111,12 @@ fn joint(document: &Document) -> Option<String> {
         return no_estimate(document);
     };
     let physical = physical(estimate, with_bounds);
-    (!physical.is_empty()).then(|| physical.join(", "))
+    let untested = estimate.misfit.as_ref();
+    let untested = match untested.is_some_and(|misfit| misfit.degrees_of_freedom == 0) {
+        true => "; untested: as many unknowns as frequencies",
+        false => "",
+    };
+    (!physical.is_empty()).then(|| physical.join(", ") + untested)
 }
 
 /// The parameters that have a unit, in words.
@@ -122,36 +147,18 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
     format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
 }
 
-fn model(document: &Document) -> Option<String> {
-    let worst = most_missed(document)?;
-    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
-        let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
-        let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
-        format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
-    });
-    Some(format!(
-        "largest frequency error of the model {} % (mode {}){gap}",
-        signed_or_below(worst.error_percent?),
-        worst.mode
-    ))
-}
-
-fn doubts(document: &Document) -> Option<String> {
-    let warnings = match document.main_warnings().count() {
-        0 => "no warnings".to_owned(),
-        1 => "1 warning, see above".to_owned(),
-        count => format!("{count} warnings, see above"),
-    };
-    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
-    // Where nothing was computed there is nothing to doubt.
-    let computed = document.modes.is_some() || document.recordings.is_some();
-    computed.then_some(warnings + &checks)
-}
-
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
     let taps = taps(document).map(|taps| capital(&taps) + ".");
     let first = [taps, channels(document), modes(document)];
+    // One sentence for each mode that changes with the amplitude.
+    let amplitudes = document.modes.iter().flatten().filter_map(|mode| {
+        let change = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
+        let (number, change) = (mode.mode?, change.to_string());
+        // A number stays on the line of its unit.
+        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
+        Some(format!("Caution: mode {number} {change}."))
+    });
     let rest = [
         quality_count(document).map(|count| capital(&count) + "."),
         estimate(document),
@@ -161,7 +168,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
     let last = [resolution(document), described(document)];
     let first = first.into_iter().flatten();
     first
-        .chain(amplitudes(document))
+        .chain(amplitudes)
         .chain(rest.into_iter().flatten())
         .chain(gap_in_short(document))
         .chain(last.into_iter().flatten())
@@ -181,23 +188,6 @@ fn described(document: &Document) -> Option<String> {
          beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
             .to_owned()
     })
-}
-
-/// One sentence for each mode that changes with the amplitude.
-fn amplitudes(document: &Document) -> Vec<String> {
-    let modes = document.modes.as_deref().unwrap_or_default();
-    let mut sentences = Vec::new();
-    for mode in modes {
-        let amplitude = mode.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
-        let change = amplitude.and_then(|amplitude| amplitude.ends.as_ref());
-        if let Some((number, change)) = mode.mode.zip(change) {
-            let change = change.to_string();
-            // A number stays on the line of its unit.
-            let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
-            sentences.push(format!("Caution: mode {number} {change}."));
-        }
-    }
-    sentences
 }
 
 /// On what taps were looked for where there is no hammer.
@@ -239,13 +229,7 @@ fn modes(document: &Document) -> Option<String> {
             "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
         ));
     }
-    sentence.push_str(&others(modes));
-    Some(sentence + ".")
-}
-
-/// Returns the number of peaks that are not counted, by kind: "; 3 more peaks are not counted (2 no clear
-/// resonance, 1 mains 50 Hz)".
-fn others(modes: &[ModeSection]) -> String {
+    // The peaks that are not counted, by kind: "; 3 more peaks are not counted (2 no clear resonance, 1 mains 50 Hz)".
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for mode in modes.iter().filter(|mode| mode.mode.is_none()) {
         let name = mode.label.as_deref().unwrap_or(UNPAIRED);
@@ -255,18 +239,16 @@ fn others(modes: &[ModeSection]) -> String {
         }
     }
     let total: usize = kinds.iter().map(|(_, count)| count).sum();
-    let list: Vec<String> = kinds
-        .iter()
-        .map(|(name, count)| match kinds.len() {
-            1 => (*name).to_owned(),
-            _ => format!("{count} {name}"),
-        })
-        .collect();
-    match total {
-        0 => String::new(),
-        1 => format!("; 1 more peak is not counted ({})", list.join(", ")),
-        count => format!("; {count} more peaks are not counted ({})", list.join(", ")),
-    }
+    let list = kinds.iter().map(|(name, count)| match kinds.len() {
+        1 => (*name).to_owned(),
+        _ => format!("{count} {name}"),
+    });
+    let list = list.collect::<Vec<_>>().join(", ");
+    Some(match total {
+        0 => sentence + ".",
+        1 => format!("{sentence}; 1 more peak is not counted ({list})."),
+        count => format!("{sentence}; {count} more peaks are not counted ({list})."),
+    })
 }
 
 fn estimate(document: &Document) -> Option<String> {
@@ -370,41 +352,29 @@ fn resolution(document: &Document) -> Option<String> {
     // Of the method that the estimate is by; else of the one that there is.
     let span = spans.iter().find(|span| Some(span.method) == main);
     let span = span.or(spans.first())?;
-    let ranges: Vec<String> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
-        .into_iter()
-        .filter_map(|(name, range)| {
-            let [low, high] = range?;
-            Some(format!(
-                "{name} from {} to {}",
-                significant(low, 4),
-                significant(high, 4)
-            ))
-        })
-        .collect();
+    let ranges = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)];
+    let ranges = ranges.into_iter().filter_map(|(name, range)| {
+        let [low, high] = range?.map(|end| significant(end, 4));
+        Some(format!("{name} from {low} to {high}"))
+    });
+    let ranges: Vec<String> = ranges.collect();
+    if ranges.is_empty() {
+        return None;
+    }
     let failed = match span.failed {
         0 => String::new(),
         failed => format!(", and {failed} of {} leave no estimate", span.patterns),
     };
-    if ranges.is_empty() {
-        return None;
-    }
+    // The bound that the spans were computed from: beside a frequency read between the lines, "bound" alone would
+    // be taken for that one's.
+    let mut modes = document.modes.iter().flatten();
+    let bound =
+        match modes.any(|mode| matches!(mode.method, Some(ReadBy::Fit | ReadBy::Interpolated))) {
+            true => "half line (as if it had been read on a line only)",
+            false => "bound",
+        };
     Some(format!(
-        "With every frequency anywhere within its {}, the non-dimensional stiffness is {}{failed}.",
-        bound_name(document),
+        "With every frequency anywhere within its {bound}, the non-dimensional stiffness is {}{failed}.",
         ranges.join(", ")
     ))
-}
-
-/// Returns the bound that the spans were computed from: beside a frequency read between the lines, "bound" alone would
-/// be taken for that one's.
-fn bound_name(document: &Document) -> &'static str {
-    let modes = document.modes.as_deref().unwrap_or_default();
-    let between = modes
-        .iter()
-        .any(|mode| matches!(mode.method, Some(ReadBy::Fit | ReadBy::Interpolated)));
-    if between {
-        "half line (as if it had been read on a line only)"
-    } else {
-        "bound"
-    }
 }

@@ -6,13 +6,11 @@
 //! ([`merge_modes`]).
 //!
 //! [`polyreference`] finds the poles of a whole band from several responses at once, also where two
-//! modes show as one peak. [`matrix_pencil`] does so for free decays in the time domain. [`fit`] refines
-//! poles to the greatest likelihood and says how well they are known. [`amplitude`] follows frequency and
-//! damping along a decay.
+//! modes show as one peak. [`fit`] refines poles to the greatest likelihood and says how well they are known.
+//! [`amplitude`] follows frequency and damping along a decay.
 
 pub mod amplitude;
 pub mod fit;
-pub mod matrix_pencil;
 mod peaks;
 pub mod polyreference;
 mod reading;

@@ -45,10 +45,9 @@ fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> 
     }
     for level in &mut levels {
         // A power of exactly zero has no level; -400 dB keeps it out of every comparison.
-        *level = if *level > 0.0 {
-            10.0 * level.log10()
-        } else {
-            -400.0
+        *level = match *level > 0.0 {
+            true => 10.0 * level.log10(),
+            false => -400.0,
         };
     }
     levels
@@ -113,10 +112,7 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
         let peak = Peak {
             index,
             prominence_db: prominence(db, index),
-            above_noise_db: level
-                .noise_db
-                .as_ref()
-                .map(|noise| db[index] - noise[index]),
+            above_noise_db: (level.noise_db.as_ref()).map(|noise| db[index] - noise[index]),
         };
         let least = match peak.above_noise_db {
             // Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB; six times that is out of its
@@ -124,13 +120,18 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
             Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
             None => settings.blind_prominence_db,
         };
-        if peak.prominence_db >= least {
-            let height = peak
-                .above_noise_db
-                .unwrap_or_else(|| above_surroundings(db, index));
-            if height >= settings.above_noise_db {
-                peaks.push(peak);
-            }
+        if peak.prominence_db.is_nan() || peak.prominence_db < least {
+            continue;
+        }
+        // Where no noise is known, the height is that over the median of the surroundings: 25 lines or a tenth of
+        // the position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
+        let height = peak.above_noise_db.unwrap_or_else(|| {
+            let reach = (index / 10).max(25);
+            let last = (index + reach + 1).min(db.len());
+            db[index] - median(&mut db[index.saturating_sub(reach)..last].to_vec())
+        });
+        if height >= settings.above_noise_db {
+            peaks.push(peak);
         }
     }
     peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
@@ -138,9 +139,8 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
     let separation = settings.separation.saturating_mul(width);
     let mut kept: Vec<Peak> = Vec::new();
     for peak in peaks {
-        let clear = kept
-            .iter()
-            .all(|other| peak.index.abs_diff(other.index) >= separation);
+        let mut others = kept.iter();
+        let clear = others.all(|other| peak.index.abs_diff(other.index) >= separation);
         if clear && kept.len() < settings.most {
             kept.push(peak);
         }
@@ -175,15 +175,6 @@ fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
         lowest = lowest.min(level);
     }
     (lowest, true)
-}
-
-/// Returns the height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the
-/// position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
-fn above_surroundings(level: &[f64], index: usize) -> f64 {
-    let reach = (index / 10).max(25);
-    let first = index.saturating_sub(reach);
-    let last = (index + reach + 1).min(level.len());
-    level[index] - median(&mut level[first..last].to_vec())
 }
 
 /// Settings of the recognition of mains lines.

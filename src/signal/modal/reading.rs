@@ -204,12 +204,25 @@ pub fn read_peaks(
             let nearest = others.map(|other| other.index.abs_diff(peak.index)).min();
             let room = nearest.map_or(usize::MAX, |distance| distance / 3);
             let decay = window.added_decay();
+            // The fitted oscillation must decay beyond doubt: by two standard deviations where the peak is clear of
+            // the noise; by five, and visibly over the record, where it is not.
+            let clear = match peak.above_noise_db {
+                Some(above) => above >= CLEAR_OF_NOISE,
+                None => peak.prominence_db >= CLEAR_WHEN_BLIND,
+            };
+            let deviations = if clear { 2.0 } else { 5.0 };
             match interpolate_pole(&level.lines, spectra, peak.index, room, decay) {
-                Ok(found) if found.is_resonance(peak, level.lines.half_line()) => {
-                    between = Some(found);
+                Ok(found) => {
+                    let readable = level.lines.half_line().max(0.5 * found.half_width());
+                    let is_resonance = (found.damping_ratio)
+                        .is_some_and(|ratio| ratio > deviations * found.damping_std)
+                        && (clear || found.decay_in_record >= LEAST_DECAY)
+                        && (peak.prominence_db >= CLEAR_PROMINENCE || found.bound < readable);
+                    between = Some(found).filter(|_| is_resonance);
+                    label = (!is_resonance).then_some(PeakLabel::NoResonance);
                 }
                 Err(Unfit::TooFewLines) => {}
-                Ok(_) | Err(Unfit::PoleElsewhere) => label = Some(PeakLabel::NoResonance),
+                Err(Unfit::PoleElsewhere) => label = Some(PeakLabel::NoResonance),
             }
         }
         readings.push(reading(level, peak, between, label));
@@ -272,21 +285,6 @@ pub struct Interpolation {
 }
 
 impl Interpolation {
-    /// Returns true where the fitted oscillation decays beyond doubt: by two standard deviations where the
-    /// peak is clear of the noise; by five, and visibly over the record, where it is not.
-    fn is_resonance(&self, peak: &Peak, half_line: f64) -> bool {
-        let clear = match peak.above_noise_db {
-            Some(above) => above >= CLEAR_OF_NOISE,
-            None => peak.prominence_db >= CLEAR_WHEN_BLIND,
-        };
-        let deviations = if clear { 2.0 } else { 5.0 };
-        let decays = (self.damping_ratio)
-            .is_some_and(|ratio| ratio > deviations * self.damping_std)
-            && (clear || self.decay_in_record >= LEAST_DECAY);
-        let readable = self.bound < half_line.max(0.5 * self.half_width());
-        decays && (peak.prominence_db >= CLEAR_PROMINENCE || readable)
-    }
-
     /// Returns half of the half-power width, zeta f (Hz); 0 without damping.
     fn half_width(&self) -> f64 {
         self.damping_ratio.unwrap_or(0.0) * self.frequency
@@ -368,19 +366,15 @@ fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
     let half = 0.5 * power(spectra, peak)?;
     (1..).find(|reach| {
         let sides = [Some(peak + reach), peak.checked_sub(*reach)];
-        !sides.iter().all(|line| {
-            line.and_then(|line| power(spectra, line))
-                .is_some_and(|p| p > half)
-        })
+        let powers = sides.map(|line| line.and_then(|line| power(spectra, line)));
+        !powers.iter().all(|power| power.is_some_and(|p| p > half))
     })
 }
 
 /// Returns the summed power of all spectra on a line; `None` beyond the end of one.
 fn power(spectra: &[&[Complex64]], line: usize) -> Option<f64> {
-    spectra
-        .iter()
-        .map(|spectrum| spectrum.get(line).map(Complex64::norm_sqr))
-        .sum()
+    let values = spectra.iter().map(|spectrum| spectrum.get(line));
+    values.map(|value| value.map(Complex64::norm_sqr)).sum()
 }
 
 #[derive(Clone, Copy)]
@@ -424,11 +418,7 @@ fn solve_pole(
     weights: &[f64],
 ) -> Option<PoleFit> {
     // The polynomials 1, u, and u^2 where there are lines enough.
-    let terms = if lines.len() > 2 * SLOPING_REACH {
-        3
-    } else {
-        2
-    };
+    let terms = 2 + usize::from(lines.len() > 2 * SLOPING_REACH);
     let background = DMatrix::from_fn(lines.len(), terms, |row, degree| {
         Complex64::from(weights[row].sqrt() * offsets[row].powi(degree as i32))
     });
@@ -457,10 +447,9 @@ fn solve_pole(
     // Complex values less the polynomial's unknowns per spectrum less the common pole.
     let unknowns = background.rank() * spectra.len() + 1;
     let freedom = (offsets.len() * spectra.len()).saturating_sub(unknowns);
-    let std = if freedom == 0 {
-        0.0
-    } else {
-        (squares / (2.0 * freedom as f64) / denominator).sqrt()
+    let std = match freedom {
+        0 => 0.0,
+        _ => (squares / (2.0 * freedom as f64) / denominator).sqrt(),
     };
     Some(PoleFit { pole, std })
 }
@@ -518,15 +507,28 @@ impl Resonance {
     /// Takes another resonance over as the same one; the reading that resolves it better stays.
     fn absorb(&mut self, other: Resonance) {
         self.shown_by.extend(other.shown_by);
-        if resolves_better(&other.best.reading, &self.best.reading) {
+        let (a, b) = (&other.best.reading, &self.best.reading);
+        let fitted = [a, b].map(|reading| reading.source == ReadBy::Fit);
+        let is_better = if a.label.is_some() != b.label.is_some() {
+            a.label.is_none()
+        } else if fitted == [true, true] {
+            a.std < b.std
+        } else if fitted != [false, false] {
+            fitted[0]
+        } else if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {
+            // Half lines that differ by less than 1 % come from blocks of nearly the same length.
+            a.half_line < b.half_line
+        } else {
+            a.prominence_db > b.prominence_db
+        };
+        if is_better {
             self.best = other.best;
         }
     }
 
     fn is_shown_with(&self, other: &Resonance) -> bool {
-        self.shown_by
-            .iter()
-            .any(|recording| other.shown_by.contains(recording))
+        let mut shown = self.shown_by.iter();
+        shown.any(|recording| other.shown_by.contains(recording))
     }
 }
 
@@ -572,13 +574,9 @@ pub fn merge_modes(recordings: &[BandReadings]) -> Vec<MergedMode> {
         let other = merged.remove(second);
         merged[first].absorb(other);
     }
-    merged.sort_by(|a, b| {
-        a.best
-            .reading
-            .frequency
-            .total_cmp(&b.best.reading.frequency)
-    });
-    merged.into_iter().map(|resonance| resonance.best).collect()
+    let mut modes: Vec<MergedMode> = merged.into_iter().map(|one| one.best).collect();
+    modes.sort_by(|a, b| a.reading.frequency.total_cmp(&b.reading.frequency));
+    modes
 }
 
 /// Largest relative distance of two readings of a mode that drifted from one recording to another.
@@ -608,22 +606,4 @@ fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<
         }
     }
     nearest
-}
-
-/// Returns true where reading `a` knows its frequency better than `b`.
-fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
-    if a.label.is_some() != b.label.is_some() {
-        return a.label.is_none();
-    }
-    match (a.source == ReadBy::Fit, b.source == ReadBy::Fit) {
-        (true, true) => return a.std < b.std,
-        (false, false) => {}
-        (a_is_fitted, _) => return a_is_fitted,
-    }
-    // Half lines that differ by less than 1 % come from blocks of nearly the same length.
-    if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {
-        a.half_line < b.half_line
-    } else {
-        a.prominence_db > b.prominence_db
-    }
 }

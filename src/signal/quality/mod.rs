@@ -2,11 +2,10 @@
 //!
 //! Each check takes plain evidence ([`RecordingEvidence`]) and returns verdicts; it rejects nothing and
 //! changes no result. [`judge_recording`] makes the checks of one recording, [`judge_test`] those that
-//! need several. Limits are in [`QualitySettings`], each with its source.
+//! need several. The [`limits`] are constants, each with its source.
 
-mod averages;
+mod one_recording;
 mod recordings;
-mod taps;
 mod verdict;
 
 use num_complex::Complex64;
@@ -16,51 +15,35 @@ use crate::spectral::{DecayCheck, Lines, Window};
 use crate::taps::{Rejection, SecondHit, Tap};
 use tapjoint_numerics::stats::median;
 
-pub use averages::{
-    check_averages, check_coherence, check_decay, check_exponential_window,
-    check_frequency_scatter, check_random_error, check_window_damping,
-};
-pub use recordings::{
-    check_antiresonances, check_driving_point, check_linearity, check_mass_loading,
-    check_reciprocity,
-};
-pub use taps::{
-    check_double_hit, check_force_fall, check_force_noise, check_force_ripple, check_overload,
-    check_tap_levels, check_weak,
-};
 pub use verdict::{Check, Outcome, Subject, Verdict};
 
 /// All checks of one recording.
-pub fn judge_recording(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {
-    let mut verdicts = Vec::new();
-    verdicts.extend(check_double_hit(recording, settings));
-    verdicts.extend(check_force_ripple(recording, settings));
-    verdicts.extend(check_overload(recording));
-    verdicts.extend(check_weak(recording));
-    verdicts.push(check_tap_levels(recording, settings));
-    verdicts.push(check_force_fall(recording, settings));
-    verdicts.push(check_force_noise(recording, settings));
-    verdicts.push(check_averages(recording, settings));
-    verdicts.extend(check_coherence(recording, settings));
-    verdicts.extend(check_random_error(recording, settings));
-    verdicts.push(check_decay(recording, settings));
-    verdicts.push(check_exponential_window(recording, settings));
-    verdicts.extend(check_window_damping(recording, settings));
-    verdicts.extend(check_frequency_scatter(recording, settings));
-    verdicts.extend(check_driving_point(recording, settings));
-    verdicts.extend(check_antiresonances(recording, settings));
+pub fn judge_recording(recording: &RecordingEvidence) -> Vec<Verdict> {
+    let mut verdicts = one_recording::check_double_hit(recording);
+    verdicts.extend(one_recording::check_force_ripple(recording));
+    verdicts.extend(one_recording::check_overload(recording));
+    verdicts.extend(one_recording::check_weak(recording));
+    verdicts.push(one_recording::check_tap_levels(recording));
+    verdicts.push(one_recording::check_force_fall(recording));
+    verdicts.push(one_recording::check_force_noise(recording));
+    verdicts.push(one_recording::check_averages(recording));
+    verdicts.extend(recording.of_modes(one_recording::check_coherence));
+    verdicts.extend(recording.of_modes(one_recording::check_random_error));
+    verdicts.push(one_recording::check_decay(recording));
+    verdicts.push(one_recording::check_exponential_window(recording));
+    verdicts.extend(recording.of_modes(one_recording::check_window_damping));
+    verdicts.extend(recording.of_modes(one_recording::check_frequency_scatter));
+    verdicts.extend(recordings::check_driving_point(recording));
+    verdicts.extend(recordings::check_antiresonances(recording));
     verdicts
 }
 
 /// All checks of a test: those of each recording, then those across recordings.
-pub fn judge_test(recordings: &[RecordingEvidence], settings: &QualitySettings) -> Vec<Verdict> {
-    let mut verdicts: Vec<Verdict> = recordings
-        .iter()
-        .flat_map(|recording| judge_recording(recording, settings))
-        .collect();
-    verdicts.extend(check_reciprocity(recordings, settings));
-    verdicts.extend(check_linearity(recordings, settings));
-    verdicts.extend(check_mass_loading(recordings, settings));
+pub fn judge_test(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
+    let mut verdicts: Vec<Verdict> = recordings.iter().flat_map(judge_recording).collect();
+    verdicts.extend(recordings::check_reciprocity(recordings));
+    verdicts.extend(recordings::check_linearity(recordings));
+    verdicts.extend(recordings::check_mass_loading(recordings));
     verdicts
 }
 
@@ -179,14 +162,12 @@ impl RecordingEvidence {
         (!peaks.is_empty()).then(|| median(&mut peaks))
     }
 
-    /// Name and coherence of the sensor with the highest coherence at a line. Levels of different quantities
-    /// cannot be compared.
-    fn best_coherence(&self, line: usize) -> Option<(&str, f64)> {
-        let known = self.sensors.iter().filter_map(|sensor| {
-            let coherence = sensor.coherence.as_ref()?.get(line)?;
-            Some((sensor.name.as_str(), *coherence))
-        });
-        known.max_by(|a, b| a.1.total_cmp(&b.1))
+    /// One verdict for each resonance.
+    fn of_modes(
+        &self,
+        check: fn(&RecordingEvidence, &ResonanceEvidence) -> Verdict,
+    ) -> impl Iterator<Item = Verdict> {
+        self.resonances.iter().map(move |mode| check(self, mode))
     }
 
     /// Begins a verdict on this recording.
@@ -217,88 +198,60 @@ impl RecordingEvidence {
 
 /// Limits, each with its source. "ISO 7626-5" is ISO 7626-5:2019, impact excitation, in the reading of
 /// field practice.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct QualitySettings {
+pub mod limits {
     /// Second hit over the first that rejects a tap. 0.1: a ripple of 1.7 dB in the force spectrum
     /// (field practice after ISO 7626-5: one impact per record).
-    pub double_hit: f64,
+    pub const DOUBLE_HIT: f64 = 0.1;
     /// Fall of the force spectrum over the band (dB). 20: 10 to 20 dB are common, beyond that the far end
     /// is hardly excited (ISO 7626-5).
-    pub force_fall: f64,
+    pub const FORCE_FALL: f64 = 20.0;
     /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
     /// small by the share of its power, here a tenth.
-    pub force_over_noise: f64,
+    pub const FORCE_OVER_NOISE: f64 = 10.0;
     /// Largest over smallest accepted tap. 3: 10 dB, one range of an amplifier; wider, a joint that is not
     /// linear shows in the averages.
-    pub tap_levels: f64,
+    pub const TAP_LEVELS: f64 = 3.0;
     /// Fewest taps that are enough. 3 (ISO 7626-5: 3 to 5).
-    pub averages: usize,
+    pub const AVERAGES: usize = 3;
     /// Fewest taps from which a coherence is trusted. 5: chance alone gives 1 - 0.05^(1/(n-1)), 0.53 for 5
     /// taps and 0.78 for 3.
-    pub trusted_averages: usize,
+    pub const TRUSTED_AVERAGES: usize = 5;
     /// High coherence. 0.9 (ISO 7626-5).
-    pub coherence: f64,
+    pub const COHERENCE: f64 = 0.9;
     /// Random error of an FRF's magnitude at a resonance. 5 % (ISO 7626-5).
-    pub random_error: f64,
+    pub const RANDOM_ERROR: f64 = 0.05;
     /// Level left at the record's end. 1 % (ISO 7626-5: 10 % at half time).
-    pub remaining: f64,
+    pub const REMAINING: f64 = 0.01;
     /// Natural decay from which an exponential window may be used. 25 % (ISO 7626-5): beyond, the window
     /// and not the structure decides what is measured.
-    pub remaining_for_window: f64,
+    pub const REMAINING_FOR_WINDOW: f64 = 0.25;
     /// Share of a window in the damping read under it, from which that damping is doubtful. 0.5: the
     /// structure's own share is then the smaller one, and carries the error of both.
-    pub window_share: f64,
+    pub const WINDOW_SHARE: f64 = 0.5;
     /// Relative scatter of a frequency from tap to tap. 1 % (ASTM E1876: readings agree within 1 %).
-    pub frequency_scatter: f64,
+    pub const FREQUENCY_SCATTER: f64 = 0.01;
     /// Relative scatter below which there is no doubt, whatever noise explains. 0.005 %: a third of a kelvin does as
     /// much to steel.
-    pub least_scatter: f64,
+    pub const LEAST_SCATTER: f64 = 5e-5;
     /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
-    pub deviations: f64,
+    pub const DEVIATIONS: f64 = 3.0;
     /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.
     /// 0.5 %: bolted joints drift by some 1 % of their stiffness, and no frequency changes by more than half
     /// of that, f^2 being at most proportional to the stiffness.
-    pub drift: f64,
+    pub const DRIFT: f64 = 5e-3;
     /// Agreement of two FRFs that should be equal, |sum H1 conj(H2)|^2/(sum |H1|^2 sum |H2|^2). 0.9: they
     /// share nine tenths of their power.
-    pub reciprocity: f64,
+    pub const RECIPROCITY: f64 = 0.9;
     /// Relative difference of their levels. 0.2: twice the 10 % to which hammer and accelerometer are
     /// usually calibrated together.
-    pub reciprocity_gain: f64,
+    pub const RECIPROCITY_GAIN: f64 = 0.2;
     /// Distance within which two positions are the same (m). 5 mm: about the size of a hammer tip or an
     /// accelerometer's base.
-    pub same_position: f64,
+    pub const SAME_POSITION: f64 = 0.005;
     /// Ratio of two tap levels from which they can show a non-linearity. 1.5: below, one series scatters as
     /// much.
-    pub two_levels: f64,
+    pub const TWO_LEVELS: f64 = 1.5;
     /// Relative difference within which two resonances of two recordings are the same mode. 3 %: what an
     /// accelerometer's mass or a joint's level usually move, and less than modes lie apart.
-    pub same_mode: f64,
-}
-
-impl Default for QualitySettings {
-    fn default() -> Self {
-        QualitySettings {
-            double_hit: 0.1,
-            force_fall: 20.0,
-            force_over_noise: 10.0,
-            tap_levels: 3.0,
-            averages: 3,
-            trusted_averages: 5,
-            coherence: 0.9,
-            random_error: 0.05,
-            remaining: 0.01,
-            remaining_for_window: 0.25,
-            window_share: 0.5,
-            frequency_scatter: 0.01,
-            least_scatter: 5e-5,
-            deviations: 3.0,
-            drift: 5e-3,
-            reciprocity: 0.9,
-            reciprocity_gain: 0.2,
-            same_position: 0.005,
-            two_levels: 1.5,
-            same_mode: 0.03,
-        }
-    }
+    pub const SAME_MODE: f64 = 0.03;
 }

@@ -3,8 +3,7 @@
 use num_complex::Complex64;
 
 use super::{
-    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
-    Verdict,
+    Check, Outcome, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject, Verdict, limits,
 };
 use crate::recording::ResponseForm;
 use tapjoint_numerics::stats::times;
@@ -15,30 +14,30 @@ use tapjoint_numerics::stats::times;
 const LARGEST_CHANCE: f64 = 0.34;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
-pub fn check_reciprocity(
-    recordings: &[RecordingEvidence],
-    settings: &QualitySettings,
-) -> Vec<Verdict> {
+pub(super) fn check_reciprocity(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for (first, second) in pairs(recordings) {
         // A driving point is no pair of places.
-        let one_place = is_near(first.tap_position, second.tap_position, settings);
+        let one_place = is_near(first.tap_position, second.tap_position);
         if one_place || first.fastened != second.fastened {
             continue;
         }
-        for a in sensors_near(first, second.tap_position, settings) {
-            for b in sensors_near(second, first.tap_position, settings) {
+        for a in sensors_near(first, second.tap_position) {
+            for b in sensors_near(second, first.tap_position) {
                 if a.form == b.form {
-                    verdicts.extend(compare_swapped(first, a, second, b, settings));
+                    verdicts.extend(compare_swapped(first, a, second, b));
                 }
             }
         }
     }
+    let why = "Not applicable: no two recordings swap the places of tap and sensor; tap once where the sensor was, with the sensor where the tap was.";
+    or_missing(verdicts, Check::Reciprocity, limits::RECIPROCITY, why)
+}
+
+/// The verdicts, or where there are none one on the test that says why the check does not apply.
+fn or_missing(mut verdicts: Vec<Verdict>, check: Check, limit: f64, why: &str) -> Vec<Verdict> {
     if verdicts.is_empty() {
-        let verdict = Verdict::new(Check::Reciprocity, Subject::Test, settings.reciprocity);
-        verdicts.push(verdict.missing(
-            "Not applicable: no two recordings swap the places of tap and sensor; tap once where the sensor was, with the sensor where the tap was.",
-        ));
+        verdicts.push(Verdict::new(check, Subject::Test, limit).missing(why));
     }
     verdicts
 }
@@ -52,24 +51,23 @@ fn pairs(
 }
 
 /// Returns `true` for two known positions (m) that count as the same place.
-fn is_near(a: Option<f64>, b: Option<f64>, settings: &QualitySettings) -> bool {
+fn is_near(a: Option<f64>, b: Option<f64>) -> bool {
     a.zip(b)
-        .is_some_and(|(a, b)| (a - b).abs() <= settings.same_position)
+        .is_some_and(|(a, b)| (a - b).abs() <= limits::SAME_POSITION)
 }
 
 /// Returns `true` also where neither position is known.
-fn is_unmoved(a: Option<f64>, b: Option<f64>, settings: &QualitySettings) -> bool {
-    is_near(a, b, settings) || (a.is_none() && b.is_none())
+fn is_unmoved(a: Option<f64>, b: Option<f64>) -> bool {
+    is_near(a, b) || (a.is_none() && b.is_none())
 }
 
 /// Sensors of a recording at a position (m).
-fn sensors_near<'a>(
-    recording: &'a RecordingEvidence,
+fn sensors_near(
+    recording: &RecordingEvidence,
     position: Option<f64>,
-    settings: &QualitySettings,
-) -> impl Iterator<Item = &'a SensorEvidence> {
+) -> impl Iterator<Item = &SensorEvidence> {
     let sensors = recording.sensors.iter();
-    sensors.filter(move |sensor| is_near(sensor.position, position, settings))
+    sensors.filter(move |sensor| is_near(sensor.position, position))
 }
 
 /// Compares the FRF of sensor `a` in `first` with that of sensor `b` in `second`, tap and sensor swapped.
@@ -78,16 +76,25 @@ fn compare_swapped(
     a: &SensorEvidence,
     second: &RecordingEvidence,
     b: &SensorEvidence,
-    settings: &QualitySettings,
 ) -> Option<Verdict> {
     let (h1, h2) = (a.frf.as_ref()?, b.frf.as_ref()?);
     let (mut cross, mut power1, mut power2) = (Complex64::ZERO, 0.0, 0.0);
     for (line, x) in h1.iter().enumerate() {
-        if let Some(y) = at_frequency(second, h2, first.lines.frequency(line)) {
-            cross += x * y.conj();
-            power1 += x.norm_sqr();
-            power2 += y.norm_sqr();
+        // The other FRF at that frequency, linear between its lines; none outside its band.
+        let place = (first.lines.frequency(line) - second.lines.low) / second.lines.spacing;
+        let index = (place + 1e-9).floor();
+        let share = (place - index).max(0.0);
+        if index < 0.0 {
+            continue;
         }
+        let y = match (h2.get(index as usize), h2.get(index as usize + 1)) {
+            (Some(one), Some(next)) => one * (1.0 - share) + next * share,
+            (Some(one), None) if share < 1e-6 => *one,
+            _ => continue,
+        };
+        cross += x * y.conj();
+        power1 += x.norm_sqr();
+        power2 += y.norm_sqr();
     }
     if power1 <= 0.0 || power2 <= 0.0 {
         return None;
@@ -98,7 +105,7 @@ fn compare_swapped(
     let opposite = cross.re < 0.0;
     let outcome = match agreement {
         g if opposite || g < 0.5 => Outcome::Bad,
-        g if g < settings.reciprocity || level > settings.reciprocity_gain => Outcome::Doubtful,
+        g if g < limits::RECIPROCITY || level > limits::RECIPROCITY_GAIN => Outcome::Doubtful,
         _ => Outcome::Good,
     };
     let happened = format!(
@@ -111,105 +118,64 @@ fn compare_swapped(
         } else {
             ""
         },
-        settings.reciprocity,
-        settings.reciprocity_gain
+        limits::RECIPROCITY,
+        limits::RECIPROCITY_GAIN
     );
-    let verdict = first.sensor_verdict(Check::Reciprocity, a, settings.reciprocity);
+    let verdict = first.sensor_verdict(Check::Reciprocity, a, limits::RECIPROCITY);
     Some(verdict.found(agreement, outcome, happened))
 }
 
-/// An FRF at a frequency, linear between its lines; `None` outside its band.
-fn at_frequency(
-    recording: &RecordingEvidence,
-    frf: &[Complex64],
-    frequency: f64,
-) -> Option<Complex64> {
-    let place = (frequency - recording.lines.low) / recording.lines.spacing;
-    let index = (place + 1e-9).floor();
-    if index < 0.0 {
-        return None;
-    }
-    let share = (place - index).max(0.0);
-    let one = frf.get(index as usize)?;
-    match frf.get(index as usize + 1) {
-        Some(next) => Some(one * (1.0 - share) + next * share),
-        None => (share < 1e-6).then_some(*one),
-    }
-}
-
 /// Frequencies at two tap levels in one arrangement agree within their uncertainty.
-pub fn check_linearity(
-    recordings: &[RecordingEvidence],
-    settings: &QualitySettings,
-) -> Vec<Verdict> {
+pub(super) fn check_linearity(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for (first, second) in pairs(recordings) {
         let (Some(a), Some(b)) = (first.tap_level(), second.tap_level()) else {
             continue;
         };
         let ratio = b / a;
-        let differ = a > 0.0 && b > 0.0 && ratio.max(1.0 / ratio) >= settings.two_levels;
-        if differ && same_arrangement(first, second, settings) {
-            let change = format!("at {ratio:.2} times the tap level");
-            let check = Check::Linearity;
-            verdicts.extend(shifts(check, first, second, &change, recordings, settings));
+        let differ = a > 0.0 && b > 0.0 && ratio.max(1.0 / ratio) >= limits::TWO_LEVELS;
+        if differ && same_arrangement(first, second) {
+            let (check, change) = (
+                Check::Linearity,
+                format!("at {ratio:.2} times the tap level"),
+            );
+            verdicts.extend(shifts(check, first, second, &change, recordings));
         }
     }
-    if verdicts.is_empty() {
-        let verdict = Verdict::new(Check::Linearity, Subject::Test, settings.deviations);
-        verdicts.push(verdict.missing(
-            "Not applicable: no two recordings differ in the tap level alone; record once more with softer or harder taps.",
-        ));
-    }
-    verdicts
+    let why = "Not applicable: no two recordings differ in the tap level alone; record once more with softer or harder taps.";
+    or_missing(verdicts, Check::Linearity, limits::DEVIATIONS, why)
 }
 
 /// Frequencies with the sensors elsewhere agree within their uncertainty.
-pub fn check_mass_loading(
-    recordings: &[RecordingEvidence],
-    settings: &QualitySettings,
-) -> Vec<Verdict> {
+pub(super) fn check_mass_loading(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     // Each arrangement once, beside the first recording.
     if let Some((first, later)) = recordings.split_first() {
         let mut seen = vec![first];
         for second in later {
-            let is_known = seen.iter().any(|one| same_sensors(one, second, settings));
+            let is_known = seen.iter().any(|one| same_sensors(one, second));
             // A mass that is fastened moves frequencies by itself.
             if second.fastened == first.fastened && !is_known {
                 seen.push(second);
                 let (check, change) = (Check::MassLoading, "with the sensors elsewhere");
-                verdicts.extend(shifts(check, first, second, change, &[], settings));
+                verdicts.extend(shifts(check, first, second, change, &[]));
             }
         }
     }
-    if verdicts.is_empty() {
-        let verdict = Verdict::new(Check::MassLoading, Subject::Test, settings.deviations);
-        verdicts.push(verdict.missing(
-            "Not applicable: the sensors are at the same places in all recordings; move or remove one and record again.",
-        ));
-    }
-    verdicts
+    let why = "Not applicable: the sensors are at the same places in all recordings; move or remove one and record again.";
+    or_missing(verdicts, Check::MassLoading, limits::DEVIATIONS, why)
 }
 
-fn same_sensors(
-    first: &RecordingEvidence,
-    second: &RecordingEvidence,
-    settings: &QualitySettings,
-) -> bool {
+fn same_sensors(first: &RecordingEvidence, second: &RecordingEvidence) -> bool {
     let mut pairs = first.sensors.iter().zip(&second.sensors);
     first.sensors.len() == second.sensors.len()
-        && pairs.all(|(a, b)| is_unmoved(a.position, b.position, settings))
+        && pairs.all(|(a, b)| is_unmoved(a.position, b.position))
 }
 
-fn same_arrangement(
-    first: &RecordingEvidence,
-    second: &RecordingEvidence,
-    settings: &QualitySettings,
-) -> bool {
-    is_unmoved(first.tap_position, second.tap_position, settings)
+fn same_arrangement(first: &RecordingEvidence, second: &RecordingEvidence) -> bool {
+    is_unmoved(first.tap_position, second.tap_position)
         && first.fastened == second.fastened
-        && same_sensors(first, second, settings)
+        && same_sensors(first, second)
 }
 
 /// One verdict for each mode of both recordings on its shift in standard deviations. `change` says how `second`
@@ -220,14 +186,13 @@ fn shifts(
     second: &RecordingEvidence,
     change: &str,
     levels: &[RecordingEvidence],
-    settings: &QualitySettings,
 ) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for mode in &first.resonances {
-        let Some(other) = partner(mode, first, second, settings) else {
+        let Some(other) = partner(mode, first, second) else {
             continue;
         };
-        let verdict = first.mode_verdict(check, mode, settings.deviations);
+        let verdict = first.mode_verdict(check, mode, limits::DEVIATIONS);
         let shift = 100.0 * (other.frequency / mode.frequency - 1.0);
         let (Some(a), Some(b)) = (mode.std, other.std) else {
             verdicts.push(verdict.missing(&format!(
@@ -244,24 +209,24 @@ fn shifts(
             signed(shift),
             second.file,
             times(deviations),
-            settings.deviations
+            limits::DEVIATIONS
         );
-        verdicts.push(if deviations <= settings.deviations {
+        verdicts.push(if deviations <= limits::DEVIATIONS {
             verdict.found(deviations, Outcome::Good, happened)
-        } else if let Some(order) = in_order(mode, first, levels, settings) {
+        } else if let Some(order) = in_order(mode, first, levels) {
             verdict.found(deviations, Outcome::Doubtful, happened + &order)
         } else {
             // Time, and mounting a sensor anew, move a frequency too, but seldom in the order of the levels.
             let moved = 0.01 * shift.abs();
-            let is_usual = moved <= settings.drift;
+            let is_usual = moved <= limits::DRIFT;
             if is_usual {
                 happened += &format!(
                     " A joint's usual drift between recordings leaves up to {:.1} %.",
-                    100.0 * settings.drift
+                    100.0 * limits::DRIFT
                 );
             }
             // The limit that decides is shown: the usual drift.
-            let verdict = verdict.against(settings.drift, "1");
+            let verdict = verdict.against(limits::DRIFT, "1");
             verdict.found(moved, Outcome::doubtful_unless(is_usual), happened)
         });
     }
@@ -282,8 +247,8 @@ struct Seen {
 
 impl Seen {
     /// Returns `true` for a frequency that lies below another one by more than chance explains.
-    fn is_clearly_below(&self, other: &Seen, settings: &QualitySettings) -> bool {
-        other.frequency - self.frequency > settings.deviations * self.std.hypot(other.std)
+    fn is_clearly_below(&self, other: &Seen) -> bool {
+        other.frequency - self.frequency > limits::DEVIATIONS * self.std.hypot(other.std)
     }
 }
 
@@ -295,12 +260,11 @@ fn in_order(
     mode: &ResonanceEvidence,
     first: &RecordingEvidence,
     recordings: &[RecordingEvidence],
-    settings: &QualitySettings,
 ) -> Option<String> {
     let mut seen = Vec::new();
     for one in recordings {
-        if same_arrangement(first, one, settings)
-            && let Some(own) = partner(mode, first, one, settings)
+        if same_arrangement(first, one)
+            && let Some(own) = partner(mode, first, one)
             && let (Some(level), Some(std)) = (one.tap_level(), own.std)
         {
             let frequency = own.frequency;
@@ -312,19 +276,16 @@ fn in_order(
         }
     }
     // A joint that settles moves the frequencies in the order of time.
-    let ratio = settings.two_levels;
+    let ratio = limits::TWO_LEVELS;
     let in_time = seen.is_sorted_by(|a, b| a.level < ratio * b.level)
         || seen.is_sorted_by(|a, b| b.level < ratio * a.level);
     seen.sort_by(|a, b| a.level.total_cmp(&b.level));
     let levels: Vec<&[Seen]> = seen.chunk_by(|a, b| b.level < ratio * a.level).collect();
     let (mut rises, mut falls) = (levels.len() > 1, levels.len() > 1);
     for two in levels.windows(2) {
-        for (low, high) in two[0]
-            .iter()
-            .flat_map(|low| two[1].iter().map(move |high| (low, high)))
-        {
-            rises &= low.is_clearly_below(high, settings);
-            falls &= high.is_clearly_below(low, settings);
+        for low in two[0] {
+            rises &= two[1].iter().all(|high| low.is_clearly_below(high));
+            falls &= two[1].iter().all(|high| high.is_clearly_below(low));
         }
     }
     let sizes: Vec<usize> = levels.iter().map(|level| level.len()).collect();
@@ -358,11 +319,10 @@ fn partner<'a>(
     mode: &ResonanceEvidence,
     first: &RecordingEvidence,
     second: &'a RecordingEvidence,
-    settings: &QualitySettings,
 ) -> Option<&'a ResonanceEvidence> {
     let other = nearest(&second.resonances, mode.frequency)?;
     let back = nearest(&first.resonances, other.frequency)?;
-    let near = (other.frequency / mode.frequency - 1.0).abs() <= settings.same_mode;
+    let near = (other.frequency / mode.frequency - 1.0).abs() <= limits::SAME_MODE;
     (near && back.frequency == mode.frequency).then_some(other)
 }
 
@@ -378,11 +338,8 @@ const ABOUT: usize = 2;
 
 /// The imaginary part of accelerance and receptance (the real part of mobility) keeps one sign at all
 /// resonances: every mode answers there in phase with itself.
-pub fn check_driving_point(
-    recording: &RecordingEvidence,
-    settings: &QualitySettings,
-) -> Vec<Verdict> {
-    of_driving_points(recording, settings, Check::DrivingPoint, 1, |receptance| {
+pub(super) fn check_driving_point(recording: &RecordingEvidence) -> Vec<Verdict> {
+    of_driving_points(recording, Check::DrivingPoint, 1, |receptance| {
         let (mut all, mut wrong) = (0, 0);
         for mode in &recording.resonances {
             let line = recording.lines.nearest(mode.frequency);
@@ -406,10 +363,7 @@ pub fn check_driving_point(
 
 /// Between every two resonances of a driving point lies an antiresonance: the real part of the
 /// receptance, negative above one resonance and positive below the next, passes zero.
-pub fn check_antiresonances(
-    recording: &RecordingEvidence,
-    settings: &QualitySettings,
-) -> Vec<Verdict> {
+pub(super) fn check_antiresonances(recording: &RecordingEvidence) -> Vec<Verdict> {
     let lines = &recording.lines;
     let mut places = Vec::with_capacity(recording.resonances.len());
     for mode in &recording.resonances {
@@ -420,43 +374,36 @@ pub fn check_antiresonances(
         let width = ((half / lines.spacing).round() as usize).max(1);
         places.push((line, width));
     }
-    of_driving_points(
-        recording,
-        settings,
-        Check::Antiresonances,
-        2,
-        |receptance| {
-            // A channel with the wrong sign is the other check's matter.
-            let at_modes = places.iter().filter_map(|&(line, _)| receptance.get(line));
-            let sum: f64 = at_modes.map(|x| x.im).sum();
-            let upright = if sum > 0.0 { -1.0 } else { 1.0 };
-            let gaps = places.len().saturating_sub(1);
-            let mut missing = gaps;
-            for pair in places.windows(2) {
-                let ((first, wide), (last, narrow)) = (pair[0], pair[1]);
-                let between = receptance.get(first + wide..last.saturating_sub(narrow) + 1);
-                let mut parts = between.unwrap_or_default().iter().map(|x| upright * x.re);
-                let passes_zero = parts.any(|re| re < 0.0) && parts.any(|re| re > 0.0);
-                missing -= usize::from(passes_zero);
-            }
-            let outcome = match missing {
-                0 => Outcome::Good,
-                1 => Outcome::Doubtful,
-                _ => Outcome::Bad,
-            };
-            let happened = format!(
-                "{missing} of {gaps} gaps between resonances are without an antiresonance (limit 0)."
-            );
-            (missing, outcome, happened)
-        },
-    )
+    of_driving_points(recording, Check::Antiresonances, 2, |receptance| {
+        // A channel with the wrong sign is the other check's matter.
+        let at_modes = places.iter().filter_map(|&(line, _)| receptance.get(line));
+        let sum: f64 = at_modes.map(|x| x.im).sum();
+        let upright = if sum > 0.0 { -1.0 } else { 1.0 };
+        let gaps = places.len().saturating_sub(1);
+        let mut missing = gaps;
+        for pair in places.windows(2) {
+            let ((first, wide), (last, narrow)) = (pair[0], pair[1]);
+            let between = receptance.get(first + wide..last.saturating_sub(narrow) + 1);
+            let mut parts = between.unwrap_or_default().iter().map(|x| upright * x.re);
+            let passes_zero = parts.any(|re| re < 0.0) && parts.any(|re| re > 0.0);
+            missing -= usize::from(passes_zero);
+        }
+        let outcome = match missing {
+            0 => Outcome::Good,
+            1 => Outcome::Doubtful,
+            _ => Outcome::Bad,
+        };
+        let happened = format!(
+            "{missing} of {gaps} gaps between resonances are without an antiresonance (limit 0)."
+        );
+        (missing, outcome, happened)
+    })
 }
 
 /// One verdict for each sensor at the tap's place, or one that says why there is none. `judge` takes the receptance
 /// there and returns value, outcome and sentence.
 fn of_driving_points(
     recording: &RecordingEvidence,
-    settings: &QualitySettings,
     check: Check,
     least_modes: usize,
     judge: impl Fn(&[Complex64]) -> (usize, Outcome, String),
@@ -469,7 +416,7 @@ fn of_driving_points(
         return vec![none.missing("Not applicable: too few resonances.")];
     }
     let mut verdicts = Vec::new();
-    for sensor in sensors_near(recording, recording.tap_position, settings) {
+    for sensor in sensors_near(recording, recording.tap_position) {
         if let Some(receptance) = receptance(recording, sensor) {
             let (value, outcome, happened) = judge(&receptance);
             let verdict = recording.sensor_verdict(check, sensor, 0.0);

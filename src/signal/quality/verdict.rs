@@ -310,11 +310,7 @@ impl Verdict {
     pub fn severity(&self) -> f64 {
         let value = self.value.unwrap_or(0.0);
         // Relative to its limit, which may differ between recordings.
-        let relative = if self.limit > 0.0 {
-            value / self.limit
-        } else {
-            value
-        };
+        let relative = value / if self.limit > 0.0 { self.limit } else { 1.0 };
         match self.check {
             Check::Coherence | Check::ForceNoise | Check::Reciprocity => -relative,
             _ => relative,
@@ -404,20 +400,20 @@ struct WrittenSubject {
 
 impl From<Subject> for WrittenSubject {
     fn from(about: Subject) -> Self {
-        let mut written = WrittenSubject {
-            subject: about.to_string(),
-            recording: about.file().map(str::to_owned),
-            tap: None,
-            frequency: None,
-            sensor: None,
+        let (subject, recording) = (about.to_string(), about.file().map(str::to_owned));
+        let (tap, frequency, sensor) = match about {
+            Subject::Tap { tap, .. } => (Some(tap), None, None),
+            Subject::Mode { frequency, .. } => (None, Some(frequency), None),
+            Subject::Sensor { sensor, .. } => (None, None, Some(sensor)),
+            Subject::Recording { .. } | Subject::Test => (None, None, None),
         };
-        match about {
-            Subject::Tap { tap, .. } => written.tap = Some(tap),
-            Subject::Mode { frequency, .. } => written.frequency = Some(frequency),
-            Subject::Sensor { sensor, .. } => written.sensor = Some(sensor),
-            Subject::Recording { .. } | Subject::Test => {}
+        WrittenSubject {
+            subject,
+            recording,
+            tap,
+            frequency,
+            sensor,
         }
-        written
     }
 }
 
@@ -429,14 +425,14 @@ impl fmt::Display for Subject {
             Subject::Mode {
                 file,
                 frequency,
-                is_mode,
+                is_mode: true,
             } => {
-                let what = if *is_mode {
-                    ""
-                } else {
-                    " (a peak that is no mode)"
-                };
-                write!(f, "{file}, {frequency:.2} Hz{what}")
+                write!(f, "{file}, {frequency:.2} Hz")
+            }
+            Subject::Mode {
+                file, frequency, ..
+            } => {
+                write!(f, "{file}, {frequency:.2} Hz (a peak that is no mode)")
             }
             Subject::Sensor { file, sensor } => write!(f, "{file}, sensor {sensor}"),
             Subject::Test => f.write_str("test"),

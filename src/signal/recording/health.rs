@@ -1,8 +1,7 @@
 //! Quality of a channel's samples, gathered in one pass, and the checks that samples and rates must pass.
 
-use super::error::RecordingError;
+use super::error::{RecordingError, short};
 use super::text::LARGEST;
-use super::warning::{ChannelLabel, RecordingWarning};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -53,10 +52,12 @@ const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 pub(super) fn check_rate(file: &str, value: f64) -> Result<(), RecordingError> {
     match RATES.contains(&value) {
         true => Ok(()),
-        false => Err(RecordingError::BadSampleRate {
-            file: file.to_owned(),
-            value,
-        }),
+        false => Err(RecordingError::new(
+            file,
+            format!(
+                "sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct it or the time column"
+            ),
+        )),
     }
 }
 
@@ -80,13 +81,13 @@ pub(super) fn check_finite(
         return Ok(());
     };
     let frame = start + at as u64;
-    Err(RecordingError::NotFinite {
-        file: name.to_owned(),
-        channel: channel + 1,
-        frame,
-        time: frame as f64 / sample_rate,
-        value: samples.get(at).copied().unwrap_or(f64::NAN),
-    })
+    let problem = format!(
+        "channel {}, sample {frame} ({} s) is {}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again",
+        channel + 1,
+        short(frame as f64 / sample_rate),
+        samples[at]
+    );
+    Err(RecordingError::new(name, problem))
 }
 
 /// Checks channels in memory and returns their common length.
@@ -104,42 +105,29 @@ pub(super) fn check_samples<'a>(
             break;
         }
         if samples.len() != frames {
-            return Err(RecordingError::LengthMismatch {
-                file: name.to_owned(),
-                channel: at + 1,
-                found: samples.len(),
-                expected: frames,
-            });
+            let problem = format!(
+                "channel {} has {} samples, channel 1 has {frames}; allowed: equal lengths",
+                at + 1,
+                samples.len()
+            );
+            return Err(RecordingError::new(name, problem));
         }
         check_finite(name, sample_rate, at, 0, samples)?;
     }
     match frames {
-        0 => Err(RecordingError::NoSamples {
-            file: name.to_owned(),
-        }),
+        0 => Err(RecordingError::no_samples(name)),
         frames => Ok(frames),
     }
 }
 
-/// A run of equal samples at the channel's highest or lowest level.
+/// A run of equal samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlatTop {
+pub struct EqualRun {
     /// First sample (0-based).
     pub start: u64,
     /// Samples.
     pub len: u64,
-    /// The level (the channel's unit).
-    pub value: f64,
-}
-
-/// A run of exactly repeated samples inside an otherwise moving signal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dropout {
-    /// First repeated sample (0-based).
-    pub start: u64,
-    /// Samples.
-    pub len: u64,
-    /// The repeated value (the channel's unit).
+    /// Their value (the channel's unit).
     pub value: f64,
 }
 
@@ -166,13 +154,13 @@ pub struct ChannelHealth {
     /// Runs of at least 3 equal samples at the channel's highest or lowest level, the first 32 of
     /// each side.
     #[serde(skip)]
-    pub flat_tops: Vec<FlatTop>,
+    pub flat_tops: Vec<EqualRun>,
     /// Number of flat tops, beyond the list too.
     #[serde(rename = "flat_tops")]
     pub flat_top_count: u64,
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
     #[serde(skip)]
-    pub dropped: Vec<Dropout>,
+    pub dropped: Vec<EqualRun>,
     /// Number of dropouts, beyond the list too.
     #[serde(skip)]
     pub dropout_count: u64,
@@ -192,61 +180,54 @@ impl ChannelHealth {
         scaled.rms *= factor.abs();
         scaled.peak *= factor.abs();
         (scaled.minimum, scaled.maximum) = (low.min(high), low.max(high));
-        for flat_top in &mut scaled.flat_tops {
-            flat_top.value *= factor;
-        }
-        for dropout in &mut scaled.dropped {
-            dropout.value *= factor;
+        for run in scaled.flat_tops.iter_mut().chain(&mut scaled.dropped) {
+            run.value *= factor;
         }
         scaled
     }
 
-    /// Returns the doubts that this health gives rise to.
-    pub(super) fn warnings(
-        &self,
-        channel: &ChannelLabel,
-        sample_rate: f64,
-    ) -> Vec<RecordingWarning> {
-        let channel = channel.clone();
+    /// Returns the doubts that this health gives rise to: their codes and what is wrong.
+    pub(super) fn doubts(&self, sample_rate: f64) -> Vec<(&'static str, String)> {
+        let (mean, peak) = (self.mean, self.peak);
         if self.constant {
-            let level = self.mean;
-            return vec![RecordingWarning::Constant { channel, level }];
+            let problem = format!(
+                "every sample is {mean}; probably nothing was connected; check the cable and the channel numbers"
+            );
+            return vec![("constant-channel", problem)];
         }
-        let mut warnings = Vec::new();
+        let mut doubts = Vec::new();
         if let Some(first) = self.first_full_scale {
-            warnings.push(RecordingWarning::FullScale {
-                channel: channel.clone(),
-                count: self.full_scale_samples,
-                time: first as f64 / sample_rate,
-            });
+            let problem = format!(
+                "{} samples at full scale, the first at {:.6} s; the input was probably overloaded; lower the gain or tap more softly",
+                self.full_scale_samples,
+                first as f64 / sample_rate
+            );
+            doubts.push(("full-scale", problem));
         }
-        if let Some(first) = self.flat_tops.first() {
-            warnings.push(RecordingWarning::FlatTops {
-                channel: channel.clone(),
-                count: self.flat_top_count,
-                time: first.start as f64 / sample_rate,
-                len: first.len,
-                level: first.value,
-            });
+        if let Some(EqualRun { start, len, value }) = self.flat_tops.first() {
+            let problem = format!(
+                "{} flat tops at its extreme level, the first at {:.6} s ({len} equal samples at {value}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
+                self.flat_top_count,
+                *start as f64 / sample_rate
+            );
+            doubts.push(("flat-tops", problem));
         }
-        if let Some(first) = self.dropped.first() {
-            warnings.push(RecordingWarning::Dropped {
-                channel: channel.clone(),
-                count: self.dropout_count,
-                samples: self.dropped_samples,
-                time: first.start as f64 / sample_rate,
-                len: first.len,
-                level: first.value,
-            });
+        if let Some(EqualRun { start, len, value }) = self.dropped.first() {
+            let problem = format!(
+                "{} runs of repeated samples inside the moving signal, {} samples in all, the first at {:.6} s ({len} samples of {value}); the recorder probably lost data; leave these taps out or record again",
+                self.dropout_count,
+                self.dropped_samples,
+                *start as f64 / sample_rate
+            );
+            doubts.push(("dropped-samples", problem));
         }
-        if self.mean.abs() > OFFSET_OF_PEAK * self.peak {
-            warnings.push(RecordingWarning::Offset {
-                channel,
-                mean: self.mean,
-                peak: self.peak,
-            });
+        if mean.abs() > OFFSET_OF_PEAK * peak {
+            let problem = format!(
+                "mean {mean:.4e} where the peak is {peak:.4e}; the sensor's supply or the amplifier's zero probably shifts it; couple it AC, or ignore this where the mean is removed"
+            );
+            doubts.push(("offset", problem));
         }
-        warnings
+        doubts
     }
 }
 
@@ -287,7 +268,7 @@ struct Run {
 struct Side {
     sign: f64,
     level: f64,
-    places: Vec<FlatTop>,
+    places: Vec<EqualRun>,
     count: u64,
 }
 
@@ -351,39 +332,38 @@ impl HealthMeter {
         let total = before + added;
         self.health.mean += difference * added / total;
         self.sum_of_squares += squares + difference * difference * before * added / total;
-        for value in samples {
-            self.add_sample(*value);
-        }
-    }
-
-    fn add_sample(&mut self, value: f64) {
-        let at = self.count;
-        self.count += 1;
-        if self.full_scale.is_some_and(|level| value.abs() >= level) {
-            self.health.full_scale_samples += 1;
-            self.health.first_full_scale.get_or_insert(at);
-        }
-        let step = (value - self.last).abs();
-        if at > 0 && step == 0.0 {
-            self.run.len += 1;
-        } else {
-            if at > 0 {
-                self.quantum = self.quantum.min(step);
-                self.end_run(step);
+        for value in samples.iter().copied() {
+            let at = self.count;
+            self.count += 1;
+            if self.full_scale.is_some_and(|level| value.abs() >= level) {
+                self.health.full_scale_samples += 1;
+                self.health.first_full_scale.get_or_insert(at);
             }
-            self.high.raise(value);
-            self.low.raise(value);
-            self.run = Run {
-                start: at,
-                len: 1,
-                entry: if at > 0 { step } else { 0.0 },
-                activity: self.activity,
+            // The first sample has no step; it begins a run.
+            let step = if at > 0 {
+                (value - self.last).abs()
+            } else {
+                0.0
             };
-        }
-        if at > 0 {
+            if at > 0 && step == 0.0 {
+                self.run.len += 1;
+            } else {
+                if at > 0 {
+                    self.quantum = self.quantum.min(step);
+                    self.end_run(step);
+                }
+                self.high.raise(value);
+                self.low.raise(value);
+                self.run = Run {
+                    start: at,
+                    len: 1,
+                    entry: step,
+                    activity: self.activity,
+                };
+            }
             self.activity += ACTIVITY_WEIGHT * (step - self.activity);
+            self.last = value;
         }
-        self.last = value;
     }
 
     /// Judges the run that ends with a step of magnitude `exit` (0 at the end of the recording).
@@ -406,7 +386,7 @@ impl HealthMeter {
                 if side.holds(value) {
                     side.count += 1;
                     if side.places.len() < PLACES_KEPT {
-                        side.places.push(FlatTop { start, len, value });
+                        side.places.push(EqualRun { start, len, value });
                     }
                 }
             }
@@ -421,7 +401,7 @@ impl HealthMeter {
             self.health.dropout_count += 1;
             self.health.dropped_samples += len;
             if self.health.dropped.len() < PLACES_KEPT {
-                self.health.dropped.push(Dropout { start, len, value });
+                self.health.dropped.push(EqualRun { start, len, value });
             }
         }
     }

@@ -14,26 +14,25 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 mod csv;
 mod error;
 mod health;
 mod responses;
-mod spacing;
 mod text;
 mod uff;
 mod units;
-mod warning;
 mod wav;
 mod write;
 
-pub use error::{RecordingError, ResponseError, UffError, WavError};
-pub use health::{ChannelHealth, Dropout, FlatTop};
+pub use error::{RecordingError, RecordingWarning};
+pub use health::{ChannelHealth, EqualRun};
 pub use responses::{FrequencyResponse, FrequencyResponses, open_frequency_responses};
 pub use text::Separator;
 pub use uff::{
@@ -41,19 +40,13 @@ pub use uff::{
     UffCoding, UniversalFile, list_datasets, read_function,
 };
 pub use units::{ResponseForm, STANDARD_GRAVITY, channel_unit};
-pub use warning::{ChannelLabel, RecordingWarning, ResponseWarning};
 pub use write::{
     UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff, encode_wav,
     write_wav,
 };
 
-use csv::{CsvCursor, CsvSource};
+use error::unreadable;
 use health::{HealthMeter, check_rate, check_samples};
-use uff::{UffCursor, UffSource};
-use wav::{WavCursor, WavSource};
-
-/// More channels than this are taken for a damaged header; the largest front ends have hundreds.
-const MAX_CHANNELS: usize = 4096;
 
 /// Two sample rates nearer than this, relatively, are the same.
 const SAME_RATE: f64 = 1e-3;
@@ -74,7 +67,12 @@ impl ReadSettings {
     fn ignored_rate(&self, used: f64) -> Option<RecordingWarning> {
         let given = self.sample_rate?;
         let differs = (given - used).abs() > SAME_RATE * used;
-        differs.then_some(RecordingWarning::SampleRateIgnored { given, used })
+        differs.then(|| {
+            let message = format!(
+                "the sample rate given ({given} Hz) differs from the file's own ({used} Hz), which is used; drop the one given or correct the file"
+            );
+            RecordingWarning::new("sample-rate-ignored", message)
+        })
     }
 }
 
@@ -111,6 +109,37 @@ pub enum Format {
     Memory,
 }
 
+impl fmt::Display for Format {
+    /// Writes "WAV, 24-bit integer", "CSV, semicolon, decimal comma".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::WavInteger { bits } => write!(f, "WAV, {bits}-bit integer"),
+            Self::WavFloat { bits } => write!(f, "WAV, {bits}-bit float"),
+            Self::Csv {
+                separator, decimal, ..
+            } => {
+                let separator = match separator {
+                    Separator::Tab => "tab",
+                    Separator::Semicolon => "semicolon",
+                    Separator::Comma => "comma",
+                    Separator::Blanks => "blanks",
+                };
+                let decimal = match decimal {
+                    ',' => ", decimal comma",
+                    _ => "",
+                };
+                write!(f, "CSV, {separator}{decimal}")
+            }
+            Self::Uff58 {
+                coding: UffCoding::Ascii,
+            } => f.write_str("UFF 58, text"),
+            Self::Uff58 { .. } => f.write_str("UFF 58b, binary"),
+            Self::FrequencyResponses => f.write_str("frequency response functions"),
+            Self::Memory => f.write_str("samples in memory"),
+        }
+    }
+}
+
 /// Source of a text file's sample rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Timing {
@@ -138,6 +167,19 @@ pub struct ChannelInfo {
     pub health: ChannelHealth,
 }
 
+impl ChannelInfo {
+    /// A channel whose file units are its values.
+    fn unscaled(name: Option<String>, unit: Option<String>, meter: HealthMeter) -> Self {
+        Self {
+            name,
+            unit,
+            header_unit: None,
+            scale: 1.0,
+            health: meter.finish(),
+        }
+    }
+}
+
 /// A channel held in memory.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Channel {
@@ -162,13 +204,12 @@ pub struct Block {
 #[derive(Debug, Clone)]
 pub struct Recording {
     name: String,
-    path: Option<PathBuf>,
     format: Format,
     sample_rate: f64,
     frames: u64,
     channels: Vec<ChannelInfo>,
     warnings: Vec<RecordingWarning>,
-    source: Source,
+    source: Arc<dyn Source>,
 }
 
 impl Recording {
@@ -203,40 +244,27 @@ impl Recording {
         check_rate(&name, sample_rate)?;
         let slices = channels.iter().map(|channel| channel.samples.as_slice());
         let frames = check_samples(&name, sample_rate, slices)? as u64;
-        let mut infos = Vec::with_capacity(channels.len());
-        let mut samples = Vec::with_capacity(channels.len());
-        for channel in channels {
+        let channels = channels.into_iter().map(|channel| {
             let mut meter = HealthMeter::new(None);
             meter.add(&channel.samples);
-            infos.push(ChannelInfo {
-                name: channel.name,
-                unit: channel.unit,
-                header_unit: None,
-                scale: 1.0,
-                health: meter.finish(),
-            });
-            samples.push(channel.samples);
-        }
+            let info = ChannelInfo::unscaled(channel.name, channel.unit, meter);
+            (info, channel.samples)
+        });
+        let (channels, samples): (_, Vec<Vec<f64>>) = channels.unzip();
         Ok(Self {
             name,
-            path: None,
             format: Format::Memory,
             sample_rate,
             frames,
-            channels: infos,
+            channels,
             warnings: Vec::new(),
-            source: Source::Memory(Arc::new(samples)),
+            source: Arc::new(samples),
         })
     }
 
     /// The file as the caller named it, or the name of a recording in memory.
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// The file; `None` for a recording in memory.
-    pub fn path(&self) -> Option<&Path> {
-        self.path.as_deref()
     }
 
     /// Format of the file.
@@ -273,17 +301,11 @@ impl Recording {
     /// Step between two neighbouring values of a channel (its unit): of integer samples the last bit,
     /// of others 0.
     pub fn quantum(&self, channel: usize) -> f64 {
-        let scale = self
-            .channels
-            .get(channel)
-            .map_or(0.0, |info| info.scale.abs());
-        match self.format {
-            Format::WavInteger { bits } => scale * 2f64.powi(1 - i32::from(bits)),
-            Format::WavFloat { .. }
-            | Format::Csv { .. }
-            | Format::Uff58 { .. }
-            | Format::FrequencyResponses
-            | Format::Memory => 0.0,
+        match (self.format, self.channels.get(channel)) {
+            (Format::WavInteger { bits }, Some(info)) => {
+                info.scale.abs() * 2f64.powi(1 - i32::from(bits))
+            }
+            _ => 0.0,
         }
     }
 
@@ -298,8 +320,10 @@ impl Recording {
     pub fn warnings(&self) -> Vec<RecordingWarning> {
         let mut warnings = self.warnings.clone();
         for (at, channel) in self.channels.iter().enumerate() {
-            let label = channel_label(at, channel);
-            warnings.extend(channel.health.warnings(&label, self.sample_rate));
+            let name = channel.name.as_deref();
+            for (code, problem) in channel.health.doubts(self.sample_rate) {
+                warnings.push(RecordingWarning::of_channel(code, at + 1, name, problem));
+            }
         }
         warnings
     }
@@ -325,11 +349,13 @@ impl Recording {
         self.check_channels(channels)?;
         let end = range.end.min(self.frames);
         let start = range.start.min(end);
-        if start == end {
-            return Ok(vec![Vec::new(); channels.len()]);
+        let mut samples = vec![Vec::new(); channels.len()];
+        if start < end {
+            let mut cursor = self.source.cursor(start)?;
+            cursor.read(channels, end - start, &mut samples)?;
         }
-        let samples = self.source.cursor(start)?.read(channels, end - start)?;
-        Ok(self.scaled(channels, samples))
+        self.scale(channels, &mut samples);
+        Ok(samples)
     }
 
     /// The whole recording in blocks of `block` samples (at least 1), the last one shorter. After
@@ -353,20 +379,16 @@ impl Recording {
     pub fn set_scale(&mut self, channel: usize, scale: f64) -> Result<(), RecordingError> {
         self.check_channels(&[channel])?;
         if !scale.is_finite() || scale == 0.0 {
-            return Err(RecordingError::BadScale {
-                file: self.name.clone(),
-                channel: channel + 1,
-                value: scale,
-            });
+            let problem = format!(
+                "channel {}: scale {scale}; allowed: a finite number other than 0 (negative = mounted the other way)",
+                channel + 1
+            );
+            return Err(RecordingError::new(&self.name, problem));
         }
-        let Some(info) = self.channels.get_mut(channel) else {
-            return Ok(());
-        };
-        self.warnings.retain(|warning| match warning {
-            RecordingWarning::ScaleOverUnit { channel: label, .. }
-            | RecordingWarning::UnknownUnit { channel: label, .. }
-            | RecordingWarning::UnitsDisagree { channel: label, .. } => label.number != channel + 1,
-            _ => true,
+        let info = &mut self.channels[channel];
+        let of_unit = ["scale-over-unit", "unknown-unit", "units-disagree"];
+        self.warnings.retain(|warning| {
+            warning.channel != Some(channel + 1) || !of_unit.contains(&warning.code())
         });
         if let Some(unit) = &info.header_unit {
             let agrees = match channel_unit(unit) {
@@ -376,11 +398,13 @@ impl Recording {
                 None => false,
             };
             if !agrees {
-                self.warnings.push(RecordingWarning::ScaleOverUnit {
-                    channel: channel_label(channel, info),
-                    scale,
-                    unit: unit.clone(),
-                });
+                let (number, name) = (channel + 1, info.name.as_deref());
+                let problem = format!(
+                    "the scale {scale} is used and the unit \"{unit}\" of the header is not; drop one of them if they say the same"
+                );
+                let code = "scale-over-unit";
+                self.warnings
+                    .push(RecordingWarning::of_channel(code, number, name, problem));
             }
         }
         info.health = info.health.scaled(scale / info.scale);
@@ -389,29 +413,20 @@ impl Recording {
         Ok(())
     }
 
-    /// [`set_scale`](Self::set_scale) by value.
-    ///
-    /// # Errors
-    /// Those of [`set_scale`](Self::set_scale).
-    pub fn with_scale(mut self, channel: usize, scale: f64) -> Result<Self, RecordingError> {
-        self.set_scale(channel, scale)?;
-        Ok(self)
-    }
-
     fn check_channels(&self, channels: &[usize]) -> Result<(), RecordingError> {
         channels
             .iter()
             .try_for_each(|channel| self.channel_by_number(channel.saturating_add(1)).map(drop))
     }
 
-    fn scaled(&self, channels: &[usize], mut samples: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        for (channel, samples) in channels.iter().zip(&mut samples) {
-            let scale = self.channels.get(*channel).map_or(1.0, |info| info.scale);
+    /// Turns file units of these channels into their units.
+    fn scale(&self, channels: &[usize], samples: &mut [Vec<f64>]) {
+        for (channel, samples) in channels.iter().zip(samples) {
+            let scale = self.channels[*channel].scale;
             if scale != 1.0 {
                 samples.iter_mut().for_each(|sample| *sample *= scale);
             }
         }
-        samples
     }
 
     /// The index (0-based) of the channel with a 1-based number.
@@ -421,11 +436,7 @@ impl Recording {
     pub fn channel_by_number(&self, number: usize) -> Result<usize, RecordingError> {
         match number.checked_sub(1) {
             Some(index) if index < self.channels.len() => Ok(index),
-            _ => Err(RecordingError::UnknownChannelNumber {
-                file: self.name.clone(),
-                number,
-                existing: self.existing_channels(),
-            }),
+            _ => Err(self.no_channel(&number.to_string())),
         }
     }
 
@@ -435,6 +446,48 @@ impl Recording {
     /// # Errors
     /// No channel or several channels of that name; the message lists what exists and the nearest.
     pub fn channel_by_name(&self, name: &str) -> Result<usize, RecordingError> {
+        // Beyond this similarity (Jaro-Winkler, 1 = equal) a name is worth proposing.
+        const NEAR: f64 = 0.7;
+        if let Some(index) = self.find_name(name)? {
+            return Ok(index);
+        }
+        let lower = name.trim().to_lowercase();
+        let names = self.channels.iter().filter_map(|c| c.name.as_deref());
+        let nearest = names
+            .map(|name| {
+                let name_lower = name.to_lowercase();
+                // "force" means "ch1_force_V", however long that is.
+                let within = lower.len() > 2 && name_lower.contains(&lower);
+                let similarity = strsim::jaro_winkler(&name_lower, &lower);
+                (similarity + f64::from(u8::from(within)), name)
+            })
+            .filter(|(similarity, _)| *similarity >= NEAR)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let number = lower.parse().ok();
+        let number = number.filter(|number| (1..=self.channels.len()).contains(number));
+        let proposal = match (nearest, number) {
+            (Some((_, name)), _) => format!("; did you mean \"{name}\"?"),
+            (None, Some(number)) => format!("; did you mean the number, channel = {number}?"),
+            (None, None) => String::new(),
+        };
+        Err(self.no_channel(&format!("named \"{}\"{proposal}", name.trim())))
+    }
+
+    /// The index (0-based) of the channel that a user means by a text: a name, else a number.
+    ///
+    /// # Errors
+    /// Those of [`channel_by_name`](Self::channel_by_name) and
+    /// [`channel_by_number`](Self::channel_by_number).
+    pub fn channel_index(&self, text: &str) -> Result<usize, RecordingError> {
+        match (self.find_name(text)?, text.trim().parse()) {
+            (Some(index), _) => Ok(index),
+            (None, Ok(number)) => self.channel_by_number(number),
+            (None, Err(_)) => self.channel_by_name(text),
+        }
+    }
+
+    /// Finds the channel with a name; several of that name are an error.
+    fn find_name(&self, name: &str) -> Result<Option<usize>, RecordingError> {
         let wanted = name.trim();
         let without_unit = units::split_unit(wanted).0;
         let rules: [&dyn Fn(&str) -> bool; 4] = [
@@ -448,55 +501,25 @@ impl Recording {
                 .filter(|index| self.channels[*index].name.as_deref().is_some_and(rule));
             if let Some(index) = found.next() {
                 return match found.count() {
-                    0 => Ok(index),
-                    others => Err(RecordingError::AmbiguousChannelName {
-                        file: self.name.clone(),
-                        name: wanted.to_owned(),
-                        count: others + 1,
-                        existing: self.existing_channels(),
-                    }),
+                    0 => Ok(Some(index)),
+                    others => Err(RecordingError::new(
+                        &self.name,
+                        format!(
+                            "{} channels are named \"{wanted}\"; use the channel's number: {}",
+                            others + 1,
+                            self.existing_channels()
+                        ),
+                    )),
                 };
             }
         }
-        Err(self.unknown_name(wanted))
+        Ok(None)
     }
 
-    /// The index (0-based) of the channel that a user means by a text: a name, else a number.
-    ///
-    /// # Errors
-    /// Those of [`channel_by_name`](Self::channel_by_name) and
-    /// [`channel_by_number`](Self::channel_by_number).
-    pub fn channel_index(&self, text: &str) -> Result<usize, RecordingError> {
-        match (self.channel_by_name(text), text.trim().parse()) {
-            (Err(RecordingError::UnknownChannelName { .. }), Ok(number)) => {
-                self.channel_by_number(number)
-            }
-            (by_name, _) => by_name,
-        }
-    }
-
-    fn unknown_name(&self, wanted: &str) -> RecordingError {
-        // Beyond this similarity (Jaro-Winkler, 1 = equal) a name is worth proposing.
-        const NEAR: f64 = 0.7;
-        let names = self.channels.iter().filter_map(|c| c.name.as_deref());
-        let nearest = names
-            .map(|name| {
-                let (name_lower, wanted) = (name.to_lowercase(), wanted.to_lowercase());
-                // "force" means "ch1_force_V", however long that is.
-                let within = wanted.len() > 2 && name_lower.contains(&wanted);
-                let similarity = strsim::jaro_winkler(&name_lower, &wanted);
-                (similarity + f64::from(u8::from(within)), name)
-            })
-            .filter(|(similarity, _)| *similarity >= NEAR)
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        RecordingError::UnknownChannelName {
-            file: self.name.clone(),
-            name: wanted.to_owned(),
-            nearest: nearest.map_or(String::new(), |(_, name)| {
-                format!("; did you mean \"{name}\"?")
-            }),
-            existing: self.existing_channels(),
-        }
+    fn no_channel(&self, which: &str) -> RecordingError {
+        let existing = self.existing_channels();
+        let problem = format!("no channel {which}; there are: {existing}; name one of these");
+        RecordingError::new(&self.name, problem)
     }
 
     /// `1 ("force"), 2 ("response")`, for messages.
@@ -517,13 +540,6 @@ impl Recording {
     }
 }
 
-fn channel_label(at: usize, channel: &ChannelInfo) -> ChannelLabel {
-    ChannelLabel {
-        number: at + 1,
-        name: channel.name.clone(),
-    }
-}
-
 /// The blocks of a recording, see [`Recording::blocks`].
 #[derive(Debug)]
 pub struct Blocks<'a> {
@@ -531,110 +547,75 @@ pub struct Blocks<'a> {
     channels: Vec<usize>,
     block: u64,
     at: u64,
-    cursor: Option<Cursor<'a>>,
-}
-
-impl Blocks<'_> {
-    fn next_block(&mut self) -> Result<Block, RecordingError> {
-        let recording = self.recording;
-        let cursor = match &mut self.cursor {
-            Some(cursor) => cursor,
-            none => {
-                recording.check_channels(&self.channels)?;
-                none.insert(recording.source.cursor(self.at)?)
-            }
-        };
-        let start = self.at;
-        let frames = self.block.min(recording.frames - start);
-        let samples = cursor.read(&self.channels, frames)?;
-        self.at += frames;
-        Ok(Block {
-            start,
-            samples: recording.scaled(&self.channels, samples),
-        })
-    }
+    cursor: Option<Box<dyn Cursor + 'a>>,
 }
 
 impl Iterator for Blocks<'_> {
     type Item = Result<Block, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.at >= self.recording.frames {
+        let (recording, start) = (self.recording, self.at);
+        if start >= recording.frames {
             return None;
         }
-        let block = self.next_block();
-        if block.is_err() {
-            self.at = self.recording.frames;
-        }
-        Some(block)
+        let end = recording.frames.min(start + self.block);
+        let cursor = match self.cursor.take() {
+            Some(cursor) => Ok(cursor),
+            None => recording
+                .check_channels(&self.channels)
+                .and_then(|()| recording.source.cursor(start)),
+        };
+        let mut samples = vec![Vec::new(); self.channels.len()];
+        let read = cursor.and_then(|mut cursor| {
+            cursor.read(&self.channels, end - start, &mut samples)?;
+            recording.scale(&self.channels, &mut samples);
+            self.cursor = Some(cursor);
+            Ok(Block { start, samples })
+        });
+        // After an error nothing follows.
+        self.at = if read.is_ok() { end } else { recording.frames };
+        Some(read)
     }
 }
 
 /// Place of the samples of a recording.
-#[derive(Debug, Clone)]
-enum Source {
-    Wav(Box<WavSource>),
-    Csv(Box<CsvSource>),
-    Uff(Box<UffSource>),
-    Memory(Arc<Vec<Vec<f64>>>),
-}
-
-impl Source {
+trait Source: fmt::Debug + Send + Sync {
     /// Positions a reader at `frame`.
-    fn cursor(&self, frame: u64) -> Result<Cursor<'_>, RecordingError> {
-        Ok(match self {
-            Self::Wav(source) => Cursor::Wav(source.cursor(frame)?),
-            Self::Csv(source) => Cursor::Csv(source.cursor(frame)?),
-            Self::Uff(source) => Cursor::Uff(source.cursor(frame)),
-            Self::Memory(channels) => Cursor::Memory(MemoryCursor {
-                channels,
-                at: usize::try_from(frame).unwrap_or(usize::MAX),
-            }),
-        })
-    }
+    fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError>;
 }
 
 /// A reader somewhere in the samples; one per pass, since it moves.
-#[derive(Debug)]
-enum Cursor<'a> {
-    Wav(WavCursor<'a>),
-    Csv(CsvCursor<'a>),
-    Uff(UffCursor<'a>),
-    Memory(MemoryCursor<'a>),
+trait Cursor: fmt::Debug {
+    /// Appends up to `limit` samples of the wanted channels to `into`, in file units; fewer only at the end.
+    fn read(
+        &mut self,
+        channels: &[usize],
+        limit: u64,
+        into: &mut [Vec<f64>],
+    ) -> Result<(), RecordingError>;
 }
 
-impl Cursor<'_> {
-    /// Up to `limit` samples of the wanted channels, in file units; fewer only at the end.
-    fn read(&mut self, channels: &[usize], limit: u64) -> Result<Vec<Vec<f64>>, RecordingError> {
-        let mut samples = vec![Vec::new(); channels.len()];
-        match self {
-            Self::Wav(cursor) => cursor.read(channels, limit, &mut samples)?,
-            Self::Csv(cursor) => cursor.read(channels, limit, &mut samples)?,
-            Self::Uff(cursor) => cursor.read(channels, limit, &mut samples)?,
-            Self::Memory(cursor) => cursor.read(channels, limit, &mut samples),
-        }
-        Ok(samples)
+impl Source for Vec<Vec<f64>> {
+    fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError> {
+        let rests = self.iter().map(|samples| &samples[frame as usize..]);
+        Ok(Box::new(rests.collect::<Vec<&[f64]>>()))
     }
 }
 
-/// A place in samples held in memory.
-#[derive(Debug)]
-struct MemoryCursor<'a> {
-    channels: &'a [Vec<f64>],
-    at: usize,
-}
-
-impl MemoryCursor<'_> {
-    fn read(&mut self, channels: &[usize], limit: u64, into: &mut [Vec<f64>]) {
-        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
-        let frames = self.channels.first().map_or(0, Vec::len);
-        let end = self.at.saturating_add(limit).min(frames);
-        for (channel, samples) in channels.iter().zip(into.iter_mut()) {
-            let all = self.channels.get(*channel);
-            let part = all.and_then(|all| all.get(self.at.min(end)..end));
-            samples.extend_from_slice(part.unwrap_or_default());
+/// The rest of every channel that is held in memory.
+impl Cursor for Vec<&[f64]> {
+    fn read(
+        &mut self,
+        channels: &[usize],
+        limit: u64,
+        into: &mut [Vec<f64>],
+    ) -> Result<(), RecordingError> {
+        let end = limit.min(self.first().map_or(0, |rest| rest.len() as u64)) as usize;
+        for (channel, samples) in channels.iter().zip(into) {
+            samples.extend_from_slice(&self[*channel][..end]);
         }
-        self.at = end;
+        self.iter_mut().for_each(|rest| *rest = &rest[end..]);
+        Ok(())
     }
 }
 
@@ -685,15 +666,13 @@ const DECIDING_BYTES: usize = 4096;
 fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     let head = read_head(path, file, DECIDING_BYTES)?;
     if head.is_empty() {
-        return Err(RecordingError::EmptyFile {
-            file: file.to_owned(),
-        });
+        let problem = "the file is empty (0 bytes); record or export it again";
+        return Err(RecordingError::new(file, problem));
     }
     // The mark that begins such text in either order of bytes.
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Err(RecordingError::Utf16 {
-            file: file.to_owned(),
-        });
+        let problem = "the text is UTF-16, two bytes a character; save it as UTF-8 (in spreadsheets the type \"CSV UTF-8\")";
+        return Err(RecordingError::new(file, problem));
     }
     let riff = [b"RIFF", b"RF64", b"BW64"]
         .iter()
@@ -703,10 +682,8 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     }
     let mut unread = UNREAD.iter();
     if let Some((.., format)) = unread.find(|(at, bytes, _)| stands_at(&head, *at, bytes)) {
-        return Err(RecordingError::UnsupportedFormat {
-            file: file.to_owned(),
-            format,
-        });
+        let problem = format!("{format} is not read by this version; export as WAV, CSV or UFF58");
+        return Err(RecordingError::new(file, problem));
     }
     if begins_with_mark(&head) {
         return Ok(FileType::Universal);
@@ -719,10 +696,11 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
         return Ok(FileType::Text);
     }
     let first_bytes: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
-    Err(RecordingError::UnknownFormat {
-        file: file.to_owned(),
-        first_bytes: first_bytes.join(" "),
-    })
+    let problem = format!(
+        "neither a WAV file, a universal file nor text (first bytes {}); export as WAV, CSV or UFF58",
+        first_bytes.join(" ")
+    );
+    Err(RecordingError::new(file, problem))
 }
 
 fn stands_at(head: &[u8], at: usize, bytes: &[u8]) -> bool {
@@ -768,12 +746,4 @@ fn read_fully(reader: &mut impl Read, into: &mut [u8]) -> io::Result<usize> {
         }
     }
     Ok(got)
-}
-
-/// Returns the error of a file that the operating system does not give.
-fn unreadable(file: &str, source: io::Error) -> RecordingError {
-    RecordingError::Unreadable {
-        file: file.to_owned(),
-        source,
-    }
 }

@@ -10,17 +10,15 @@ use std::path::Path;
 use num_complex::Complex64;
 
 use super::csv::{CsvSource, split_texts};
-use super::error::{RecordingError, ResponseError, UffError};
+use super::error::{RecordingError, RecordingWarning};
 use super::health::first_unusable;
-use super::spacing::TimeCheck;
-use super::text::shown;
+use super::text::{TimeCheck, shown};
 use super::uff::{
-    ACCELERATION, AbscissaUnit, DISPLACEMENT, Dataset, EXCITATION_FORCE, Entry, EvenPoints,
-    Function, FunctionGroup, FunctionType, Ordinate, Point, UniversalFile, VELOCITY, describe,
-    even_points, list_datasets, read_values,
+    ACCELERATION, AbscissaUnit, DISPLACEMENT, EXCITATION_FORCE, Entry, EvenPoints, Function,
+    FunctionGroup, FunctionType, Ordinate, Point, UniversalFile, VELOCITY, even_points, left_out,
+    list_datasets, read_function,
 };
 use super::units::{ResponseForm, quotient, response_unit};
-use super::warning::ResponseWarning;
 use super::{FileType, read_head, recognise};
 
 /// Bytes of header that are looked at.
@@ -43,7 +41,7 @@ pub struct FrequencyResponses {
     /// The responses in the order of the file; one at least.
     pub responses: Vec<FrequencyResponse>,
     /// Doubts about them.
-    pub warnings: Vec<ResponseWarning>,
+    pub warnings: Vec<RecordingWarning>,
 }
 
 impl FrequencyResponses {
@@ -82,36 +80,62 @@ pub fn open_frequency_responses(path: &Path) -> Result<FrequencyResponses, Recor
     match recognise(path, &file)? {
         FileType::Universal => open_uff(path),
         FileType::Text => open_text(path, file),
-        FileType::Wav => Err(ResponseError::TimeSeries {
-            file,
-            what: "a WAV file, a time series".to_owned(),
-        }
-        .into()),
+        FileType::Wav => Err(time_series(&file, "a WAV file, a time series")),
     }
+}
+
+/// Returns the error of a recording where responses were expected.
+fn time_series(file: &str, what: &str) -> RecordingError {
+    let problem = format!(
+        "is {what}; frequency response functions were expected because `form` is given; remove `form` (and `sensor`) from its [[recording]], or give the file with the responses"
+    );
+    RecordingError::new(file, problem)
 }
 
 // ---- Text: columns of frequency, real and imaginary part, below whatever the analyser writes about them.
 
+/// Returns the error of columns that are not frequency, real part and imaginary part.
+fn wrong_columns(source: &CsvSource, problem: &str) -> RecordingError {
+    source.error(format!(
+        "{problem}; allowed: three columns, frequency (Hz), real part and imaginary part, and coherence as a fourth; export it so"
+    ))
+}
+
 fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingError> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    let (source, _) = CsvSource::open(path, &file, |block| {
+    let source = CsvSource::open(path, &file, |block| {
         columns.resize(block.len(), Vec::new());
         for (column, part) in columns.iter_mut().zip(block) {
             column.extend_from_slice(part);
         }
     })?;
-    let header = TextHeader::read(path, &source)?;
-    header.check_columns(&source, columns.len())?;
+    // Cells of the lines above the first row, the last line first.
+    let length = usize::try_from(source.layout.start).unwrap_or(HEADER_BYTES);
+    let bytes = read_head(path, &source.file, length.min(HEADER_BYTES))?;
+    let lines = bytes.rsplit(|byte| *byte == source.layout.line_end);
+    let header: Vec<Vec<String>> = lines
+        .map(|line| split_texts(line, source.layout.separator))
+        .collect();
+    check_columns(&header, &source, columns.len())?;
     columns.resize(4, Vec::new());
     let [frequencies, real, imaginary, coherence] = columns.as_slice() else {
-        return Err(RecordingError::NoSamples { file });
+        return Err(RecordingError::no_samples(&file));
     };
     let (first_frequency, spacing) = even_lines(&source, frequencies)?;
-    let factor = header.frequency_factor();
-    let unit = header.unit();
+    let (factor, unit) = units_in(&header);
     let scale = unit.as_ref().map_or(1.0, |(_, scale, _)| *scale);
     let parts = real.iter().zip(imaginary);
-    let (reference, response) = header.points();
+    // A line such as "Ref Chan:Resp Chan", "1+Z:3+Z".
+    let points = header.iter().find(|cells| {
+        let first = cells.first().map(|cell| cell.to_lowercase());
+        first.is_some_and(|cell| cell.starts_with("ref") && cell.contains("resp"))
+    });
+    let points = points.and_then(|cells| cells.get(1)?.split_once(':'));
+    let (reference, response) = points.unwrap_or_default();
+    let [reference, response] = [reference, response].map(|name| Point {
+        name: Some(name.trim().to_owned()).filter(|name| !name.is_empty()),
+        ..Point::default()
+    });
     Ok(FrequencyResponses {
         file,
         first_frequency: first_frequency * factor,
@@ -135,144 +159,100 @@ fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingE
     })
 }
 
-/// Cells of the lines above the first row, the last line first.
-struct TextHeader {
-    lines: Vec<Vec<String>>,
+/// Words that begin the heading of a magnitude or a phase.
+const POLAR: [&str; 8] = [
+    "magnitude",
+    "amplitude",
+    "phase",
+    "abs",
+    "mag ",
+    "mag(",
+    "deg",
+    "db",
+];
+
+/// The first cell that begins with one of `words`, in any case of letters.
+fn cell_beginning<'a>(header: &'a [Vec<String>], words: &[&str]) -> Option<&'a String> {
+    header.iter().flatten().find(|cell| {
+        let cell = cell.to_lowercase();
+        words.iter().any(|word| cell.starts_with(word))
+    })
 }
 
-impl TextHeader {
-    fn read(path: &Path, source: &CsvSource) -> Result<Self, RecordingError> {
-        let length = usize::try_from(source.layout.start).unwrap_or(HEADER_BYTES);
-        let bytes = read_head(path, &source.file, length.min(HEADER_BYTES))?;
-        let lines = bytes.rsplit(|byte| *byte == source.layout.line_end);
-        Ok(Self {
-            lines: lines
-                .map(|line| split_texts(line, source.layout.separator))
-                .collect(),
-        })
+/// Checks that there are three columns, or four with a coherence, none of them named as something else.
+fn check_columns(
+    header: &[Vec<String>],
+    source: &CsvSource,
+    count: usize,
+) -> Result<(), RecordingError> {
+    if source.layout.time.is_some() {
+        let what = "a time series (it has a time column)";
+        return Err(time_series(&source.file, what));
     }
-
-    /// The first cell that begins with one of `words`, in any case of letters.
-    fn cell_beginning(&self, words: &[&str]) -> Option<&String> {
-        self.lines.iter().flatten().find(|cell| {
-            let cell = cell.to_lowercase();
-            words.iter().any(|word| cell.starts_with(word))
-        })
-    }
-
-    /// Checks that there are three columns, or four with a coherence, none of them named as something else.
-    fn check_columns(&self, source: &CsvSource, count: usize) -> Result<(), ResponseError> {
-        let file = source.file.clone();
-        if source.layout.time.is_some() {
-            return Err(ResponseError::TimeSeries {
-                file,
-                what: "a time series (it has a time column)".to_owned(),
-            });
+    let polar = cell_beginning(header, &POLAR);
+    let coherence = cell_beginning(header, &["coh", "gamma"]);
+    let problem = match (polar, count, coherence) {
+        (Some(cell), ..) => {
+            let cell = shown(cell.as_bytes());
+            format!("the heading \"{cell}\" means magnitude and phase")
         }
-        let polar = self.cell_beginning(&[
-            "magnitude",
-            "amplitude",
-            "phase",
-            "abs",
-            "mag ",
-            "mag(",
-            "deg",
-            "db",
-        ]);
-        let coherence = self.cell_beginning(&["coh", "gamma"]);
-        let problem = match (polar, count, coherence) {
-            (Some(cell), ..) => {
-                let cell = shown(cell.as_bytes());
-                format!("the heading \"{cell}\" means magnitude and phase")
-            }
-            (None, 3, _) | (None, 4, Some(_)) => return Ok(()),
-            (None, 4, None) => {
-                "there are 4 columns and no heading says what the last is".to_owned()
-            }
-            (None, count, _) => format!("there are {count} columns"),
-        };
-        Err(ResponseError::Columns {
-            file,
-            line: source.layout.lines_before + 1,
-            problem,
+        (None, 3, _) | (None, 4, Some(_)) => return Ok(()),
+        (None, 4, None) => "there are 4 columns and no heading says what the last is".to_owned(),
+        (None, count, _) => format!("there are {count} columns"),
+    };
+    Err(wrong_columns(source, &problem))
+}
+
+/// Returns the factor from the frequency column's unit to Hz, and the unit of the values: as written, its factor, its
+/// form.
+fn units_in(header: &[Vec<String>]) -> (f64, Option<(String, f64, ResponseForm)>) {
+    let mut first_cells = header.iter().filter_map(|cells| cells.first());
+    let factor = first_cells.find_map(|cell| {
+        let cell = cell.to_lowercase();
+        let cell = cell.trim_end_matches([')', ']']);
+        match cell.rsplit(['(', '[', ' ']).next() {
+            Some("hz") => Some(1.0),
+            Some("khz") => Some(1e3),
+            // 2 pi rad are one cycle.
+            Some("rad/s") => Some(0.5 / std::f64::consts::PI),
+            _ => None,
+        }
+    });
+    // The cell nearest above the numbers that is a unit, or that has one in its last brackets.
+    let unit = header.iter().flatten().find_map(|cell| {
+        let inner = cell.split_once(['(', '[']).map(|(_, rest)| rest);
+        let inner = inner.and_then(|rest| rest.strip_suffix([')', ']']));
+        [Some(cell.as_str()), inner].into_iter().find_map(|text| {
+            let text = text?.trim();
+            let (factor, form) = response_unit(text)?;
+            Some((text.to_owned(), factor, form))
         })
-    }
-
-    /// Returns the factor from the frequency column's unit to Hz: kHz and rad/s where the header says so.
-    fn frequency_factor(&self) -> f64 {
-        for cell in self.lines.iter().filter_map(|cells| cells.first()) {
-            let cell = cell.to_lowercase();
-            let cell = cell.trim_end_matches([')', ']']);
-            match cell.rsplit(['(', '[', ' ']).next() {
-                Some("hz") => return 1.0,
-                Some("khz") => return 1e3,
-                // 2 pi rad are one cycle.
-                Some("rad/s") => return 0.5 / std::f64::consts::PI,
-                _ => {}
-            }
-        }
-        1.0
-    }
-
-    /// Returns the unit as written, its factor and form: the cell nearest above the numbers that is one, or
-    /// that has one in its last brackets.
-    fn unit(&self) -> Option<(String, f64, ResponseForm)> {
-        for cell in self.lines.iter().flatten() {
-            let inner = cell.split_once(['(', '[']).map(|(_, rest)| rest);
-            let inner = inner.and_then(|rest| rest.strip_suffix([')', ']']));
-            for text in [Some(cell.as_str()), inner].into_iter().flatten() {
-                let text = text.trim();
-                if let Some((factor, form)) = response_unit(text) {
-                    return Some((text.to_owned(), factor, form));
-                }
-            }
-        }
-        None
-    }
-
-    /// Returns reference and response from a line such as "Ref Chan:Resp Chan", "1+Z:3+Z".
-    fn points(&self) -> (Point, Point) {
-        let line = self.lines.iter().find(|cells| {
-            let first = cells.first().map(|cell| cell.to_lowercase());
-            first.is_some_and(|cell| cell.starts_with("ref") && cell.contains("resp"))
-        });
-        let pair = line.and_then(|cells| cells.get(1)?.split_once(':'));
-        let Some((reference, response)) = pair else {
-            return Default::default();
-        };
-        let [reference, response] = [reference, response].map(|name| Point {
-            name: Some(name.trim().to_owned()).filter(|name| !name.is_empty()),
-            ..Point::default()
-        });
-        (reference, response)
-    }
+    });
+    (factor.unwrap_or(1.0), unit)
 }
 
 /// Returns first frequency and spacing (the column's unit).
-fn even_lines(source: &CsvSource, frequencies: &[f64]) -> Result<(f64, f64), ResponseError> {
-    let before = source.layout.lines_before;
+fn even_lines(source: &CsvSource, frequencies: &[f64]) -> Result<(f64, f64), RecordingError> {
     let printed: Vec<String> = frequencies.iter().map(|x| format!("{x:e}")).collect();
     let texts = printed.iter().map(|text| text.as_bytes());
     let cells = frequencies.iter().copied().zip(texts);
     let mut check = TimeCheck::new(cells.clone().take(HEAD_ROWS));
-    for ((frequency, cell), line) in cells.zip(before + 1..) {
-        check
-            .add(frequency, cell, line)
-            .map_err(|uneven| ResponseError::Uneven {
-                file: source.file.clone(),
-                line: uneven.line,
-                frequency: uneven.time,
-                step: uneven.step,
-                expected: check.reference(),
-            })?;
+    // Empty lines are not counted.
+    for ((frequency, cell), line) in cells.zip(source.layout.lines_before + 1..) {
+        check.add(frequency, cell, line).map_err(|uneven| {
+            let problem = format!(
+                "uneven lines: {}; allowed: 0.1 % of the step, or what rounding of the printed frequency explains; export evenly spaced lines",
+                uneven.words(1.0, "Hz", "line")
+            );
+            RecordingError::at_line(&source.file, uneven.line, problem)
+        })?;
     }
     match frequencies {
         [] => Ok((0.0, 0.0)),
-        [_] => Err(ResponseError::Columns {
-            file: source.file.clone(),
-            line: before + 1,
-            problem: "there is a single line, which has no spacing".to_owned(),
-        }),
+        [_] => {
+            let problem = "there is a single line, which has no spacing";
+            Err(wrong_columns(source, problem))
+        }
         [first, .., last] => Ok((*first, (last - first) / (frequencies.len() - 1) as f64)),
     }
 }
@@ -281,37 +261,48 @@ fn even_lines(source: &CsvSource, frequencies: &[f64]) -> Result<(f64, f64), Res
 
 fn open_uff(path: &Path) -> Result<FrequencyResponses, RecordingError> {
     let file = list_datasets(path)?;
-    let mut warnings = Vec::new();
-    if let Some(dataset) = file.cut_header {
-        warnings.push(ResponseWarning::HeaderCut { dataset });
-    }
+    let unit = AbscissaUnit::Hertz;
+    let mut warnings = Vec::from_iter(file.cut_header_doubt());
     let responses = functions(&file, FunctionType::FREQUENCY_RESPONSE);
-    let group = FunctionGroup::largest(&file, responses, AbscissaUnit::Hertz)?;
-    let Some(points) = group.points else {
-        return Err(nothing_usable(&file, group.left_out.first()));
+    let Some(group) = FunctionGroup::largest(&file, responses, unit)? else {
+        let found = file.contents();
+        let series = file
+            .functions()
+            .any(|(_, function)| function.is_time_series());
+        return Err(match series {
+            true => {
+                let what = format!("a universal file with time series ({found})");
+                time_series(&file.name, &what)
+            }
+            false => RecordingError::new(
+                &file.name,
+                format!(
+                    "holds no frequency response function (function type 4), only {found}; export complex responses over force"
+                ),
+            ),
+        });
     };
-    for ((dataset, function), reason) in group.left_out {
-        warnings.push(left_out(dataset, function, reason));
+    for (entry, reason) in group.left_out {
+        warnings.push(left_out(entry, &reason, unit));
     }
     let mut responses = Vec::with_capacity(group.functions.len());
-    for (dataset, function) in group.functions {
-        let response = read_response(&file, dataset, function, &mut warnings)?;
-        responses.push(((dataset, function), response));
+    for entry in group.functions {
+        responses.push((entry, read_response(&file, entry, &mut warnings)?));
     }
-    let lines = complete_lines(points.points, &mut responses, &mut warnings);
+    let lines = complete_lines(group.points.points, &mut responses, &mut warnings);
     if lines == 0 {
-        return Err(RecordingError::NoSamples { file: file.name });
+        return Err(RecordingError::no_samples(&file.name));
     }
-    for (dataset, function) in functions(&file, FunctionType::COHERENCE) {
-        let attached = attach_coherence(&file, dataset, function, &points, lines, &mut responses)?;
+    for entry in functions(&file, FunctionType::COHERENCE) {
+        let attached = attach_coherence(&file, entry, &group.points, lines, &mut responses)?;
         if let Err(reason) = attached {
-            warnings.push(left_out(dataset, function, reason.to_owned()));
+            warnings.push(left_out(entry, reason, unit));
         }
     }
     let responses = responses.into_iter().map(|(_, response)| response);
     Ok(FrequencyResponses {
-        first_frequency: points.start,
-        spacing: points.step,
+        first_frequency: group.points.start,
+        spacing: group.points.step,
         lines,
         responses: responses.collect(),
         file: file.name,
@@ -324,52 +315,28 @@ fn functions(file: &UniversalFile, wanted: FunctionType) -> impl Iterator<Item =
         .filter(move |(_, function)| function.function_type == wanted)
 }
 
-fn left_out(dataset: &Dataset, function: &Function, reason: String) -> ResponseWarning {
-    ResponseWarning::LeftOut {
-        dataset: dataset.number,
-        name: describe(function),
-        reason,
-    }
-}
-
-/// Returns why there is no response.
-fn nothing_usable(file: &UniversalFile, unusable: Option<&(Entry<'_>, String)>) -> RecordingError {
-    let (name, found) = (file.name.clone(), file.contents());
-    if let Some(((dataset, function), problem)) = unusable {
-        return ResponseError::Unusable {
-            file: name,
-            dataset: dataset.number,
-            name: describe(function),
-            problem: problem.clone(),
-        }
-        .into();
-    }
-    if file.functions().next().is_none() {
-        return UffError::NoFunctions { file: name, found }.into();
-    }
-    match file
-        .functions()
-        .any(|(_, function)| function.is_time_series())
-    {
-        true => ResponseError::TimeSeries {
-            file: name,
-            what: format!("a universal file with time series ({found})"),
-        },
-        false => ResponseError::None { file: name, found },
-    }
-    .into()
-}
-
 /// Reads one response in SI units, and adds the doubts about it.
 fn read_response(
     file: &UniversalFile,
-    dataset: &Dataset,
-    function: &Function,
-    warnings: &mut Vec<ResponseWarning>,
+    entry: Entry<'_>,
+    warnings: &mut Vec<RecordingWarning>,
 ) -> Result<FrequencyResponse, RecordingError> {
-    let read = read_values(file, dataset, function)?;
+    let (dataset, function) = entry;
+    let read = read_function(file, dataset.number)?;
+    let (response, reference) = (
+        function.response.to_string(),
+        function.reference.to_string(),
+    );
+    // Both points, else the description.
+    let name = if response != "-" || reference != "-" {
+        format!("{response} / {reference}")
+    } else {
+        let label = function.numerator.label.clone();
+        let words = function.id_lines[0].clone().or(label);
+        words.unwrap_or_else(|| function.function_type.name().to_owned())
+    };
     let mut response = FrequencyResponse {
-        name: response_name(function),
+        name,
         response: function.response.clone(),
         reference: function.reference.clone(),
         ..FrequencyResponse::default()
@@ -381,28 +348,24 @@ fn read_response(
         .map(|(re, im)| Complex64::new(*re, *im) * factor)
         .collect();
     let sums = response.values.iter().map(|value| value.re + value.im);
-    match first_unusable(sums.clone()) {
+    match first_unusable(sums) {
         None => Ok(response),
-        Some(at) => Err(UffError::NotFinite {
-            file: file.name.clone(),
-            dataset: dataset.number,
-            point: at as u64 + 1,
-            value: sums.clone().nth(at).unwrap_or(f64::NAN),
+        Some(at) => {
+            let value = response.values[at].re + response.values[at].im;
+            Err(not_finite(&file.name, dataset.number, at, value))
         }
-        .into()),
     }
 }
 
-/// Names a response by both points, else by the description.
-fn response_name(function: &Function) -> String {
-    let response = function.response.to_string();
-    let reference = function.reference.to_string();
-    if response != "-" || reference != "-" {
-        return format!("{response} / {reference}");
-    }
-    let label = function.numerator.label.clone();
-    let words = function.id_lines[0].clone().or(label);
-    words.unwrap_or_else(|| function.function_type.name().to_owned())
+/// Returns the error of a value that is no number of physical size.
+///
+/// `dataset` is 1-based (when writing: the response), `point` 0-based.
+pub(super) fn not_finite(file: &str, dataset: usize, point: usize, value: f64) -> RecordingError {
+    let problem = format!(
+        "dataset {dataset}, point {} is {value}; allowed: finite numbers of magnitude up to 1e100; export the file again",
+        point + 1
+    );
+    RecordingError::new(file, problem)
 }
 
 /// Settles unit and form of a response, and adds doubts about them. Returns the factor to SI.
@@ -413,7 +376,7 @@ fn settle_unit(
     response: &mut FrequencyResponse,
     file: &UniversalFile,
     function: &Function,
-    warnings: &mut Vec<ResponseWarning>,
+    warnings: &mut Vec<RecordingWarning>,
 ) -> f64 {
     let (above, below) = (&function.numerator, &function.denominator);
     let by_axes = match (above.quantity, below.quantity) {
@@ -430,19 +393,20 @@ fn settle_unit(
         ),
         (written, _) => (written.clone(), whole),
     };
-    let name = response.name.clone();
+    let name = &response.name;
     if let (Some(unit), None) = (&written, by_unit) {
-        let unit = unit.clone();
-        warnings.push(ResponseWarning::UnknownUnit { name, unit });
+        let message = format!(
+            "{name}: the unit \"{unit}\" is not known; the numbers are taken as they stand, in SI units; check the level"
+        );
+        warnings.push(RecordingWarning::new("unknown-unit", message));
     } else if let (Some(axes), Some((_, unit_form)), Some(unit)) = (by_axes, by_unit, &written)
         && axes != unit_form
     {
-        warnings.push(ResponseWarning::FormsDisagree {
-            name,
-            unit: unit.clone(),
-            by_axes: axes.name(),
-            by_unit: unit_form.name(),
-        });
+        let (by_axes, by_unit) = (axes.name(), unit_form.name());
+        let message = format!(
+            "{name}: the types of its axes make it {by_axes}, its unit \"{unit}\" makes it {by_unit}; it is taken as {by_axes}; say which it is with `form`"
+        );
+        warnings.push(RecordingWarning::new("forms-disagree", message));
     }
     let by_system = file
         .units
@@ -462,16 +426,16 @@ fn settle_unit(
 fn complete_lines(
     promised: u64,
     responses: &mut Vec<(Entry<'_>, FrequencyResponse)>,
-    warnings: &mut Vec<ResponseWarning>,
+    warnings: &mut Vec<RecordingWarning>,
 ) -> usize {
     let lengths = responses.iter().map(|(_, response)| response.values.len());
     if lengths.clone().any(|present| present as u64 == promised) {
-        responses.retain(|((dataset, function), response)| {
+        responses.retain(|(entry, response)| {
             let present = response.values.len();
             let complete = present as u64 == promised;
             if !complete {
                 let reason = format!("{present} of its {promised} lines are there");
-                warnings.push(left_out(dataset, function, reason));
+                warnings.push(left_out(*entry, &reason, AbscissaUnit::Hertz));
             }
             complete
         });
@@ -481,26 +445,26 @@ fn complete_lines(
     for (_, response) in responses {
         response.values.truncate(shortest);
     }
-    warnings.push(ResponseWarning::Truncated {
-        present: shortest as u64,
-        promised,
-    });
+    let message = format!(
+        "the file is truncated: {shortest} of the promised {promised} lines are there; an export or a copy was probably interrupted; what is there is used"
+    );
+    warnings.push(RecordingWarning::new("truncated", message));
     shortest
 }
 
 /// Gives a coherence to the first response of the same points that has none yet; `Err` inside says why it is unused.
 fn attach_coherence(
     file: &UniversalFile,
-    dataset: &Dataset,
-    function: &Function,
+    entry: Entry<'_>,
     points: &EvenPoints,
     lines: usize,
     responses: &mut [(Entry<'_>, FrequencyResponse)],
 ) -> Result<Result<(), &'static str>, RecordingError> {
+    let (dataset, function) = entry;
     if function.ordinate == Ordinate::Complex {
         return Ok(Err("a coherence is real, its values are complex"));
     }
-    match even_points(file, dataset, function, AbscissaUnit::Hertz)? {
+    match even_points(file, entry, AbscissaUnit::Hertz)? {
         Ok(own) if own.matches(points) => {}
         _ => return Ok(Err("its lines are not those of the responses")),
     }
@@ -512,7 +476,7 @@ fn attach_coherence(
     let Some((_, response)) = own else {
         return Ok(Err("no response has its points"));
     };
-    let mut values = read_values(file, dataset, function)?.real;
+    let mut values = read_function(file, dataset.number)?.real;
     values.truncate(lines);
     // What printing with six digits adds to a coherence of 1, and more.
     let usable = values.iter().all(|value| (-1e-3..=1.001).contains(value));

@@ -101,29 +101,17 @@ pub(super) fn split_unit(cell: &str) -> (&str, Option<&str>) {
         let Some(inner) = cell.strip_suffix(close) else {
             continue;
         };
-        let Some(at) = matching_bracket(inner, open, close) else {
-            continue;
-        };
-        let (name, unit) = inner.split_at(at);
-        return (name.trim(), unit.get(1..).map(str::trim));
-    }
-    (cell, None)
-}
-
-/// Place of the bracket that a closing one after `inner` would close.
-fn matching_bracket(inner: &str, open: char, close: char) -> Option<usize> {
-    let mut depth = 0_usize;
-    for (at, character) in inner.char_indices().rev() {
-        if character == close {
-            depth += 1;
-        } else if character == open {
+        // The bracket that the closing one closes: others may stand within.
+        let mut depth = 1_usize;
+        for (at, character) in inner.char_indices().rev() {
+            depth += usize::from(character == close);
+            depth -= usize::from(character == open);
             if depth == 0 {
-                return Some(at);
+                return (inner[..at].trim(), Some(inner[at + 1..].trim()));
             }
-            depth -= 1;
         }
     }
-    None
+    (cell, None)
 }
 
 /// Form of a frequency response function: what is measured per force.
@@ -145,40 +133,28 @@ impl ResponseForm {
         ResponseForm::Receptance,
     ];
 
+    /// Name, unit, unit of the response alone, and number of times that displacement was differentiated in time.
+    fn facts(self) -> (&'static str, &'static str, &'static str, i32) {
+        match self {
+            ResponseForm::Accelerance => ("accelerance", "(m/s2)/N", "m/s2", 2),
+            ResponseForm::Mobility => ("mobility", "(m/s)/N", "m/s", 1),
+            ResponseForm::Receptance => ("receptance", "m/N", "m", 0),
+        }
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
-        match self {
-            ResponseForm::Accelerance => "accelerance",
-            ResponseForm::Mobility => "mobility",
-            ResponseForm::Receptance => "receptance",
-        }
+        self.facts().0
     }
 
     /// Its unit.
     pub fn unit(self) -> &'static str {
-        match self {
-            ResponseForm::Accelerance => "(m/s2)/N",
-            ResponseForm::Mobility => "(m/s)/N",
-            ResponseForm::Receptance => "m/N",
-        }
+        self.facts().1
     }
 
     /// Unit of the response alone.
     pub fn response_unit(self) -> &'static str {
-        match self {
-            ResponseForm::Accelerance => "m/s2",
-            ResponseForm::Mobility => "m/s",
-            ResponseForm::Receptance => "m",
-        }
-    }
-
-    /// Number of times that displacement was differentiated in time.
-    fn derivatives(self) -> i32 {
-        match self {
-            ResponseForm::Receptance => 0,
-            ResponseForm::Mobility => 1,
-            ResponseForm::Accelerance => 2,
-        }
+        self.facts().2
     }
 
     /// A value of this form at `frequency` (Hz) as a value of another form.
@@ -186,7 +162,7 @@ impl ResponseForm {
     /// At 0 Hz there is nothing to integrate from: an acceleration says nothing about where the
     /// structure rests, so that the result does not exist (`None`); derivatives are 0 there.
     pub fn convert(self, to: ResponseForm, value: Complex64, frequency: f64) -> Option<Complex64> {
-        let order = to.derivatives() - self.derivatives();
+        let order = to.facts().3 - self.facts().3;
         if order < 0 && frequency == 0.0 {
             return None;
         }
@@ -222,25 +198,7 @@ pub(super) fn response_unit(text: &str) -> Option<(f64, ResponseForm)> {
     if let Some((_, form)) = WHOLE.iter().find(|(whole, _)| *whole == plain) {
         return Some((1.0, *form));
     }
-    let (motion, force) = split_quotient(&text)?;
-    quotient(motion, force)
-}
-
-/// Factor and form of a motion over a force, each with a unit of its own.
-pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)> {
-    let (motion, motion_si) = label_unit(motion)?;
-    let (force, force_si) = label_unit(force)?;
-    let form = match (motion_si, force_si) {
-        ("m/s2", "N") => ResponseForm::Accelerance,
-        ("m/s", "N") => ResponseForm::Mobility,
-        ("m", "N") => ResponseForm::Receptance,
-        _ => return None,
-    };
-    Some((motion / force, form))
-}
-
-/// Numerator and denominator of a quotient.
-fn split_quotient(text: &str) -> Option<(&str, &str)> {
+    // Characters outside of brackets.
     let mut outside = Vec::new();
     let mut depth = 0_i32;
     for (place, character) in text.char_indices() {
@@ -251,21 +209,32 @@ fn split_quotient(text: &str) -> Option<(&str, &str)> {
             _ => {}
         }
     }
-    // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
-    if let Some((place, mark)) = outside.iter().rfind(|(_, c)| ['*', '\u{b7}'].contains(c)) {
-        let (first, second) = (text.get(..*place)?, text.get(place + mark.len_utf8()..)?);
-        return match (reciprocal(first), reciprocal(second)) {
-            (Some(force), None) => Some((second, force)),
-            (None, Some(force)) => Some((first, force)),
-            _ => None,
-        };
-    }
-    if let Some((place, _)) = outside.iter().rfind(|(_, c)| *c == '/') {
-        return Some((text.get(..*place)?, text.get(place + 1..)?));
-    }
-    // "(m/s2)(N)": two brackets side by side.
-    let place = text.find(")(")?;
-    Some((text.get(..=place)?, text.get(place + 1..)?))
+    let product = outside.iter().rfind(|(_, c)| "*\u{b7}".contains(*c));
+    let (motion, force) = if let Some((place, mark)) = product {
+        // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
+        let (first, second) = (&text[..*place], &text[place + mark.len_utf8()..]);
+        match (reciprocal(first), reciprocal(second)) {
+            (Some(force), None) => (second, force),
+            (None, Some(force)) => (first, force),
+            _ => return None,
+        }
+    } else if let Some((place, _)) = outside.iter().rfind(|(_, c)| *c == '/') {
+        (&text[..*place], &text[place + 1..])
+    } else {
+        // "(m/s2)(N)": two brackets side by side.
+        let place = text.find(")(")?;
+        (&text[..=place], &text[place + 1..])
+    };
+    quotient(motion, force)
+}
+
+/// Factor and form of a motion over a force, each with a unit of its own.
+pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)> {
+    let (motion, motion_si) = label_unit(motion)?;
+    let (force, force_si) = label_unit(force)?;
+    let mut forms = ResponseForm::ALL.into_iter();
+    let form = forms.find(|form| form.response_unit() == motion_si && force_si == "N")?;
+    Some((motion / force, form))
 }
 
 /// Returns the "N" of "1/N" or "(1/N)".

@@ -7,12 +7,11 @@
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use super::error::{RecordingError, WavError};
+use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_finite};
-use super::warning::RecordingWarning;
-use super::{ChannelInfo, Format, MAX_CHANNELS, ReadSettings, Recording, Source};
-use super::{read_fully, unreadable};
+use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, read_fully};
 
 /// More chunks than this are taken for garbage: real files have a dozen.
 const MAX_CHUNKS: usize = 10_000;
@@ -37,19 +36,18 @@ pub(super) fn open_wav(
     file: String,
     settings: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
-    let source = WavSource::open(path, &file)?;
-    let header = &source.header;
-    let (sample_rate, frames) = (f64::from(header.sample_rate), header.frames);
-    let mut warnings = header.warnings.clone();
+    let mut warnings = Vec::new();
+    let source = WavSource::open(path, &file, &mut warnings)?;
+    let (sample_rate, frames) = (f64::from(source.sample_rate), source.frames);
     warnings.extend(settings.ignored_rate(sample_rate));
-    let format = match header.coding {
+    let format = match source.coding {
         Coding::Integer { valid, .. } => Format::WavInteger { bits: valid },
         Coding::Float { bits } => Format::WavFloat { bits },
     };
-    let all: Vec<usize> = (0..header.channels).collect();
-    let mut meters = vec![HealthMeter::new(header.coding.full_scale()); header.channels];
-    let per_block = (PASS_SAMPLES / header.channels).max(1) as u64;
-    let mut cursor = source.cursor(0)?;
+    let all: Vec<usize> = (0..source.channels).collect();
+    let mut meters = vec![HealthMeter::new(source.coding.full_scale()); source.channels];
+    let per_block = (PASS_SAMPLES / source.channels).max(1) as u64;
+    let mut cursor = source.reader(0)?;
     while cursor.at < frames {
         let start = cursor.at;
         let mut block = vec![Vec::new(); all.len()];
@@ -59,67 +57,110 @@ pub(super) fn open_wav(
             meter.add(samples);
         }
     }
-    drop(cursor);
-    let channels = meters.into_iter().map(|meter| ChannelInfo {
-        name: None,
-        unit: None,
-        header_unit: None,
-        scale: 1.0,
-        health: meter.finish(),
-    });
+    let channels = meters.into_iter();
     Ok(Recording {
         name: file,
-        path: Some(path.to_owned()),
         format,
         sample_rate,
         frames,
-        channels: channels.collect(),
+        channels: channels
+            .map(|meter| ChannelInfo::unscaled(None, None, meter))
+            .collect(),
         warnings,
-        source: Source::Wav(Box::new(source)),
+        source: Arc::new(source),
     })
 }
 
-/// A WAV file whose header has been understood.
-#[derive(Debug, Clone)]
-pub(super) struct WavSource {
+/// A WAV file whose header has been understood and checked against the file.
+#[derive(Debug)]
+struct WavSource {
     path: PathBuf,
     file: String,
-    header: WavHeader,
+    sample_rate: u32,
+    channels: usize,
+    coding: Coding,
+    /// Bytes of one sample of all channels.
+    frame_bytes: u64,
+    /// First byte of the samples in the file.
+    data_start: u64,
+    /// Complete samples per channel that are in the file.
+    frames: u64,
+}
+
+impl Source for WavSource {
+    fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError> {
+        Ok(Box::new(self.reader(frame)?))
+    }
 }
 
 impl WavSource {
-    fn open(path: &Path, file: &str) -> Result<Self, RecordingError> {
-        let mut opened = File::open(path).map_err(|source| unreadable(file, source))?;
-        let length = opened
-            .seek(SeekFrom::End(0))
-            .map_err(|source| unreadable(file, source))?;
-        let walker = ChunkWalker {
-            reader: &mut opened,
+    /// Walks the chunks up to the samples, from the first one behind "RIFF", a size and "WAVE".
+    fn open(
+        path: &Path,
+        file: &str,
+        warnings: &mut Vec<RecordingWarning>,
+    ) -> Result<Self, RecordingError> {
+        let mut reader = File::open(path).map_err(|source| unreadable(file, source))?;
+        let length = reader.seek(SeekFrom::End(0));
+        let mut walker = ChunkWalker {
+            reader,
             file,
-            length,
-            long_data_size: None,
-            format: None,
+            length: length.map_err(|source| unreadable(file, source))?,
         };
-        let mut source = Self {
-            path: path.to_owned(),
-            file: file.to_owned(),
-            header: walker.run()?,
-        };
-        source.settle_alignment()?;
-        Ok(source)
+        let (mut at, mut format, mut long_size) = (12, None, None);
+        for _ in 0..MAX_CHUNKS {
+            let Some((name, size)) = walker.chunk_header(at)? else {
+                break;
+            };
+            let content = at + 8;
+            match (&name, format) {
+                (b"fmt ", _) => format = Some(walker.read_format(content, size)?),
+                (b"ds64", _) => {
+                    // The data size stands after the 64-bit RIFF size.
+                    let mut bytes = [0_u8; 8];
+                    let got = walker.read_at(content + 8, &mut bytes)?;
+                    long_size = (got == 8).then(|| u64::from_le_bytes(bytes));
+                }
+                (b"data", None) => return Err(walker.missing("fmt ", " before the samples")),
+                (b"data", Some(format)) => {
+                    let channels = usize::from(format.channels);
+                    check_channel_count(file, channels)?;
+                    let promised = long_size.filter(|_| size == u32::MAX);
+                    let promised = promised.unwrap_or(u64::from(size));
+                    let frame_bytes = u64::from(format.channels) * format.coding.bytes();
+                    let (frames, doubt) = walker.count_frames(content, promised, frame_bytes)?;
+                    warnings.extend(doubt);
+                    let mut source = Self {
+                        path: path.to_owned(),
+                        file: file.to_owned(),
+                        sample_rate: format.sample_rate,
+                        channels,
+                        coding: format.coding,
+                        frame_bytes,
+                        data_start: content,
+                        frames,
+                    };
+                    warnings.extend(source.settle_alignment()?);
+                    return Ok(source);
+                }
+                _ => {}
+            }
+            at = walker.after_chunk(content, u64::from(size))?;
+        }
+        Err(walker.missing(if format.is_some() { "data" } else { "fmt " }, ""))
     }
 
     /// Positions a reader at `frame`.
-    pub(super) fn cursor(&self, frame: u64) -> Result<WavCursor<'_>, RecordingError> {
-        let header = &self.header;
-        let at = frame.min(header.frames);
-        let mut reader = File::open(&self.path).map_err(|source| unreadable(&self.file, source))?;
-        reader
-            .seek(SeekFrom::Start(header.data_start + at * header.frame_bytes))
-            .map_err(|source| unreadable(&self.file, source))?;
+    fn reader(&self, frame: u64) -> Result<WavCursor<'_>, RecordingError> {
+        let at = frame.min(self.frames);
+        let start = SeekFrom::Start(self.data_start + at * self.frame_bytes);
+        let opened = File::open(&self.path).and_then(|mut reader| {
+            reader.seek(start)?;
+            Ok(reader)
+        });
         Ok(WavCursor {
             source: self,
-            reader,
+            reader: opened.map_err(|source| unreadable(&self.file, source))?,
             at,
             bytes: Vec::new(),
             values: Vec::new(),
@@ -130,16 +171,16 @@ impl WavSource {
     ///
     /// At the high end the low bits are all zero. When they are not, and every value fits into the
     /// valid bits, the writer used the low end; when neither holds, all bits are taken as valid.
-    fn settle_alignment(&mut self) -> Result<(), RecordingError> {
-        let Coding::Integer { bits, valid, .. } = self.header.coding else {
-            return Ok(());
+    fn settle_alignment(&mut self) -> Result<Option<RecordingWarning>, RecordingError> {
+        let Coding::Integer { bits, valid, .. } = self.coding else {
+            return Ok(None);
         };
         if bits == valid {
-            return Ok(());
+            return Ok(None);
         }
         let limit = 2_f64.powi(-i32::from(bits - valid));
         let (mut low_bits_zero, mut fits) = (true, true);
-        let mut cursor = self.cursor(0)?;
+        let mut cursor = self.reader(0)?;
         while cursor.at < ALIGNMENT_FRAMES {
             let block = cursor.next_interleaved(ALIGNMENT_FRAMES - cursor.at)?;
             if block.is_empty() {
@@ -151,24 +192,21 @@ impl WavSource {
                 fits &= (-limit..limit).contains(value);
             }
         }
-        if !low_bits_zero && fits {
-            self.header.coding = Coding::Integer {
-                bits,
-                valid,
-                full: valid,
-            };
-            self.header.warnings.push(RecordingWarning::RightAligned {
-                bits: valid,
-                container: bits,
-            });
+        if low_bits_zero || !fits {
+            return Ok(None);
         }
-        Ok(())
+        let full = valid;
+        self.coding = Coding::Integer { bits, valid, full };
+        let message = format!(
+            "{valid}-bit samples sit at the low end of their {bits}-bit containers, not at the high end as the format demands; full scale is taken as {valid} bits; check the levels"
+        );
+        Ok(Some(RecordingWarning::new("right-aligned", message)))
     }
 }
 
 /// A reader somewhere in the samples.
 #[derive(Debug)]
-pub(super) struct WavCursor<'a> {
+struct WavCursor<'a> {
     source: &'a WavSource,
     reader: File,
     /// The next frame.
@@ -177,16 +215,15 @@ pub(super) struct WavCursor<'a> {
     values: Vec<f64>,
 }
 
-impl WavCursor<'_> {
-    /// Appends up to `limit` frames of the wanted channels to `into`; fewer only at the end.
-    pub(super) fn read(
+impl Cursor for WavCursor<'_> {
+    fn read(
         &mut self,
         channels: &[usize],
         limit: u64,
         into: &mut [Vec<f64>],
     ) -> Result<(), RecordingError> {
-        let count = self.source.header.channels;
-        let end = self.source.header.frames.min(self.at.saturating_add(limit));
+        let count = self.source.channels;
+        let end = self.source.frames.min(self.at.saturating_add(limit));
         while self.at < end {
             let values = self.next_interleaved(end - self.at)?;
             for (channel, samples) in channels.iter().zip(into.iter_mut()) {
@@ -195,51 +232,58 @@ impl WavCursor<'_> {
         }
         Ok(())
     }
+}
 
-    /// The next frames, at most `limit` and at most one block, channel after channel.
+impl WavCursor<'_> {
+    /// The next frames, at most `limit` and at most one block, channel after channel; integers with full scale 1.
     fn next_interleaved(&mut self, limit: u64) -> Result<&[f64], RecordingError> {
-        let header = &self.source.header;
-        let per_block = (BLOCK_BYTES / header.frame_bytes).max(1);
-        let frames = limit.min(per_block).min(header.frames - self.at);
+        let source = self.source;
+        let per_block = (BLOCK_BYTES / source.frame_bytes).max(1);
+        let frames = limit.min(per_block).min(source.frames - self.at);
         self.values.clear();
-        self.bytes.resize((frames * header.frame_bytes) as usize, 0);
+        self.bytes.resize((frames * source.frame_bytes) as usize, 0);
         let got = read_fully(&mut self.reader, &mut self.bytes)
-            .map_err(|source| unreadable(&self.source.file, source))?;
+            .map_err(|error| unreadable(&source.file, error))?;
         if got < self.bytes.len() {
-            return Err(RecordingError::Changed {
-                file: self.source.file.clone(),
-                frame: self.at + got as u64 / header.frame_bytes,
-            });
+            let lost = self.at + got as u64 / source.frame_bytes;
+            return Err(RecordingError::changed(&source.file, lost));
         }
-        header.coding.decode(&self.bytes, &mut self.values);
+        let values = &mut self.values;
+        match source.coding {
+            Coding::Float { bits: 32 } => {
+                let (samples, _) = self.bytes.as_chunks::<4>();
+                values.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
+            }
+            Coding::Float { .. } => {
+                let (samples, _) = self.bytes.as_chunks::<8>();
+                values.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
+            }
+            Coding::Integer { bits: 8, .. } => {
+                values.extend(self.bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
+            }
+            Coding::Integer { bits, full, .. } => {
+                let full_scale = 2_f64.powi(i32::from(full) - 1);
+                let width = usize::from(bits / 8);
+                for sample in self.bytes.chunks_exact(width) {
+                    // Filled from the high end and shifted down again, so that the sign extends itself.
+                    let mut padded = [0_u8; 4];
+                    padded[4 - width..].copy_from_slice(sample);
+                    let value = i32::from_le_bytes(padded) >> (32 - bits);
+                    values.push(f64::from(value) / full_scale);
+                }
+            }
+        }
         self.at += frames;
         Ok(&self.values)
     }
 }
 
-/// Everything the header says, checked against the file.
-#[derive(Debug, Clone, PartialEq)]
-struct WavHeader {
-    sample_rate: u32,
-    channels: usize,
-    coding: Coding,
-    /// Bytes of one sample of all channels.
-    frame_bytes: u64,
-    /// First byte of the samples in the file.
-    data_start: u64,
-    /// Complete samples per channel that are in the file.
-    frames: u64,
-    warnings: Vec<RecordingWarning>,
-}
-
-/// Walks the chunks of a file up to the samples.
+/// A file whose chunks are read.
 struct ChunkWalker<'a> {
-    reader: &'a mut File,
+    reader: File,
     /// The file's name in errors.
     file: &'a str,
     length: u64,
-    long_data_size: Option<u64>,
-    format: Option<WaveFormat>,
 }
 
 /// The fields of a "fmt " chunk that are used.
@@ -251,33 +295,6 @@ struct WaveFormat {
 }
 
 impl ChunkWalker<'_> {
-    /// Walks from the first chunk, behind "RIFF", a size and "WAVE".
-    fn run(mut self) -> Result<WavHeader, RecordingError> {
-        let mut at = 12;
-        for _ in 0..MAX_CHUNKS {
-            let Some((name, size)) = self.chunk_header(at)? else {
-                break;
-            };
-            match &name {
-                b"fmt " => self.format = Some(self.read_format(at + 8, size)?),
-                b"ds64" => {
-                    // The data size stands after the 64-bit RIFF size.
-                    let mut bytes = [0_u8; 8];
-                    let got = self.read_at((at + 8).saturating_add(8), &mut bytes)?;
-                    self.long_data_size = (got == 8).then(|| u64::from_le_bytes(bytes));
-                }
-                b"data" => return self.finish(at + 8, size),
-                _ => {}
-            }
-            at = self.after_chunk(at + 8, u64::from(size))?;
-        }
-        let chunk = match self.format {
-            Some(_) => "data",
-            None => "fmt ",
-        };
-        Err(self.missing(chunk, ""))
-    }
-
     /// Name and size of the chunk at `at`; `None` at the end of the file.
     fn chunk_header(&mut self, at: u64) -> Result<Option<([u8; 4], u32)>, RecordingError> {
         let mut header = [0_u8; 8];
@@ -343,13 +360,14 @@ impl ChunkWalker<'_> {
             }
             bytes = frame_bytes / channels;
         }
-        let coding =
-            Coding::new(tag, bits, valid, bytes).ok_or_else(|| WavError::UnsupportedCoding {
-                file: self.file.to_owned(),
-                tag,
-                name: coding_name(tag),
-                bits,
-            })?;
+        let Some(coding) = Coding::new(tag, bits, valid, bytes) else {
+            let known = CODINGS.iter().find(|(known, _)| *known == tag);
+            let name = known.map_or("of an unknown kind", |(_, name)| *name);
+            let problem = format!(
+                "WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float"
+            );
+            return Err(RecordingError::new(self.file, problem));
+        };
         Ok(WaveFormat {
             channels,
             sample_rate,
@@ -357,89 +375,46 @@ impl ChunkWalker<'_> {
         })
     }
 
-    /// Returns the header of the samples that begin at `start`.
-    fn finish(mut self, start: u64, size: u32) -> Result<WavHeader, RecordingError> {
-        let Some(format) = self.format else {
-            return Err(self.missing("fmt ", " before the samples"));
-        };
-        let channels = usize::from(format.channels);
-        if channels > MAX_CHANNELS {
-            return Err(RecordingError::TooManyChannels {
-                file: self.file.to_owned(),
-                channels,
-                limit: MAX_CHANNELS,
-            });
-        }
-        let frame_bytes = u64::from(format.channels) * format.coding.bytes();
-        let (frames, warning) = self.count_frames(start, size, frame_bytes)?;
-        Ok(WavHeader {
-            sample_rate: format.sample_rate,
-            channels,
-            coding: format.coding,
-            frame_bytes,
-            data_start: start,
-            frames,
-            warnings: warning.into_iter().collect(),
-        })
-    }
-
-    /// Counts the complete frames that the file holds from `start`, whatever `size` promises.
+    /// Counts the complete frames that the file holds from `start`, whatever number of bytes is promised.
     fn count_frames(
         &mut self,
         start: u64,
-        size: u32,
+        promised: u64,
         frame_bytes: u64,
     ) -> Result<(u64, Option<RecordingWarning>), RecordingError> {
         let available = self.length.saturating_sub(start);
-        let promised = match (size, self.long_data_size) {
-            (u32::MAX, Some(long)) => long,
-            _ => u64::from(size),
-        };
         // Sizes that writers put in before they know the size.
         let unset = promised == 0 || promised == u64::from(u32::MAX) || promised == u64::MAX;
-        let closed_and_empty = promised == 0 && self.only_chunks_follow(start)?;
+        // 0 is the truth, and not the mark of a crash, where well-formed, known chunks fill the rest of the file.
+        let mut at = start;
+        if promised == 0 {
+            for _ in 0..MAX_CHUNKS {
+                match self.chunk_header(at)? {
+                    Some((name, size)) if KNOWN_CHUNKS.contains(&&name) => {
+                        at = self.after_chunk(at + 8, u64::from(size))?;
+                    }
+                    _ => break,
+                }
+            }
+        }
         let bytes = match unset {
-            _ if closed_and_empty => 0,
+            _ if promised == 0 && at >= self.length => 0,
             true => available,
             false => promised.min(available),
         };
         let frames = bytes / frame_bytes;
         if frames == 0 {
-            return Err(RecordingError::NoSamples {
-                file: self.file.to_owned(),
-            });
+            return Err(RecordingError::no_samples(self.file));
         }
-        let warning = if unset {
-            Some(RecordingWarning::UnknownLength {
-                size: promised,
-                present: frames,
-            })
-        } else if promised / frame_bytes > frames {
-            Some(RecordingWarning::Truncated {
-                present: frames,
-                promised: promised / frame_bytes,
-            })
+        let doubt = if unset {
+            let message = format!(
+                "the header gives no valid length (data size {promised}); the recorder probably stopped without closing the file; read to the end of the file, {frames} samples per channel"
+            );
+            Some(RecordingWarning::new("unknown-length", message))
         } else {
-            None
+            RecordingWarning::truncated(frames, promised / frame_bytes)
         };
-        Ok((frames, warning))
-    }
-
-    /// Returns `true` where well-formed, known chunks fill the file from `at` to its end: then a data size of 0
-    /// is the truth and not the mark of a crash.
-    fn only_chunks_follow(&mut self, mut at: u64) -> Result<bool, RecordingError> {
-        for _ in 0..MAX_CHUNKS {
-            if at >= self.length {
-                return Ok(true);
-            }
-            match self.chunk_header(at)? {
-                Some((name, size)) if KNOWN_CHUNKS.contains(&&name) => {
-                    at = self.after_chunk(at + 8, u64::from(size))?;
-                }
-                _ => return Ok(false),
-            }
-        }
-        Ok(false)
+        Ok((frames, doubt))
     }
 
     /// Reads as much of `into` as the file has at `at`.
@@ -450,27 +425,21 @@ impl ChunkWalker<'_> {
         let read = self
             .reader
             .seek(SeekFrom::Start(at))
-            .and_then(|_| read_fully(self.reader, into));
+            .and_then(|_| read_fully(&mut self.reader, into));
         read.map_err(|source| unreadable(self.file, source))
     }
 
-    fn missing(&self, chunk: &'static str, place: &'static str) -> RecordingError {
-        WavError::MissingChunk {
-            file: self.file.to_owned(),
-            chunk,
-            place,
-        }
-        .into()
+    fn missing(&self, chunk: &str, place: &str) -> RecordingError {
+        let problem = format!(
+            "no \"{chunk}\" chunk{place}: not a usable WAV file; record or export it again"
+        );
+        RecordingError::new(self.file, problem)
     }
 
-    fn bad_header(&self, field: &'static str, value: u64, allowed: &'static str) -> RecordingError {
-        WavError::BadHeader {
-            file: self.file.to_owned(),
-            field,
-            value,
-            allowed,
-        }
-        .into()
+    fn bad_header(&self, field: &str, value: u64, allowed: &str) -> RecordingError {
+        let problem =
+            format!("the WAV header says {field} {value}; allowed: {allowed}; export it again");
+        RecordingError::new(self.file, problem)
     }
 }
 
@@ -519,51 +488,20 @@ impl Coding {
             Self::Float { .. } => None,
         }
     }
-
-    /// Decodes whole samples; integers with full scale 1.
-    fn decode(self, bytes: &[u8], into: &mut Vec<f64>) {
-        match self {
-            Self::Float { bits: 32 } => {
-                let (samples, _) = bytes.as_chunks::<4>();
-                into.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
-            }
-            Self::Float { .. } => {
-                let (samples, _) = bytes.as_chunks::<8>();
-                into.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
-            }
-            Self::Integer { bits: 8, .. } => {
-                into.extend(bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
-            }
-            Self::Integer { bits, full, .. } => {
-                let full_scale = 2_f64.powi(i32::from(full) - 1);
-                let width = usize::from(bits / 8);
-                for sample in bytes.chunks_exact(width) {
-                    // Filled from the high end and shifted down again, so that the sign extends itself.
-                    let mut padded = [0_u8; 4];
-                    padded[4 - width..].copy_from_slice(sample);
-                    let value = i32::from_le_bytes(padded) >> (32 - bits);
-                    into.push(f64::from(value) / full_scale);
-                }
-            }
-        }
-    }
 }
 
 /// Names of the codings that occur in WAV files (mmreg.h).
-fn coding_name(tag: u16) -> &'static str {
-    match tag {
-        0x0001 => "integer PCM",
-        0x0002 => "Microsoft ADPCM",
-        0x0003 => "IEEE float",
-        0x0006 => "A-law",
-        0x0007 => "mu-law",
-        0x0011 => "IMA ADPCM",
-        0x0031 => "GSM 6.10",
-        0x0050 => "MPEG",
-        0x0055 => "MP3",
-        0x00ff => "AAC",
-        0x0161 => "Windows Media Audio",
-        0xfffe => "extensible without a subformat",
-        _ => "of an unknown kind",
-    }
-}
+const CODINGS: [(u16, &str); 12] = [
+    (0x0001, "integer PCM"),
+    (0x0002, "Microsoft ADPCM"),
+    (0x0003, "IEEE float"),
+    (0x0006, "A-law"),
+    (0x0007, "mu-law"),
+    (0x0011, "IMA ADPCM"),
+    (0x0031, "GSM 6.10"),
+    (0x0050, "MPEG"),
+    (0x0055, "MP3"),
+    (0x00ff, "AAC"),
+    (0x0161, "Windows Media Audio"),
+    (0xfffe, "extensible without a subformat"),
+];

@@ -5,9 +5,9 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::error::{RecordingError, UffError};
+use super::error::RecordingError;
 use super::health::{check_finite, check_rate, check_samples};
-use super::responses::{FrequencyResponse, FrequencyResponses};
+use super::responses::{FrequencyResponse, FrequencyResponses, not_finite};
 use super::uff::Point;
 use super::units::ResponseForm;
 
@@ -71,12 +71,12 @@ impl WavLayout {
             .saturating_mul(u64::from(self.format.bits() / 8));
         // 128 bytes are more than the header takes.
         if self.channels > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
-            return Err(RecordingError::TooLarge {
-                file: name.to_owned(),
-                channels: self.channels,
-                frames: usize::try_from(frames).unwrap_or(usize::MAX),
-                bits: self.format.bits(),
-            });
+            let problem = format!(
+                "{} channels of {frames} samples at {} bits do not fit into a WAV file; allowed: 1 to 65535 channels and less than 4 GiB; write less",
+                self.channels,
+                self.format.bits()
+            );
+            return Err(RecordingError::new(name, problem));
         }
         Ok(())
     }
@@ -227,12 +227,12 @@ impl<W: Write + Seek> WavEncoder<W> {
 
     fn write(&mut self, frame: &[f64]) -> Result<(), RecordingError> {
         if frame.len() != self.layout.channels {
-            return Err(RecordingError::LengthMismatch {
-                file: self.name.clone(),
-                channel: 1,
-                found: frame.len(),
-                expected: self.layout.channels,
-            });
+            let problem = format!(
+                "a frame has {} values for {} channels; give one value for each channel",
+                frame.len(),
+                self.layout.channels
+            );
+            return Err(RecordingError::new(&self.name, problem));
         }
         let rate = f64::from(self.layout.sample_rate);
         let full_scale = 2_f64.powi(i32::from(self.layout.format.bits()) - 1);
@@ -256,7 +256,7 @@ impl<W: Write + Seek> WavEncoder<W> {
     /// Completes the header. Returns the bytes of all samples, and how many samples were clipped.
     fn finish(self) -> Result<(u64, u64), RecordingError> {
         if self.written == 0 {
-            return Err(RecordingError::NoSamples { file: self.name });
+            return Err(RecordingError::no_samples(&self.name));
         }
         self.wav
             .finalize()
@@ -329,7 +329,7 @@ const SI_UNITS: &str = "    -1\n   164\n         1SI: Meter (newton)           2
 pub fn encode_frequency_responses_uff(
     responses: &FrequencyResponses,
     format: UffFormat,
-) -> Result<Vec<u8>, UffError> {
+) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = SI_UNITS.as_bytes().to_vec();
     for (number, response) in (1..).zip(&responses.responses) {
         let parts = response
@@ -367,24 +367,18 @@ fn check_values(
     response: usize,
     width: usize,
     values: &[f64],
-) -> Result<(), UffError> {
-    let file = responses.file.clone();
-    if values.len() != responses.lines.saturating_mul(width) {
-        return Err(UffError::LengthMismatch {
-            file,
-            response,
-            found: values.len() / width,
-            expected: responses.lines,
-        });
+) -> Result<(), RecordingError> {
+    let (file, lines) = (&responses.file, responses.lines);
+    if values.len() != lines.saturating_mul(width) {
+        let found = values.len() / width;
+        let problem = format!(
+            "response {response} has {found} values, the lines are {lines}; give equal numbers"
+        );
+        return Err(RecordingError::new(file, problem));
     }
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(at) => Err(UffError::NotFinite {
-            file,
-            dataset: response,
-            point: (at / width) as u64 + 1,
-            value: values.get(at).copied().unwrap_or(f64::NAN),
-        }),
+        Some(at) => Err(not_finite(file, response, at / width, values[at])),
     }
 }
 

@@ -87,21 +87,6 @@ impl SpectralAverager {
         }
     }
 
-    /// Gfx/Gff of each response, 0 where the force has no power at all.
-    fn h1(&self) -> Vec<Vec<Complex64>> {
-        let mut h1 = self.cross.clone();
-        for values in &mut h1 {
-            for (value, &power) in values.iter_mut().zip(&self.force_power) {
-                *value = if power > 0.0 {
-                    *value / power
-                } else {
-                    Complex64::ZERO
-                };
-            }
-        }
-        h1
-    }
-
     /// The averages; `None` before the first tap.
     pub fn finish(mut self) -> Option<AveragedSpectra> {
         if self.taps == 0 {
@@ -115,12 +100,21 @@ impl SpectralAverager {
         powers.flatten().for_each(|power| *power *= share);
         self.cross.iter_mut().flatten().for_each(|x| *x *= share);
         let has_force = self.force_power.iter().any(|&power| power > 0.0);
+        let mut h1 = self.cross.clone();
+        for values in &mut h1 {
+            for (value, &power) in values.iter_mut().zip(&self.force_power) {
+                *value = match power > 0.0 {
+                    true => *value / power,
+                    false => Complex64::ZERO,
+                };
+            }
+        }
         Some(AveragedSpectra {
             lines: self.lines,
             taps: self.taps,
             force: has_force.then(|| roots(&self.force_power)),
             responses: self.response_power.iter().map(|g| roots(g)).collect(),
-            h1: has_force.then(|| self.h1()),
+            h1: has_force.then_some(h1),
             response_power: self.response_power,
             cross: has_force.then_some(self.cross),
             force_power: has_force.then_some(self.force_power),
@@ -187,7 +181,7 @@ pub fn average_records(
     let parts: Vec<SpectralAverager> = records
         .par_chunks(share)
         .map(|records| {
-            let mut sum = SpectralAverager::new(*transformer.lines(), responses);
+            let mut sum = SpectralAverager::new(transformer.lines, responses);
             let mut workspace = Workspace::default();
             let mut of_force = Vec::new();
             let mut of_responses = vec![Vec::new(); responses];
@@ -204,7 +198,7 @@ pub fn average_records(
             sum
         })
         .collect();
-    let mut sum = SpectralAverager::new(*transformer.lines(), responses);
+    let mut sum = SpectralAverager::new(transformer.lines, responses);
     parts.iter().for_each(|part| sum.merge(part));
     sum.finish()
 }
@@ -256,26 +250,24 @@ impl LinePowers {
             FrfEstimator::H1 => self.cross / self.force,
             // H2 = Gxx/Gxf, Gxf = conj(Gfx).
             FrfEstimator::H2 => self.response / self.cross.conj(),
-            FrfEstimator::Hv => self.total_least_squares(),
+            // Hv = (Gxx - Gff + sqrt((Gff - Gxx)^2 + 4 |Gfx|^2)) / (2 Gxf): Shin & Hammond, "Fundamentals of
+            // Signal Processing for Sound and Vibration Engineers", page 293, with equal noise powers, as in
+            // pyFRF 1.5.0 (`get_Hv`). (1, Hv) is the eigenvector of [[Gff, Gfx], [Gxf, Gxx]] transposed that
+            // belongs to its largest eigenvalue. |H1| <= |Hv| <= |H2|. Equal powers of N and m/s2 are a
+            // matter of units: where |H| is much above 1 Hv goes towards H2, much below towards H1.
+            FrfEstimator::Hv => {
+                let difference = self.force - self.response;
+                let root = difference.hypot(2.0 * self.cross.norm());
+                if difference > 0.0 {
+                    // The same number without the difference of two nearly equal ones:
+                    // (root - difference)(root + difference) = 4 |Gfx|^2.
+                    2.0 * self.cross / (root + difference)
+                } else {
+                    (root - difference) / (2.0 * self.cross.conj())
+                }
+            }
         };
         value.is_finite().then_some(value)
-    }
-
-    /// Hv = (Gxx - Gff + sqrt((Gff - Gxx)^2 + 4 |Gfx|^2)) / (2 Gxf): Shin & Hammond, "Fundamentals of
-    /// Signal Processing for Sound and Vibration Engineers", page 293, with equal noise powers, as in
-    /// pyFRF 1.5.0 (`get_Hv`). (1, Hv) is the eigenvector of [[Gff, Gfx], [Gxf, Gxx]] transposed that
-    /// belongs to its largest eigenvalue. |H1| <= |Hv| <= |H2|. Equal powers of N and m/s2 are a
-    /// matter of units: where |H| is much above 1 Hv goes towards H2, much below towards H1.
-    fn total_least_squares(&self) -> Complex64 {
-        let difference = self.force - self.response;
-        let root = difference.hypot(2.0 * self.cross.norm());
-        if difference > 0.0 {
-            // The same number without the difference of two nearly equal ones:
-            // (root - difference)(root + difference) = 4 |Gfx|^2.
-            2.0 * self.cross / (root + difference)
-        } else {
-            (root - difference) / (2.0 * self.cross.conj())
-        }
     }
 
     /// Coherence g2 = |Gfx|^2/(Gff Gxx), the share of the response's power that follows the force.

@@ -12,8 +12,8 @@ pub use average::{
     AveragedSpectra, FrfEstimator, LinePowers, LineQuality, SpectralAverager, TapRecord,
     average_records, random_error,
 };
-pub(crate) use transform::{Decimator, bessel_i0, kaiser_beta};
-pub use transform::{Transformer, Workspace, band_limited, chirp_z, transform_block};
+pub(crate) use transform::kaiser_beta;
+pub use transform::{Transformer, Workspace, band_limited, transform_block};
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,
     line_amplitude, measure_decay, noise_beside, noise_power,
@@ -88,23 +88,9 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Lines of a block without a zoom band: 0 to rate/2.56, spacing rate/block.
-    ///
-    /// `available` is the length of signal at hand (s).
-    ///
-    /// # Errors
-    /// [`SpectralError::Block`] for a block outside [`LEAST_BLOCK`] to [`MOST_BLOCK`] samples,
-    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band.
-    pub fn baseband(
-        sample_rate: f64,
-        block: usize,
-        available: f64,
-    ) -> Result<Lines, SpectralError> {
-        let band = (0.0, sample_rate / DISPLAY_RATIO);
-        Self::zoom(band, sample_rate, block, available)
-    }
-
     /// Lines of a zoom band, low and high end (Hz), with `block` real samples at the zoomed rate.
+    ///
+    /// Without zoom the band is 0 to rate/2.56. `available` is the length of signal at hand (s).
     ///
     /// # Errors
     /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,

@@ -6,7 +6,7 @@
 //! depth (1 + r)/(1 - r) in the force spectrum, for |1 + r e^{-j omega d}| swings between 1 + r and
 //! 1 - r, but without the spectrum's trouble to tell a ripple of long period from the pulse's own fall.
 
-use super::hammer::{Force, half_width};
+use super::search::{Force, half_width};
 use super::{Event, TapSettings};
 use tapjoint_numerics::stats::median;
 
@@ -93,7 +93,19 @@ pub(super) fn second_hit(
         .into_iter()
         .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
         .filter(|copy| copy.ratio >= settings.double_hit_warning)?;
-    let size = main.size_of(&largest);
+    let mut size = largest.ratio;
+    // The height of a pulse two samples wide between them is not known (a narrower and higher copy fits as well), but
+    // an anti-alias filter keeps its impulse, which is also what the spectrum ripples by.
+    if main.width < FORM_SHOWS {
+        let place = largest.place.round().max(0.0) as usize;
+        // An anti-alias filter rings for some samples about each pulse; half the way to the other is its own.
+        let reach = (3 * main.reach).min(main.crest.abs_diff(place) / 2);
+        let ratio = main.impulse(place, reach) / main.impulse(main.crest, reach);
+        // Beyond that something else lies beside one of the two.
+        if (0.5..=2.0).contains(&(ratio / size)) {
+            size = ratio;
+        }
+    }
     Some(SecondHit {
         delay: (largest.place - main.crest as f64).abs() / force.rate,
         // The crest that is read higher may have the smaller impulse.
@@ -128,21 +140,6 @@ impl<'a> Pulse<'a> {
         }
     }
 
-    /// A second hit's size. The height of a pulse two samples wide between them is not known (a narrower and higher
-    /// copy fits as well), but an anti-alias filter keeps its impulse, which is also what the spectrum ripples by.
-    fn size_of(&self, copy: &PulseCopy) -> f64 {
-        if self.width >= FORM_SHOWS {
-            return copy.ratio;
-        }
-        let place = copy.place.round().max(0.0) as usize;
-        // An anti-alias filter rings for some samples about each pulse; half the way to the other is its own.
-        let reach = (3 * self.reach).min(self.crest.abs_diff(place) / 2);
-        let ratio = self.impulse(place, reach) / self.impulse(self.crest, reach);
-        // Beyond that something else lies beside one of the two.
-        let is_alike = (0.5..=2.0).contains(&(ratio / copy.ratio));
-        if is_alike { ratio } else { copy.ratio }
-    }
-
     /// Sum of the samples within the reach of a crest, above the median of as many beyond it; those at its ends
     /// count half, so that a ringing from sample to sample leaves nothing.
     fn impulse(&self, crest: usize, reach: usize) -> f64 {
@@ -169,6 +166,28 @@ impl<'a> Pulse<'a> {
     fn is_clear(&self, index: usize) -> bool {
         self.crest.abs_diff(index) as f64 >= LEAST_DELAY * self.width
     }
+
+    /// Returns `true` for a crest that is ringing, `peak` above `base`.
+    ///
+    /// An anti-alias filter rings around a short pulse, and a hammer's own resonance after a long one,
+    /// swinging as far down as up; a hammer never pulls. A crest right beside a comparable downward swing is
+    /// such ringing: within twice its own width, or three samples, on either side.
+    fn is_ringing(&self, place: usize, peak: f64, base: f64) -> bool {
+        let samples = self.samples;
+        let (before, after) = samples.split_at(place.min(samples.len()));
+        let right = after.iter().take_while(|x| **x - base > 0.5 * peak);
+        let left = before.iter().rev().take_while(|x| **x - base > 0.5 * peak);
+        let width = right.count() + left.count();
+        // Not beyond the crest of the pulse itself.
+        let reach = (2 * width).max(3).min(self.crest.abs_diff(place));
+        let beside = before
+            .iter()
+            .rev()
+            .take(reach)
+            .chain(after.iter().take(reach));
+        let lowest = beside.map(|x| x - base).fold(0.0, f64::min);
+        -lowest > 0.5 * peak
+    }
 }
 
 /// Copies of the pulse, at least `least` of its height.
@@ -183,12 +202,9 @@ fn copies(main: &Pulse, least: f64) -> Vec<PulseCopy> {
     let downward = fitted(main, &crests, -1.0, limit);
     let deepest = downward.iter().map(|copy| -copy.ratio).fold(0.0, f64::max);
     upward.retain(|copy| {
-        let crest = Crest {
-            place: (copy.place.round().max(0.0) as usize).min(main.samples.len() - 1),
-            peak: copy.ratio * main.peak,
-            base: copy.base,
-        };
-        copy.ratio >= OVER_DOWNWARD * deepest && !is_ringing(main, &crest)
+        let place = (copy.place.round().max(0.0) as usize).min(main.samples.len() - 1);
+        copy.ratio >= OVER_DOWNWARD * deepest
+            && !main.is_ringing(place, copy.ratio * main.peak, copy.base)
     });
     upward
 }
@@ -196,7 +212,18 @@ fn copies(main: &Pulse, least: f64) -> Vec<PulseCopy> {
 /// Height of the force, smoothed over half a width, above its mean at the reach to either side,
 /// c(t) = s(t) - (s(t - k) + s(t + k))/2: offset and slope drop out, a pulse keeps its height.
 fn crests(main: &Pulse) -> Vec<f64> {
-    let smooth = smoothed(main.samples, (main.width / 4.0).round() as usize);
+    let mut sums = vec![0.0];
+    for x in main.samples {
+        sums.push(sums[sums.len() - 1] + x);
+    }
+    let reach = (main.width / 4.0).round() as usize;
+    let smooth: Vec<f64> = (0..main.samples.len())
+        .map(|index| {
+            let first = index.saturating_sub(reach);
+            let end = (index + reach + 1).min(main.samples.len());
+            (sums[end] - sums[first]) / (end - first) as f64
+        })
+        .collect();
     let last = smooth.len().saturating_sub(1);
     let mut crests = Vec::with_capacity(smooth.len());
     for (index, x) in smooth.iter().enumerate() {
@@ -205,21 +232,6 @@ fn crests(main: &Pulse) -> Vec<f64> {
         crests.push(x - 0.5 * (before + after));
     }
     crests
-}
-
-/// Mean over `reach` samples to either side.
-fn smoothed(samples: &[f64], reach: usize) -> Vec<f64> {
-    let mut sums = vec![0.0];
-    for x in samples {
-        sums.push(sums[sums.len() - 1] + x);
-    }
-    (0..samples.len())
-        .map(|index| {
-            let first = index.saturating_sub(reach);
-            let end = (index + reach + 1).min(samples.len());
-            (sums[end] - sums[first]) / (end - first) as f64
-        })
-        .collect()
 }
 
 /// Standard deviation of the crests away from the pulse, by their median magnitude: noise, hum, and
@@ -268,76 +280,31 @@ fn excursion(main: &Pulse, noise: f64, own: usize, settings: &TapSettings) -> Op
     let limit = (settings.double_hit * main.peak).max(OVER_NOISE * noise);
     let rearm = (settings.rearm * main.peak).max(3.0 * noise);
     let samples = main.samples.get(..own)?;
-    excursions(samples, limit, rearm)
-        .into_iter()
-        .filter(|other| main.crest.abs_diff(other.place) as f64 > main.width)
-        .filter(|other| !is_ringing(main, other))
-        .filter(|other| {
-            let width = half_width(samples, other.place);
-            width <= OTHER_WIDTH * main.width + 2.0 && OTHER_WIDTH * width + 2.0 >= main.width
-        })
-        .max_by(|a, b| a.peak.total_cmp(&b.peak))
-        .map(|other| PulseCopy {
-            place: other.place as f64,
-            ratio: other.peak / main.peak,
-            base: 0.0,
-        })
-}
-
-/// One crest of the force.
-struct Crest {
-    place: usize,
-    /// Its height above `base`.
-    peak: f64,
-    base: f64,
-}
-
-impl Crest {
-    /// Returns `true` for a force above half of the crest's height.
-    fn is_above_half(&self, force: f64) -> bool {
-        force - self.base > 0.5 * self.peak
-    }
-}
-
-fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Crest> {
-    let mut found: Vec<Crest> = Vec::new();
+    let mut found: Vec<(usize, f64)> = Vec::new();
     let mut armed = true;
-    for (place, &peak) in force.iter().enumerate() {
-        let crest = Crest {
-            place,
-            peak,
-            base: 0.0,
-        };
-        if armed && peak > limit {
-            found.push(crest);
+    for (place, &force) in samples.iter().enumerate() {
+        if armed && force > limit {
+            found.push((place, force));
             armed = false;
-        } else if !armed && peak < rearm {
+        } else if !armed && force < rearm {
             armed = true;
-        } else if let Some(open) = found.last_mut().filter(|open| !armed && peak > open.peak) {
-            *open = crest;
+        } else if let Some(open) = found.last_mut().filter(|open| !armed && force > open.1) {
+            *open = (place, force);
         }
     }
-    found
-}
-
-/// An anti-alias filter rings around a short pulse, and a hammer's own resonance after a long one,
-/// swinging as far down as up; a hammer never pulls. A crest right beside a comparable downward swing is
-/// such ringing: within twice its own width, or three samples, on either side.
-fn is_ringing(main: &Pulse, other: &Crest) -> bool {
-    let force = main.samples;
-    let (before, after) = force.split_at(other.place.min(force.len()));
-    let right = after.iter().take_while(|x| other.is_above_half(**x));
-    let left = before.iter().rev().take_while(|x| other.is_above_half(**x));
-    let width = right.count() + left.count();
-    // Not beyond the crest of the pulse itself.
-    let reach = (2 * width).max(3).min(main.crest.abs_diff(other.place));
-    let beside = before
-        .iter()
-        .rev()
-        .take(reach)
-        .chain(after.iter().take(reach));
-    let lowest = beside.map(|x| x - other.base).fold(0.0, f64::min);
-    -lowest > 0.5 * other.peak
+    found.retain(|(place, peak)| {
+        let width = half_width(samples, *place);
+        main.crest.abs_diff(*place) as f64 > main.width
+            && !main.is_ringing(*place, *peak, 0.0)
+            && width <= OTHER_WIDTH * main.width + 2.0
+            && OTHER_WIDTH * width + 2.0 >= main.width
+    });
+    let (place, peak) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(PulseCopy {
+        place: place as f64,
+        ratio: peak / main.peak,
+        base: 0.0,
+    })
 }
 
 /// Widths of a second pulse that are tried, as multiples of the first one's. A weaker blow lasts a
@@ -366,22 +333,6 @@ struct PulseCopy {
 }
 
 impl Pulse<'_> {
-    /// The pulse at `offset` samples from its crest, by the cubic through the four samples about it (Catmull and
-    /// Rom); 0 beyond its reach.
-    fn at(&self, offset: f64) -> f64 {
-        if offset.abs() > self.reach as f64 {
-            return 0.0;
-        }
-        let place = self.crest as f64 + offset;
-        let index = place.floor();
-        let u = place - index;
-        let [a, b, c, d] = [-1, 0, 1, 2].map(|step| clamped(self.samples, index as i64 + step));
-        let slope = c - a;
-        let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
-        let third = 3.0 * (b - c) + d - a;
-        b + 0.5 * u * (slope + u * (second + u * third))
-    }
-
     /// The copy near `place`; `None` where the force there has another shape or width.
     fn fit(&self, place: usize) -> Option<PulseCopy> {
         // The first search runs over all widths with a coarse delay, the second over the best alone.
@@ -428,7 +379,21 @@ impl Pulse<'_> {
         let (mut pp, mut py, mut yy) = (0.0, 0.0, 0.0);
         for step in -reach..=reach {
             let t = step as f64;
-            let p = self.at((t - offset) / width);
+            // The pulse about its crest, by the cubic through four samples (Catmull and Rom); 0 beyond its reach.
+            let from_crest = (t - offset) / width;
+            let p = if from_crest.abs() > self.reach as f64 {
+                0.0
+            } else {
+                let at = self.crest as f64 + from_crest;
+                let index = at.floor();
+                let u = at - index;
+                let [a, b, c, d] =
+                    [-1, 0, 1, 2].map(|step| clamped(self.samples, index as i64 + step));
+                let slope = c - a;
+                let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
+                let third = 3.0 * (b - c) + d - a;
+                b + 0.5 * u * (slope + u * (second + u * third))
+            };
             let y = clamped(self.samples, place as i64 + step);
             p_sum += p;
             p_slope += p * t;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use tapjoint_beam::effects::{Effect, EffectId, Group, Place};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
-/// How many recordings a drawn test has.
+/// The number of recordings of a drawn test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// Five recordings: two sensors, one of them moved once; three tap positions; two levels; six
@@ -52,9 +52,9 @@ impl Class {
 /// One planted effect.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Planted {
-    /// Of the catalogue, with its parameters by name (SI).
+    /// An effect of the catalogue, with its parameters by name (SI).
     Catalogue(EffectId, BTreeMap<String, f64>),
-    /// Of a kind that the catalogue does not have.
+    /// Something of a kind that the catalogue does not have.
     OutOfCatalogue(String),
 }
 
@@ -126,8 +126,9 @@ impl Truth {
     }
 }
 
-/// The answer of the diagnosis to one test.
-#[derive(Debug, Clone, PartialEq)]
+/// The answer of the diagnosis to one test; the default where it could not be diagnosed: no verdict and no
+/// probabilities.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Answer {
     /// Verdict of the diagnosis; `None` where the test could not be analysed or diagnosed.
     pub verdict: Option<Verdict>,
@@ -139,7 +140,7 @@ pub struct Answer {
     pub places: Vec<(Option<Place>, f64)>,
     /// Estimated parameters of the named effects (SI).
     pub parameters: Vec<(EffectId, String, f64)>,
-    /// How far the gap closes on withheld data; `None` where it was too small to say.
+    /// Share (1) of the gap that closes on withheld data; `None` where it was too small to say.
     pub closure: Option<f64>,
 }
 
@@ -219,29 +220,23 @@ impl Answer {
             .iter()
             .find(|found| matches!(&found.hypothesis, Hypothesis::Effects(own) if *own == effects));
         let parameters = named.into_iter().flat_map(|found| &found.parameters);
+        let p = &diagnosis.locations;
         Self {
             verdict: Some(diagnosis.verdict.clone()),
             classes: classes(diagnosis),
-            places: places(diagnosis),
+            places: vec![
+                (Some(Place::Joint), p.joint),
+                (Some(Place::Fixture), p.fixture),
+                (Some(Place::Sensor), p.sensor),
+                (Some(Place::Body), p.body),
+                (Some(Place::Acquisition), p.acquisition),
+                (None, p.unknown),
+            ],
             parameters: parameters
                 .map(|value| (value.effect, value.name.to_owned(), value.value))
                 .collect(),
-            closure: named
-                .and_then(|found| found.closure)
-                .map(|closure| closure.value),
+            closure: named.and_then(|found| Some(found.closure?.value)),
             effects,
-        }
-    }
-
-    /// Returns the answer to a test that could not be diagnosed: no verdict and no probabilities.
-    pub fn none() -> Self {
-        Self {
-            verdict: None,
-            effects: Vec::new(),
-            classes: BTreeMap::new(),
-            places: Vec::new(),
-            parameters: Vec::new(),
-            closure: None,
         }
     }
 }
@@ -265,16 +260,4 @@ fn classes(diagnosis: &Diagnosis) -> BTreeMap<Class, f64> {
         classes.values_mut().for_each(|p| *p /= sum);
     }
     classes
-}
-
-fn places(diagnosis: &Diagnosis) -> Vec<(Option<Place>, f64)> {
-    let p = &diagnosis.locations;
-    vec![
-        (Some(Place::Joint), p.joint),
-        (Some(Place::Fixture), p.fixture),
-        (Some(Place::Sensor), p.sensor),
-        (Some(Place::Body), p.body),
-        (Some(Place::Acquisition), p.acquisition),
-        (None, p.unknown),
-    ]
 }

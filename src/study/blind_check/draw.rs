@@ -21,7 +21,6 @@ use tapjoint_description::{DescriptionError, TestDescription};
 use tapjoint_diagnosis::{
     GapError, GapSettings, Hypothesis, diagnose, nominal_chi_square, observe,
 };
-use tapjoint_identify::observation::Observations;
 use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
 use tapjoint_simulate::{
     Damping, Laboratory, ObservedStructure, SimulateError, TestPlan, VirtualRecording, add_noise,
@@ -39,7 +38,7 @@ pub struct Campaign {
     pub outside: usize,
     /// Tests with two effects.
     pub pairs: usize,
-    /// What is recorded.
+    /// Recordings of each test.
     pub extent: Extent,
     /// Noise of the responses below their root mean square (dB). 60.
     pub noise_db: f64,
@@ -79,19 +78,19 @@ enum Plant {
 pub struct DrawnTest {
     /// Its description with the joint's stiffnesses, which the diagnosis does not see.
     pub text: String,
-    /// The same, read.
+    /// The description, read.
     pub description: TestDescription,
     /// The effects, the joint's drift among them.
     pub effects: Vec<Effect>,
     /// Faults that no effect of the catalogue describes.
     pub fastened: Fastened,
-    /// How it is recorded.
+    /// The laboratory that records it.
     pub laboratory: Laboratory,
     /// Noise of the responses below their root mean square (dB).
     pub noise_db: f64,
     /// Modes in its band.
     pub modes: usize,
-    /// What was planted.
+    /// The planted effects.
     pub truth: Truth,
     /// Seed of the recording.
     pub seed: u64,
@@ -120,7 +119,7 @@ pub struct Recorded {
 /// Noise of the hammer's channel lies so far below that of the responses, seen from the peak (dB).
 const FORCE_MARGIN_DB: f64 = 20.0;
 
-/// Why a test cannot be drawn or recorded: a defect of this module.
+/// A reason for which a test cannot be drawn or recorded: a defect of this module.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
     /// The drawn description cannot be read.
@@ -138,7 +137,7 @@ pub enum DrawError {
     /// A drawn test is no plan.
     #[error("what a drawn test can show cannot be planned: {0}")]
     Plan(#[from] PlanError),
-    /// What a drawn test can show cannot be said.
+    /// The limits of a drawn test cannot be told.
     #[error("what a drawn test can show cannot be said: {0}")]
     Limits(#[from] GapError),
     /// The nominal description cannot be written.
@@ -341,8 +340,20 @@ impl DrawnTest {
         if kind == CaseKind::Null {
             return Ok(truth);
         }
-        let (readings, settings) = (self.exact()?, GapSettings::default());
+        // Readings without scatter, on a mesh and by a code that the diagnosis does not use.
+        let planned = PlanSettings {
+            modes: self.modes,
+            frequency_std: FREQUENCY_STD,
+            drift: 0.0,
+            ..PlanSettings::default()
+        };
+        let mut plan = plan_of(&self.description, &planned)?;
+        plan.scatter = 0.0;
         let nominal = nominal_with(&self.description, None);
+        let mut true_one = nominal.clone();
+        self.fastened.add_to(&mut true_one.specimen);
+        let readings = observe(&plan, &true_one, &self.effects, 0)?;
+        let settings = GapSettings::default();
         if let CaseKind::Single(_) = kind {
             let chi_square = nominal_chi_square(&readings, &nominal, &settings)?;
             truth.detectable = Some(chi_square > NOTICED);
@@ -368,21 +379,6 @@ impl DrawnTest {
         Ok(truth)
     }
 
-    /// Readings without scatter, on a mesh and by a code that the diagnosis does not use.
-    fn exact(&self) -> Result<Observations, DrawError> {
-        let settings = PlanSettings {
-            modes: self.modes,
-            frequency_std: FREQUENCY_STD,
-            drift: 0.0,
-            ..PlanSettings::default()
-        };
-        let mut plan = plan_of(&self.description, &settings)?;
-        plan.scatter = 0.0;
-        let mut truth = nominal_with(&self.description, None);
-        self.fastened.add_to(&mut truth.specimen);
-        Ok(observe(&plan, &truth, &self.effects, 0)?)
-    }
-
     /// Records the test.
     ///
     /// # Errors
@@ -396,10 +392,20 @@ impl DrawnTest {
             seed: self.seed,
         };
         let mut test = plan_test(&plan)?;
-        if !self.fastened.is_empty() {
-            for (number, recording) in test.recordings.iter_mut().enumerate() {
-                self.fasten(recording, number)?;
-            }
+        let described = self.description.recordings.iter();
+        let recordings = test.recordings.iter_mut().zip(described);
+        for (recording, described) in recordings.filter(|_| !self.fastened.is_empty()) {
+            // Adds what no effect describes, and looks at the structure again.
+            self.fastened.add_to(&mut recording.seen.specimen);
+            let sensors = self.description.sensors.iter();
+            let places = sensors.filter_map(|sensor| described.place_of(sensor));
+            recording.structure = ObservedStructure::new(
+                &recording.seen.specimen,
+                &self.laboratory.specimen,
+                &places.collect::<Vec<f64>>(),
+                recording.seen.joint_loss_factor,
+                recording.plan.highest_mode(&self.laboratory),
+            )?;
         }
         let recordings = test.recordings.iter().enumerate();
         Ok(RecordedTest {
@@ -408,24 +414,6 @@ impl DrawnTest {
                 .map(|(n, recording)| self.take(recording, n))
                 .collect(),
         })
-    }
-
-    /// Adds what no effect describes, and looks at the structure again.
-    fn fasten(&self, recording: &mut VirtualRecording, number: usize) -> Result<(), DrawError> {
-        self.fastened.add_to(&mut recording.seen.specimen);
-        let described = &self.description.recordings[number];
-        let sensors = self.description.sensors.iter();
-        let places: Vec<f64> = sensors
-            .filter_map(|sensor| described.place_of(sensor))
-            .collect();
-        recording.structure = ObservedStructure::new(
-            &recording.seen.specimen,
-            &self.laboratory.specimen,
-            &places,
-            recording.seen.joint_loss_factor,
-            recording.plan.highest_mode(&self.laboratory),
-        )?;
-        Ok(())
     }
 
     fn take(&self, recording: &VirtualRecording, number: usize) -> Recorded {

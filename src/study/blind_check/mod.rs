@@ -23,4 +23,4 @@ pub use score::{
     Calibration, Conduct, Rate, ReliabilityBin, SET_SHARE, Scores, always_scale, score, shuffled,
 };
 pub use table::{Row, Target, render_rows, rows};
-pub use truth_file::{TruthDoubt, TruthError, TruthFile, commitment, parse_truths};
+pub use truth_file::{TruthError, TruthFile, commitment, parse_truths};

@@ -23,7 +23,7 @@ pub struct Scores {
     pub failed: usize,
     /// One effect: the most probable effect group is the planted one.
     pub top_1: Rate,
-    /// The same among those that such readings show at all.
+    /// `top_1` of the tests whose effect such readings show at all.
     pub top_1_detectable: Rate,
     /// One effect: the planted group is among the three most probable.
     pub top_3: Rate,
@@ -49,7 +49,7 @@ pub struct Scores {
     pub outside_unknown: Rate,
     /// Several effects: all named, or refused.
     pub several_found_or_refused: Rate,
-    /// The same among those of whose effects each is noticed beside the other.
+    /// `several_found_or_refused` of the tests in which each effect is noticed beside the other.
     pub several_detectable: Rate,
     /// Several effects: all named.
     pub several_found: Rate,
@@ -59,7 +59,7 @@ pub struct Scores {
     pub set_size: Option<f64>,
     /// Mean probability of what was planted where one effect was noticed.
     pub truth_probability: Option<f64>,
-    /// How far stated probabilities can be trusted.
+    /// Trust that the stated probabilities deserve.
     pub calibration: Calibration,
     /// Closure on withheld data where one effect was planted and something was named: median and
     /// tenth percentile.
@@ -94,19 +94,32 @@ pub fn score(cases: &[Case]) -> Scores {
     Scores {
         counts: [&nulls, &singles, &several, &outside].map(Vec::len),
         failed: failed.count(),
-        top_1: Rate::of(&singles, |(t, a)| rank_within(t, a, 1)),
+        top_1: Rate::of(&singles, |(t, a)| Some(rank_within(t, a, 1))),
         top_1_detectable: Rate::of(&singles, |(t, a)| {
-            rank_within(t, a, 1).filter(|_| t.detectable == Some(true))
+            (t.detectable == Some(true)).then(|| rank_within(t, a, 1))
         }),
-        top_3: Rate::of(&singles, |(t, a)| rank_within(t, a, 3)),
+        top_3: Rate::of(&singles, |(t, a)| Some(rank_within(t, a, 3))),
         top_1_of_all: Rate::of(&singles, |(t, a)| {
             Some(a.first().map(|(class, _)| class) == t.class())
         }),
-        place: Rate::of(&singles, |(t, a)| place_right(t, a)),
+        place: Rate::of(&singles, |(t, a)| {
+            let found = a.places.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            let place = found.and_then(|(place, _)| *place);
+            // A group over two places counts as right in either.
+            let mut members = EffectId::ALL.iter().filter(|id| is_class(t, id.group()));
+            Some(members.any(|id| Some(id.place()) == place))
+        }),
         named_right: Rate::of(&singles, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
         named: Rate::of(&singles, |(_, a)| Some(is_named(a))),
         named_right_of_all: Rate::of(cases, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
-        null_called_effect: Rate::of(&nulls, |(_, a)| Some(calls_effect(a))),
+        // The verdict makes its reader believe in an effect.
+        null_called_effect: Rate::of(&nulls, |(_, a)| {
+            Some(match &a.verdict {
+                Some(Verdict::Named(_) | Verdict::Group(_)) => true,
+                Some(Verdict::Set(_)) => !a.set(SET_SHARE).contains(&Class::None),
+                Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
+            })
+        }),
         null_false_alarm: Rate::of(&nulls, |(_, a)| {
             Some(matches!(a.first(), Some((Class::Group(_), _))))
         }),
@@ -139,15 +152,6 @@ fn is_named(answer: &Answer) -> bool {
     matches!(answer.verdict, Some(Verdict::Named(_)))
 }
 
-/// Returns true where the verdict makes its reader believe in an effect.
-fn calls_effect(answer: &Answer) -> bool {
-    match &answer.verdict {
-        Some(Verdict::Named(_) | Verdict::Group(_)) => true,
-        Some(Verdict::Set(_)) => !answer.set(SET_SHARE).contains(&Class::None),
-        Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
-    }
-}
-
 /// Returns true where the verdict leaves the case open: neither an effect nor "nothing is missing".
 fn is_refused(answer: &Answer) -> bool {
     matches!(
@@ -160,28 +164,14 @@ fn found_or_refused(truth: &Truth, answer: &Answer) -> bool {
     is_refused(answer) || is_named(answer) && names_exactly(truth, answer)
 }
 
-fn rank_within(truth: &Truth, answer: &Answer, most: usize) -> Option<bool> {
-    let Some(Class::Group(group)) = truth.class() else {
-        return None;
-    };
-    Some(
-        answer
-            .groups()
-            .iter()
-            .take(most)
-            .any(|&found| found == group),
-    )
+fn is_class(truth: &Truth, group: Group) -> bool {
+    truth.class() == Some(Class::Group(group))
 }
 
-/// A group over two places counts as right in either.
-fn place_right(truth: &Truth, answer: &Answer) -> Option<bool> {
-    let Some(Class::Group(group)) = truth.class() else {
-        return None;
-    };
-    let found = answer.places.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let place = found.and_then(|(place, _)| *place);
-    let mut members = EffectId::ALL.iter().filter(|id| id.group() == group);
-    Some(members.any(|id| Some(id.place()) == place))
+/// Returns true where the planted group is among the `most` most probable.
+fn rank_within(truth: &Truth, answer: &Answer, most: usize) -> bool {
+    let mut first = answer.groups().into_iter().take(most);
+    first.any(|group| is_class(truth, group))
 }
 
 /// Returns true where the verdict names the groups of all that was planted, and no other.
@@ -209,10 +199,9 @@ fn size_error(truth: &Truth, answer: &Answer) -> Option<f64> {
         .iter()
         .find(|(effect, parameter, _)| *effect == id && parameter == name)?;
     let ratio = found / planted;
-    Some(if ratio > 0.0 {
-        ratio.ln().abs()
-    } else {
-        f64::INFINITY
+    Some(match ratio > 0.0 {
+        true => ratio.ln().abs(),
+        false => f64::INFINITY,
     })
 }
 
@@ -249,7 +238,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Of all cases for which `hit` says something.
+    /// Counts the cases for which `hit` says something.
     pub fn of<T>(
         cases: impl IntoIterator<Item = T>,
         mut hit: impl FnMut(T) -> Option<bool>,
@@ -296,11 +285,11 @@ pub struct ReliabilityBin {
     pub cases: usize,
     /// Their mean stated probability; `None` without a case.
     pub stated: Option<f64>,
-    /// How many of them were right (1); `None` without a case.
+    /// Share of them that was right (1); `None` without a case.
     pub right: Option<f64>,
 }
 
-/// How far stated probabilities can be trusted.
+/// Trust that the stated probabilities deserve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// Mean over cases of the sum over classes of (p - truth)^2, from 0 (certain and right) to 2;
@@ -318,13 +307,31 @@ pub fn calibrate(cases: &[Case]) -> Calibration {
         .iter()
         .filter_map(|(truth, answer)| Some((truth.class()?, answer)))
         .collect();
-    let reliability: Vec<ReliabilityBin> = (0..BINS).map(|bin| row(bin, &cases)).collect();
-    let total = cases.len() as f64;
+    let mut reliability = Vec::with_capacity(BINS);
     let mut error = 0.0;
-    for bin in &reliability {
-        if let Some((stated, right)) = bin.stated.zip(bin.right) {
-            error += bin.cases as f64 / total * (stated - right).abs();
+    for bin in 0..BINS {
+        let (mut inside, mut stated, mut right) = (0, 0.0, 0);
+        for (truth, answer) in &cases {
+            let Some((class, probability)) = answer.first() else {
+                continue;
+            };
+            if ((probability * BINS as f64) as usize).min(BINS - 1) == bin {
+                inside += 1;
+                stated += probability;
+                right += usize::from(class == *truth);
+            }
         }
+        let stated = (inside > 0).then(|| stated / inside as f64);
+        let right = (inside > 0).then(|| right as f64 / inside as f64);
+        if let Some((stated, right)) = stated.zip(right) {
+            error += inside as f64 / cases.len() as f64 * (stated - right).abs();
+        }
+        reliability.push(ReliabilityBin {
+            from: bin as f64 / BINS as f64,
+            cases: inside,
+            stated,
+            right,
+        });
     }
     Calibration {
         brier: mean(cases.iter().map(|(class, answer)| brier(*class, answer))),
@@ -339,27 +346,7 @@ fn brier(truth: Class, answer: &Answer) -> f64 {
     (1.0 - answer.stated(truth)).powi(2) + others.map(|(_, p)| p * p).sum::<f64>()
 }
 
-fn row(bin: usize, cases: &[(Class, &Answer)]) -> ReliabilityBin {
-    let (mut inside, mut stated, mut right) = (0, 0.0, 0);
-    for (truth, answer) in cases {
-        let Some((class, probability)) = answer.first() else {
-            continue;
-        };
-        if ((probability * BINS as f64) as usize).min(BINS - 1) == bin {
-            inside += 1;
-            stated += probability;
-            right += usize::from(class == *truth);
-        }
-    }
-    ReliabilityBin {
-        from: bin as f64 / BINS as f64,
-        cases: inside,
-        stated: (inside > 0).then(|| stated / inside as f64),
-        right: (inside > 0).then(|| right as f64 / inside as f64),
-    }
-}
-
-/// How a check was conducted, and the score of answers without knowledge.
+/// The conduct of a check, and the score of answers without knowledge.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conduct {
     /// Recordings of each test; `None` of tests made elsewhere.
@@ -368,14 +355,14 @@ pub struct Conduct {
     pub commitment: Option<String>,
     /// Share of first groups right by answers dealt out to other tests; `None` without a test of one effect.
     pub shuffled: Option<f64>,
-    /// The same by always answering one common factor on all frequencies.
+    /// Share of first groups right by always answering one common factor on all frequencies.
     pub always_scale: Option<f64>,
     /// Tests that were diagnosed again under other names of their files, with the same answer.
     pub renamed: usize,
 }
 
 impl Conduct {
-    /// With what the answers earn once they are dealt out to other tests, and once they are all the same.
+    /// Adds what the answers earn once they are dealt out to other tests, and once they are all the same.
     pub fn mutated(self, cases: &[Case], seed: u64) -> Self {
         Conduct {
             shuffled: score(&shuffled(cases, seed)).top_1.value(),
@@ -396,7 +383,7 @@ pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {
         .collect()
 }
 
-/// The same answer to every case: one common factor on all frequencies.
+/// One answer to every case: one common factor on all frequencies.
 pub fn always_scale(cases: &[Case]) -> Vec<Case> {
     let answer = Answer {
         verdict: Some(Verdict::Named(vec![EffectId::Modulus])),
@@ -406,10 +393,8 @@ pub fn always_scale(cases: &[Case]) -> Vec<Case> {
         parameters: Vec::new(),
         closure: None,
     };
-    let truths = cases.iter().map(|(truth, _)| truth);
-    truths
-        .map(|truth| (truth.clone(), answer.clone()))
-        .collect()
+    let truths = cases.iter().map(|(truth, _)| truth.clone());
+    truths.map(|truth| (truth, answer.clone())).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@
 use super::case::Extent;
 use super::score::{Rate, Scores};
 
-/// Which side of its target a figure has to stay on.
+/// The side of its target on which a figure has to stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
     /// At least so much.
@@ -38,7 +38,7 @@ impl Target {
 pub struct Row {
     /// Name for programs.
     pub key: &'static str,
-    /// What it is.
+    /// Its meaning.
     pub meaning: &'static str,
     /// The figure; `None` without a case.
     pub value: Option<f64>,
@@ -46,10 +46,10 @@ pub struct Row {
     pub interval: Option<(f64, f64)>,
     /// Hits and cases of a rate.
     pub counts: Option<(usize, usize)>,
-    /// What is aimed at with five recordings (two sensor positions, three tap positions, two
+    /// The aim with five recordings (two sensor positions, three tap positions, two
     /// levels, six modes).
     pub target: Target,
-    /// What an ideal observer reaches; `None` where that is not known.
+    /// The figure that an ideal observer reaches; `None` where that is not known.
     pub ideal: Option<f64>,
 }
 
@@ -180,28 +180,36 @@ pub fn render_rows(rows: &[Row]) -> String {
         if aimed_at { "target" } else { "" }
     );
     let mut text = head.trim_end().to_owned() + "\n";
+    let mut any_missed = false;
     for row in rows {
-        let value = row
-            .value
-            .map_or_else(|| "-".to_owned(), |v| format!("{v:.0$}", decimals(row, 3)));
+        // A number of tests is whole.
+        let [decimals, of_target] = if row.key == NO_ANSWER { [0, 0] } else { [3, 2] };
+        let value = row.value.map(|value| format!("{value:.decimals$}"));
+        let value = value.unwrap_or_else(|| "-".to_owned());
         let interval = row
             .interval
-            .map_or_else(String::new, |(low, high)| format!("{low:.3} to {high:.3}"));
-        let counts = row
-            .counts
-            .map_or_else(String::new, |(hits, of)| format!("{hits}/{of}"));
-        let ideal = row
-            .ideal
-            .map_or_else(String::new, |ideal| format!("{ideal:.2}"));
+            .map(|(low, high)| format!("{low:.3} to {high:.3}"));
+        let interval = interval.unwrap_or_default();
+        let counts = row.counts.map(|(hits, of)| format!("{hits}/{of}"));
+        let counts = counts.unwrap_or_default();
+        let ideal = row.ideal.map(|ideal| format!("{ideal:.2}"));
+        let ideal = ideal.unwrap_or_default();
+        let missed = row.value.is_some_and(|value| !row.target.is_met(value));
+        any_missed |= missed;
+        let mark = if missed { "!" } else { "" };
+        let target = match row.target {
+            Target::AtLeast(limit) => format!(">={limit:.of_target$}{mark}"),
+            Target::AtMost(limit) => format!("<={limit:.of_target$}{mark}"),
+            Target::None => String::new(),
+        };
         let line = format!(
-            "{:<34}{value:>6}  {interval:<14}{counts:>8}{ideal:>7}  {}",
-            row.meaning,
-            target_text(row)
+            "{:<34}{value:>6}  {interval:<14}{counts:>8}{ideal:>7}  {target}",
+            row.meaning
         );
-        text.push_str(line.trim_end());
+        text += line.trim_end();
         text.push('\n');
     }
-    if rows.iter().any(is_missed) {
+    if any_missed {
         text.push_str("! the target is missed\n");
     }
     if compared {
@@ -210,25 +218,6 @@ pub fn render_rows(rows: &[Row]) -> String {
         );
     }
     text
-}
-
-/// A number of tests is whole; all else has so many decimals.
-fn decimals(row: &Row, usual: usize) -> usize {
-    if row.key == NO_ANSWER { 0 } else { usual }
-}
-
-fn is_missed(row: &Row) -> bool {
-    row.value.is_some_and(|value| !row.target.is_met(value))
-}
-
-fn target_text(row: &Row) -> String {
-    let (sign, limit) = match row.target {
-        Target::AtLeast(limit) => (">=", limit),
-        Target::AtMost(limit) => ("<=", limit),
-        Target::None => return String::new(),
-    };
-    let missed = if is_missed(row) { "!" } else { "" };
-    format!("{sign}{limit:.0$}{missed}", decimals(row, 2))
 }
 
 /// Figures by key, with one configuration and five modes, and with two sensor positions, two levels and shapes.

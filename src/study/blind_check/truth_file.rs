@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use tapjoint_beam::effects::{EffectError, EffectId};
 
-/// Why a truth file cannot be used.
+/// A reason for which a truth file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
     /// No JSON list of such entries.
@@ -26,7 +26,7 @@ pub enum TruthError {
          {{\"name\": \"...\", \"effects\": [\"...\"], \"params\": {{...}}}}, one for each test"
     )]
     Shape {
-        /// What the parser says, with line and column.
+        /// The parser's message, with line and column.
         source: serde_json::Error,
     },
     /// Two entries of one name.
@@ -37,55 +37,13 @@ pub enum TruthError {
     },
 }
 
-/// The truths of a file, and what about them is odd.
+/// The truths of a file, and the oddities of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthFile {
     /// One for each test, in the order of the file.
     pub truths: Vec<Truth>,
     /// Oddities that keep no truth from being used.
-    pub doubts: Vec<TruthDoubt>,
-}
-
-/// Something in a truth file that may be a slip of the pen.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum TruthDoubt {
-    /// An id that the catalogue does not have, and that is near one which it has, or says that there is none.
-    #[error(
-        "the test \"{test}\": the catalogue has no effect `{effect}`, so that it counts as something outside \
-         the catalogue{hint}"
-    )]
-    OutOfCatalogue {
-        /// The test.
-        test: String,
-        /// The id.
-        effect: String,
-        /// `; did you mean ...?`, or what to write instead.
-        hint: String,
-    },
-    /// A parameter that is not used.
-    #[error(
-        "the test \"{test}\": `{parameter}` is no parameter with a number of its effects and is left out of the \
-         errors of size; allowed: {allowed}"
-    )]
-    Parameter {
-        /// The test.
-        test: String,
-        /// The parameter.
-        parameter: String,
-        /// Those that are known.
-        allowed: String,
-    },
-    /// A key that is not used.
-    #[error(
-        "the test \"{test}\": the key `{key}` is not known and is left out; known: name, effects, params, \
-         detectable, refutable"
-    )]
-    Key {
-        /// The test.
-        test: String,
-        /// The key.
-        key: String,
-    },
+    pub doubts: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -161,39 +119,91 @@ pub fn parse_truths(text: &str) -> Result<TruthFile, TruthError> {
         if truths.iter().any(|truth| truth.name == entry.name) {
             return Err(TruthError::Twice { name: entry.name });
         }
-        doubts.extend(doubts_of(&entry));
-        truths.push(truth_of(entry));
+        let found = doubts_of(&entry).into_iter();
+        doubts.extend(found.map(|doubt| format!("the test \"{}\": {doubt}", entry.name)));
+        let mut planted = Vec::new();
+        for name in &entry.effects {
+            let Ok(id) = EffectId::parse(name) else {
+                planted.push(Planted::OutOfCatalogue(name.clone()));
+                continue;
+            };
+            // The numbers under the effect's name, or by themselves where there is but one effect.
+            let given: Vec<(&String, &Value)> = match entry.params.get(name) {
+                Some(Value::Object(own)) => own.iter().collect(),
+                _ if entry.effects.len() == 1 => entry.params.iter().collect(),
+                _ => Vec::new(),
+            };
+            let numbers = given.into_iter();
+            let numbers = numbers.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)));
+            planted.push(Planted::Catalogue(id, numbers.collect()));
+        }
+        truths.push(Truth {
+            effects: planted,
+            name: entry.name,
+            detectable: entry.detectable,
+            refutable: entry.refutable,
+        });
     }
     Ok(TruthFile { truths, doubts })
 }
 
-fn doubts_of(entry: &Entry) -> Vec<TruthDoubt> {
+/// Names what may be a slip of the pen: ids near one of the catalogue, keys and parameters that are not used.
+fn doubts_of(entry: &Entry) -> Vec<String> {
     let mut doubts = Vec::new();
     for effect in &entry.effects {
-        if let Some(hint) = hint(effect) {
-            doubts.push(TruthDoubt::OutOfCatalogue {
-                test: entry.name.clone(),
-                effect: effect.clone(),
-                hint,
-            });
-        }
+        doubts.extend(hint(effect).map(|hint| {
+            format!(
+                "the catalogue has no effect `{effect}`, so that it counts as something outside the catalogue{hint}"
+            )
+        }));
     }
     for key in entry.unknown.keys() {
-        doubts.push(TruthDoubt::Key {
-            test: entry.name.clone(),
-            key: key.clone(),
-        });
+        doubts.push(format!(
+            "the key `{key}` is not known and is left out; known: name, effects, params, detectable, refutable"
+        ));
     }
-    let known = entry.known_effects();
+    let effects = entry.known_effects();
     // Faults outside the catalogue have parameters of their own.
-    if known.len() == entry.effects.len() {
-        for (parameter, allowed) in unused_parameters(entry, &known) {
-            doubts.push(TruthDoubt::Parameter {
-                test: entry.name.clone(),
-                parameter,
-                allowed,
-            });
+    if effects.len() != entry.effects.len() {
+        return doubts;
+    }
+    let mut unused: Vec<(&str, String)> = Vec::new();
+    for (key, value) in &entry.params {
+        if let Some(&id) = effects.iter().find(|id| id.name() == key)
+            && let Value::Object(values) = value
+        {
+            let names = parameter_names(id);
+            for (name, value) in values {
+                if !(names.contains(&name.as_str()) && value.is_number()) {
+                    unused.push((name, names.join(", ")));
+                }
+            }
+            continue;
         }
+        let allowed = match effects[..] {
+            [] => "none, for nothing was planted".to_owned(),
+            [id] => {
+                let names = parameter_names(id);
+                if names.contains(&key.as_str()) && value.is_number() {
+                    continue;
+                }
+                names.join(", ")
+            }
+            _ => {
+                let ids: Vec<&str> = effects.iter().map(|id| id.name()).collect();
+                format!(
+                    "{} with their own parameters in braces, and what only one of them has",
+                    ids.join(", ")
+                )
+            }
+        };
+        unused.push((key, allowed));
+    }
+    for (parameter, allowed) in unused {
+        doubts.push(format!(
+            "`{parameter}` is no parameter with a number of its effects and is left out of the errors of size; \
+             allowed: {allowed}"
+        ));
     }
     doubts
 }
@@ -203,7 +213,7 @@ fn parameter_names(id: EffectId) -> Vec<&'static str> {
     id.parameters().iter().map(|info| info.name).collect()
 }
 
-/// What may have been meant by an id outside the catalogue; `None` where nothing speaks for a slip: of an id in it,
+/// Names the effect that an id outside the catalogue may mean. `None` where nothing speaks for a slip: of an id in it,
 /// of one that virtual tests are drawn with, and of one that is like none of these.
 fn hint(effect: &str) -> Option<String> {
     let Err(error) = EffectId::parse(effect) else {
@@ -224,72 +234,6 @@ fn hint(effect: &str) -> Option<String> {
         }
         _ => None,
     }
-}
-
-/// Parameters that no effect of the entry takes up, each with those that would be.
-fn unused_parameters(entry: &Entry, effects: &[EffectId]) -> Vec<(String, String)> {
-    let mut unused = Vec::new();
-    for (key, value) in &entry.params {
-        if let Some(&id) = effects.iter().find(|id| id.name() == key)
-            && let Value::Object(values) = value
-        {
-            let names = parameter_names(id);
-            for (name, value) in values {
-                if !(names.contains(&name.as_str()) && value.is_number()) {
-                    unused.push((name.clone(), names.join(", ")));
-                }
-            }
-            continue;
-        }
-        let allowed = match effects {
-            [] => "none, for nothing was planted".to_owned(),
-            [id] => {
-                let names = parameter_names(*id);
-                if names.contains(&key.as_str()) && value.is_number() {
-                    continue;
-                }
-                names.join(", ")
-            }
-            _ => {
-                let ids: Vec<&str> = effects.iter().map(|id| id.name()).collect();
-                format!(
-                    "{} with their own parameters in braces, and what only one of them has",
-                    ids.join(", ")
-                )
-            }
-        };
-        unused.push((key.clone(), allowed));
-    }
-    unused
-}
-
-fn truth_of(entry: Entry) -> Truth {
-    let mut planted = Vec::new();
-    for name in &entry.effects {
-        planted.push(match EffectId::parse(name) {
-            Ok(id) => Planted::Catalogue(id, parameters_of(&entry, name)),
-            Err(_) => Planted::OutOfCatalogue(name.clone()),
-        });
-    }
-    Truth {
-        effects: planted,
-        name: entry.name,
-        detectable: entry.detectable,
-        refutable: entry.refutable,
-    }
-}
-
-/// The numbers given for an effect: under its name, or by themselves where there is but one effect.
-fn parameters_of(entry: &Entry, effect: &str) -> BTreeMap<String, f64> {
-    let values: Vec<(&String, &Value)> = match entry.params.get(effect) {
-        Some(Value::Object(own)) => own.iter().collect(),
-        _ if entry.effects.len() == 1 => entry.params.iter().collect(),
-        _ => Vec::new(),
-    };
-    let numbers = values.into_iter();
-    numbers
-        .filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
-        .collect()
 }
 
 /// SHA-256 of a text, in hexadecimal digits. Printed before the diagnosis begins; whoever has the

@@ -48,7 +48,7 @@ pub enum Verdict {
 /// One printed number beside ours.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Row {
-    /// What the number is.
+    /// Meaning of the number.
     pub label: String,
     /// As printed.
     pub printed: Printed,
@@ -56,9 +56,9 @@ pub struct Row {
     pub ours: Option<f64>,
     /// Largest difference that still counts as equal, in the unit of the numbers.
     pub tolerance: f64,
-    /// How they compare.
+    /// Agreement of the two.
     pub verdict: Verdict,
-    /// Why they differ, or what else is to be said.
+    /// Reason of a difference, or another remark.
     pub remark: Option<&'static str>,
 }
 
@@ -87,15 +87,10 @@ impl Row {
         }
     }
 
-    /// The same row judged by the digits of another printed form of its number.
-    pub(super) fn judged_by(self, printed: &Printed) -> Self {
-        let ours = self.ours.unwrap_or(f64::NAN);
-        let judged = Self::to_last_digit(String::new(), printed.clone(), ours);
-        Self {
-            tolerance: judged.tolerance,
-            verdict: judged.verdict,
-            ..self
-        }
+    /// A row that reproduces within a share (1) of its number.
+    pub(super) fn near(label: String, printed: Printed, ours: Option<f64>, share: f64) -> Self {
+        let tolerance = share * printed.value;
+        Self::within(label, printed, ours.unwrap_or(f64::NAN), tolerance)
     }
 
     /// A row with nothing to compute.
@@ -112,22 +107,21 @@ impl Row {
 
     /// Takes a row that differs as explained by the rounding of its input, if the printed number
     /// lies in this span of what that rounding makes of ours.
-    pub(super) fn or_within(mut self, span: Option<Span>) -> Self {
+    pub(super) fn or_within(self, span: Option<Span>) -> Self {
         let value = self.printed.value;
         // Half a unit on either side: the printed number is rounded too.
         let half = 0.5 * self.printed.unit;
-        let inside = span.is_some_and(|s| s.low - half <= value && value <= s.high + half);
-        if self.verdict == Verdict::DoesNotReproduce && inside {
-            self.verdict = Verdict::WithinRounding;
-        }
-        self
+        self.or_if(span.is_some_and(|s| s.low - half <= value && value <= s.high + half))
     }
 
-    /// The same for Kz, by way of its reciprocal.
-    pub(super) fn or_reciprocal_within(mut self, span: Option<Span>) -> Self {
+    /// Notes a Kz that does not lie within its span, by way of its reciprocal: see [`Self::or_within`].
+    pub(super) fn or_reciprocal_within(self, span: Option<Span>) -> Self {
         let compliance = 1.0 / self.printed.value;
-        let inside = span.is_some_and(|s| s.low <= compliance && compliance <= s.high);
-        if self.verdict == Verdict::DoesNotReproduce && inside {
+        self.or_if(span.is_some_and(|s| s.low <= compliance && compliance <= s.high))
+    }
+
+    fn or_if(mut self, is_explained: bool) -> Self {
+        if self.verdict == Verdict::DoesNotReproduce && is_explained {
             self.verdict = Verdict::WithinRounding;
         }
         self
@@ -160,7 +154,7 @@ impl Row {
 pub struct Table {
     /// Its number, "1a".
     pub number: &'static str,
-    /// What it holds.
+    /// Its content.
     pub title: &'static str,
     /// Its numbers.
     pub rows: Vec<Row>,
@@ -174,7 +168,7 @@ pub struct Reproduction {
 }
 
 impl Reproduction {
-    /// How many rows have this verdict.
+    /// Counts the rows that have this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         let rows = self.tables.iter().flat_map(|table| &table.rows);
         rows.filter(|row| row.verdict == verdict).count()
@@ -191,8 +185,8 @@ pub(super) fn joint_label(kx: &Printed, ky: &Printed) -> String {
     format!("Kx {}, Ky {}", kx.text, ky.text)
 }
 
-/// An estimate from printed lambdas, with the spans over the rounding of their last digit. The
-/// span of "kz" is that of 1/Kz, which does not pass through infinity.
+/// An estimate from printed lambdas, with the spans over the rounding of their last digit. 1/Kz has a span and Kz
+/// has none, because Kz may pass through infinity.
 pub(super) fn estimate_from_printed(
     model: PairsModel,
     lambdas: &[Printed],

@@ -1,19 +1,193 @@
-//! From readings to stiffnesses, by both estimators, and the errors of these against the draw's truth.
+//! From a virtual recording to readings of each mode (on the line, between the lines and by a fit), from these to
+//! stiffnesses by both estimators, and the errors of these against the draw's truth.
 
-use super::plan::{BlockPlan, Layout};
-use super::reading::{BandReadings, index_of};
+use super::plan::{BandPlan, BlockPlan, Layout};
 use super::result::StudiedStiffness;
-use super::virtual_test::Truth;
+use super::virtual_test::{Truth, VirtualRecord};
 use super::{ResolutionError, StudiedTest};
-use tapjoint_analysis::EstimateMethod;
+use num_complex::Complex64;
+use tapjoint_analysis::{EstimateMethod, jointed_structure};
 use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_description::ReadBy;
 use tapjoint_identify::consistent::{
     ConsistentEstimator, ConsistentSettings, JointedStructure, Neighbourhood, Parameter,
 };
 use tapjoint_identify::{
     IdentifyError, MeasuredMode, PairsModel, estimate_modulus, pairs_estimator,
 };
+use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
+use tapjoint_signal::modal::{
+    CompositeLevel, FittedReading, ModeReading, PeakSettings, ReadBy, find_peaks, read_peaks,
+};
+use tapjoint_signal::spectral::{SpectralAverager, Window, largest_smooth_block};
+
+/// Fewest samples of a decay that is worth a fit.
+const LEAST_SAMPLES: usize = 64;
+
+/// One frequency as read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Read {
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// Its stated standard uncertainty (Hz).
+    pub std: f64,
+    /// The way of reading: the wanted one, or the next best.
+    pub source: ReadBy,
+}
+
+/// Readings of every mode of the study, in the order of [`ReadBy::ALL`]; none where a mode is not in the band.
+pub(super) type BandReadings = Vec<[Option<Read>; 3]>;
+
+/// Index of a way of reading in [`ReadBy::ALL`].
+pub(super) fn index_of(reading: ReadBy) -> usize {
+    match reading {
+        ReadBy::Line => 0,
+        ReadBy::Interpolated => 1,
+        ReadBy::Fit => 2,
+    }
+}
+
+/// Reads every mode of a band in every wanted way.
+pub(super) fn read_band(
+    band: &BandPlan,
+    window: Window,
+    record: &VirtualRecord,
+    layout: &Layout,
+    truth: &Truth,
+    wanted: &[ReadBy],
+) -> BandReadings {
+    let mut readings = peak_readings(band, window, record);
+    let mut places = vec![None; layout.modes.len()];
+    for &mode in &band.modes {
+        let frequency = truth.frequencies[layout.modes[mode].number - 1];
+        // The nearest reading within the mode's line, a line more, or its half-power width.
+        let mut least = f64::INFINITY;
+        for (place, reading) in readings.iter().enumerate() {
+            let distance = (reading.line_frequency - frequency).abs();
+            let width = reading.damping_ratio.unwrap_or(0.0) * frequency;
+            if distance <= 3.0 * band.lines.half_line() + width && distance < least {
+                least = distance;
+                places[mode] = Some(place);
+            }
+        }
+    }
+    if wanted.contains(&ReadBy::Fit) {
+        fit(band, record, &mut readings, &places);
+    }
+    places
+        .into_iter()
+        .map(|place| {
+            ReadBy::ALL.map(|name| {
+                let reading = readings.get(place?).filter(|_| wanted.contains(&name))?;
+                let mut reading = reading.clone();
+                reading.select_estimate(name);
+                Some(Read {
+                    frequency: reading.frequency,
+                    std: reading.std.unwrap_or(reading.half_line),
+                    source: reading.source,
+                })
+            })
+        })
+        .collect()
+}
+
+/// Peaks of H1 over all sensors, read on their lines and between them.
+fn peak_readings(band: &BandPlan, window: Window, record: &VirtualRecord) -> Vec<ModeReading> {
+    let rate = record.sample_rate;
+    let force = transformed(band, window, rate, &record.force, record.pulse_end);
+    let responses = record.responses.iter();
+    let responses: Vec<Vec<Complex64>> = responses
+        .map(|x| transformed(band, window, rate, x, band.gate))
+        .collect();
+    let mut averager = SpectralAverager::new(band.lines, responses.len());
+    averager.add(Some(&force), &responses);
+    let Some(averages) = averager.finish() else {
+        return Vec::new();
+    };
+    let Some(h1) = &averages.h1 else {
+        return Vec::new();
+    };
+    let powers: Vec<Vec<f64>> = h1
+        .iter()
+        .map(|h| h.iter().map(Complex64::norm_sqr).collect())
+        .collect();
+    // The part of H1 that noise alone would leave. White noise of rms s has E|X|^2 = s^2 sum w^2/rate^2 under a
+    // window w, which a quiet stretch before the tap would show.
+    let mut weights = vec![1.0; band.gate];
+    window.apply(&mut weights, rate);
+    let energy: f64 = weights.iter().map(|w| w * w).sum();
+    let force = averages.force_power.as_deref().unwrap_or_default();
+    let mut noise: Vec<Vec<f64>> = Vec::with_capacity(record.noise.len());
+    for level in &record.noise {
+        let power = (level / rate).powi(2) * energy;
+        let quotients = force.iter().map(|f| power / f.max(f64::MIN_POSITIVE));
+        noise.push(quotients.collect());
+    }
+    let level = CompositeLevel::new(band.lines, &powers, Some(&noise));
+    let peaks = find_peaks(&level, &PeakSettings::default());
+    let spectra: Vec<&[Complex64]> = h1.iter().map(Vec::as_slice).collect();
+    read_peaks(&level, &spectra, &peaks, window)
+}
+
+/// The spectrum of the samples up to `end` under the window.
+fn transformed(
+    band: &BandPlan,
+    window: Window,
+    sample_rate: f64,
+    samples: &[f64],
+    end: usize,
+) -> Vec<Complex64> {
+    let mut windowed = samples[..end.min(samples.len())].to_vec();
+    // A Hann window is over the whole block, however much of it is zero.
+    if window == Window::Hann {
+        windowed.resize(band.gate, 0.0);
+    }
+    window.apply(&mut windowed, sample_rate);
+    band.transformer.transform(&windowed)
+}
+
+/// Fits the free decay from every resonance, and from whatever was read near a mode.
+fn fit(
+    band: &BandPlan,
+    record: &VirtualRecord,
+    readings: &mut [ModeReading],
+    places: &[Option<usize>],
+) {
+    let chosen: Vec<usize> = (0..readings.len())
+        .filter(|place| readings[*place].label.is_none() || places.contains(&Some(*place)))
+        .collect();
+    let starts: Vec<PoleStart> = chosen
+        .iter()
+        .map(|&place| PoleStart {
+            frequency: readings[place].frequency,
+            damping_ratio: readings[place].damping_ratio,
+        })
+        .collect();
+    let Some(samples) = band
+        .gate
+        .checked_sub(record.pulse_end)
+        .and_then(largest_smooth_block)
+        .filter(|&samples| samples >= LEAST_SAMPLES)
+    else {
+        return;
+    };
+    let range = [(band.lines.low, band.lines.high)];
+    let decays: Vec<Vec<f64>> = record
+        .responses
+        .iter()
+        .map(|response| response[record.pulse_end..].to_vec())
+        .collect();
+    let decay = FreeDecayCollector::new(record.sample_rate, samples, &range).and_then(|mut all| {
+        all.add_tap(&decays)?;
+        all.finish()
+    });
+    let Ok(decay) = decay else {
+        return;
+    };
+    let fits = fit_modes(&decay, &starts, &FitSettings::default());
+    for (place, fit) in chosen.into_iter().zip(fits) {
+        readings[place].fit = fit.ok().map(|mode| Box::new(FittedReading::new(mode)));
+    }
+}
 
 /// Errors (1) of the stiffnesses in one draw, in the order of [`Estimators::parameters`]; `None` where
 /// there is no estimate.
@@ -56,7 +230,22 @@ impl<'a> Estimators<'a> {
         layout: &'a Layout,
         nominal: &Truth,
     ) -> Result<Self, ResolutionError> {
-        let parameters = parameters_of(test);
+        // Finite stiffnesses are estimated, rigid and absent ones are held.
+        let three = test.structure.regression == Some(PairsModel::ThreeParameter);
+        let mut parameters = Vec::new();
+        if test.structure.assembly == Assembly::Free {
+            parameters.push(Parameter::Modulus);
+        } else {
+            let springs = [
+                (Parameter::Kt, test.joint.kx),
+                (Parameter::Kr, test.joint.ky),
+            ];
+            let finite = springs.iter().filter(|(_, k)| *k > 0.0 && k.is_finite());
+            parameters.extend(finite.map(|(parameter, _)| *parameter));
+            if three && test.joint.kz().is_some() {
+                parameters.push(Parameter::Coupling);
+            }
+        }
         if parameters.is_empty() {
             return Err(IdentifyError::NothingToEstimate.into());
         }
@@ -75,7 +264,7 @@ impl<'a> Estimators<'a> {
             },
             parameters,
             layout,
-            structure: test.jointed(),
+            structure: jointed_structure(&test.structure, &test.details),
             regression: test.structure.regression,
             nominal: nominal.clone(),
         })
@@ -107,7 +296,10 @@ impl<'a> Estimators<'a> {
             let both = modes.as_deref().and_then(|modes| match method {
                 EstimateMethod::Consistent => {
                     let found = self.consistent(modes, truth)?;
-                    Some((found, self.true_values(&truth.joint)))
+                    Some((
+                        found,
+                        self.values(&truth.joint, self.structure.beam.modulus),
+                    ))
                 }
                 // The regression's own error on exact frequencies is not due to the reading.
                 EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
@@ -136,10 +328,6 @@ impl<'a> Estimators<'a> {
             std: None,
         })
         .collect()
-    }
-
-    fn true_values(&self, joint: &JointStiffness) -> Vec<f64> {
-        self.values(joint, self.structure.beam.modulus)
     }
 
     /// The values of the estimated stiffnesses.
@@ -187,7 +375,7 @@ impl<'a> Estimators<'a> {
     /// Returns the stiffnesses of the study with their nominal values.
     pub fn described(&self) -> Vec<StudiedStiffness> {
         let pairs = self.pairs(&self.exact(&self.nominal));
-        let values = self.true_values(&self.nominal.joint);
+        let values = self.values(&self.nominal.joint, self.structure.beam.modulus);
         let parameters = self.parameters.iter().zip(values).enumerate();
         parameters
             .map(|(index, (&parameter, value))| StudiedStiffness {
@@ -258,26 +446,4 @@ impl<'a> Estimators<'a> {
         }
         Some(sums)
     }
-}
-
-/// Finite stiffnesses are estimated, rigid and absent ones are held.
-fn parameters_of(test: &StudiedTest) -> Vec<Parameter> {
-    if test.structure.assembly == Assembly::Free {
-        return vec![Parameter::Modulus];
-    }
-    let mut parameters = Vec::new();
-    let springs = [
-        (Parameter::Kt, test.joint.kx),
-        (Parameter::Kr, test.joint.ky),
-    ];
-    for (parameter, value) in springs {
-        if value > 0.0 && value.is_finite() {
-            parameters.push(parameter);
-        }
-    }
-    let three = test.structure.regression == Some(PairsModel::ThreeParameter);
-    if three && test.joint.kz().is_some() {
-        parameters.push(Parameter::Coupling);
-    }
-    parameters
 }

@@ -8,7 +8,6 @@
 
 mod estimate;
 mod plan;
-mod reading;
 mod result;
 mod virtual_test;
 
@@ -19,18 +18,16 @@ pub use result::{
 pub use tapjoint_analysis::EstimateMethod;
 pub use tapjoint_description::ReadBy;
 
-use estimate::{Estimators, ParameterErrors, name_of};
+use estimate::{BandReadings, Estimators, ParameterErrors, Read, index_of, name_of, read_band};
 use plan::{BlockPlan, Layout, ModePlan};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use reading::{BandReadings, Read, index_of, read_band};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint_analysis::{StructureDetails, TestedStructure, structure_details};
 use tapjoint_beam::{Assembly, JointStiffness, StructureError};
 use tapjoint_description::TestDescription;
 use tapjoint_identify::IdentifyError;
-use tapjoint_identify::consistent::JointedStructure;
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::spectral::SpectralError;
 use virtual_test::{Truth, Truths, VirtualRecord};
@@ -40,13 +37,13 @@ use virtual_test::{Truth, Truths, VirtualRecord};
 pub struct StudiedTest {
     /// The structure as described.
     pub structure: TestedStructure,
-    /// What else is known of it: sensors' masses, a lap joint's layout.
+    /// Other known details: sensors' masses, a lap joint's layout.
     pub details: StructureDetails,
     /// The joint about which draws vary.
     pub joint: JointStiffness,
-    /// Where the hammer strikes (m).
+    /// Position of the hammer's taps (m).
     pub tap: f64,
-    /// Where the sensors sit (m).
+    /// Positions of the sensors (m).
     pub sensors: Vec<f64>,
     /// Bands (Hz) in which modes are read, each mode in the narrowest that holds it; empty = one from 0
     /// to a quarter above the highest mode.
@@ -72,11 +69,14 @@ impl StudiedTest {
     ) -> Self {
         let first = test.recordings.first();
         let end = structure.beam.length;
-        let sensors: Vec<f64> = test
+        let placed = test
             .sensors
             .iter()
-            .filter_map(|sensor| test.place_of(sensor))
-            .collect();
+            .filter_map(|sensor| test.place_of(sensor));
+        let mut sensors: Vec<f64> = placed.collect();
+        if sensors.is_empty() {
+            sensors.push(end);
+        }
         let described = test
             .recordings
             .iter()
@@ -90,15 +90,10 @@ impl StudiedTest {
                 Assembly::Cantilever | Assembly::Lap => joint,
             },
             tap: first.and_then(|recording| recording.tap).unwrap_or(end),
-            sensors: if sensors.is_empty() {
-                vec![end]
-            } else {
-                sensors
-            },
-            bands: if bands.is_empty() {
-                described.collect()
-            } else {
-                bands.to_vec()
+            sensors,
+            bands: match bands {
+                [] => described.collect(),
+                _ => bands.to_vec(),
             },
             modes: measured
                 .and_then(|measured| measured.modes.iter().copied().max())
@@ -106,18 +101,6 @@ impl StudiedTest {
                 .unwrap_or(USUAL_MODES),
             fit_modes: test.analysis.fit_modes,
         }
-    }
-
-    /// The tested structure as the estimators take it.
-    fn jointed(&self) -> JointedStructure {
-        let described = &self.structure;
-        let mut jointed =
-            JointedStructure::new(described.theory, described.beam, described.assembly);
-        if described.assembly == Assembly::Lap {
-            jointed.lap = self.details.lap;
-        }
-        jointed.masses = self.details.masses.clone();
-        jointed
     }
 }
 
@@ -132,7 +115,7 @@ pub struct ResolutionSettings {
     pub readings: Vec<ReadBy>,
     /// Virtual tests for each block size. 1000: an rms error then has a standard error of 1 to 2 %.
     pub draws: usize,
-    /// Of these, so many are fitted too. 100: a fit takes longer than all else, and its errors of some
+    /// Number of them that are fitted too. 100: a fit takes longer than all else, and its errors of some
     /// hundredths of a line need no more digits.
     pub fit_draws: usize,
     /// Damping ratio of every mode. 0.003: a bolted steel beam.
@@ -231,6 +214,24 @@ pub fn study_resolution(
         band: layout.bands[mode.band].into(),
         used: mode.used,
     });
+    let mut blocks = Vec::with_capacity(plans.len());
+    for plan in &plans {
+        let lines = plan.bands.first().map_or(0, |band| band.lines.displayed());
+        let bands = plan.bands.iter().map(|band| BandLines {
+            low: band.lines.low,
+            high: band.lines.high,
+            spacing: band.lines.spacing,
+            half_line: band.lines.half_line(),
+            seconds: band.lines.duration,
+            windows: band.windows.iter().map(|window| window.name()).collect(),
+        });
+        blocks.push(BlockLines {
+            block: plan.block,
+            lines,
+            half_line_percent_of_band: formula_percent(lines),
+            bands: bands.collect(),
+        });
+    }
     let mut study = ResolutionStudy {
         draws: settings.draws,
         fit_draws: settings.fit_draws.min(settings.draws),
@@ -242,7 +243,7 @@ pub fn study_resolution(
         modes: modes.collect(),
         omitted: layout.omitted.clone(),
         stiffnesses: estimators.described(),
-        blocks: plans.iter().map(block_lines).collect(),
+        blocks,
         frequency_errors: Vec::new(),
         stiffness_errors: Vec::new(),
         answers: Vec::new(),
@@ -268,24 +269,6 @@ pub fn study_resolution(
     }
     study.conclude(&settings.windows, &settings.readings);
     Ok(study)
-}
-
-fn block_lines(plan: &BlockPlan) -> BlockLines {
-    let lines = plan.bands.first().map_or(0, |band| band.lines.displayed());
-    let bands = plan.bands.iter().map(|band| BandLines {
-        low: band.lines.low,
-        high: band.lines.high,
-        spacing: band.lines.spacing,
-        half_line: band.lines.half_line(),
-        seconds: band.lines.duration,
-        windows: band.windows.iter().map(|window| window.name()).collect(),
-    });
-    BlockLines {
-        block: plan.block,
-        lines,
-        half_line_percent_of_band: formula_percent(lines),
-        bands: bands.collect(),
-    }
 }
 
 /// One virtual test: its truth, its readings and the errors of its estimates.
@@ -336,28 +319,16 @@ impl Draw {
     }
 }
 
-/// rms, mean, 95 % point and largest of some errors.
-#[derive(Debug, Clone, Copy)]
-struct Summary {
-    rms: f64,
-    mean: f64,
-    p95: f64,
-    largest: f64,
-}
-
-impl Summary {
-    fn of(errors: &[f64]) -> Option<Self> {
-        let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let largest = *sizes.last()?;
-        let place = (0.95 * (sizes.len() - 1) as f64).ceil() as usize;
-        Some(Summary {
-            rms: root_mean_square(errors),
-            mean: errors.iter().sum::<f64>() / errors.len() as f64,
-            p95: sizes[place],
-            largest,
-        })
-    }
+/// Returns rms, mean, 95 % point and largest of some errors; `None` of nothing.
+fn summary(errors: &[f64]) -> [Option<f64>; 4] {
+    let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let Some(&largest) = sizes.last() else {
+        return [None; 4];
+    };
+    let place = (0.95 * (sizes.len() - 1) as f64).ceil() as usize;
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    [root_mean_square(errors), mean, sizes[place], largest].map(Some)
 }
 
 /// Adds the errors of one block size to the study.
@@ -395,7 +366,8 @@ fn add_errors(
                         both[method as usize][index].map(|error| 100.0 * error)
                     });
                     let errors: Vec<f64> = estimates.collect();
-                    let summary = Summary::of(&errors);
+                    let [rms_percent, mean_percent, p95_percent, largest_percent] =
+                        summary(&errors);
                     study.stiffness_errors.push(StiffnessError {
                         block: plan.block,
                         window: name,
@@ -404,10 +376,10 @@ fn add_errors(
                         parameter: name_of(parameter),
                         found: errors.len(),
                         draws: draws.len(),
-                        rms_percent: summary.map(|summary| summary.rms),
-                        mean_percent: summary.map(|summary| summary.mean),
-                        p95_percent: summary.map(|summary| summary.p95),
-                        largest_percent: summary.map(|summary| summary.largest),
+                        rms_percent,
+                        mean_percent,
+                        p95_percent,
+                        largest_percent,
                         line_rms_percent: lines.map(|lines| 100.0 * lines[index].rms),
                         half_line_bound_percent: lines.map(|lines| 100.0 * lines[index].bound),
                     });
@@ -435,7 +407,12 @@ fn frequency_error(
             own += usize::from(read.source == reading);
         }
     }
-    let summary = Summary::of(&errors);
+    // The standard deviation of the truths takes two.
+    let count = truths.len();
+    let centre = truths.iter().sum::<f64>() / count as f64;
+    let squares: f64 = truths.iter().map(|truth| (truth - centre).powi(2)).sum();
+    let spread = (count > 1).then(|| (squares / (count - 1) as f64).sqrt());
+    let [rms, mean, p95, largest] = summary(&errors);
     FrequencyError {
         block: plan.block,
         window,
@@ -445,21 +422,13 @@ fn frequency_error(
         used: mode.used && mode.band == band,
         spacing: lines.spacing,
         half_line: lines.half_line(),
-        spread_lines: standard_deviation(&truths).map(|spread| spread / lines.spacing),
+        spread_lines: spread.map(|spread| spread / lines.spacing),
         found: errors.len(),
         own,
         draws: reads.len(),
-        rms: summary.map(|summary| summary.rms),
-        mean: summary.map(|summary| summary.mean),
-        p95: summary.map(|summary| summary.p95),
-        largest: summary.map(|summary| summary.largest),
+        rms,
+        mean,
+        p95,
+        largest,
     }
-}
-
-/// Standard deviation; `None` of fewer than two.
-fn standard_deviation(values: &[f64]) -> Option<f64> {
-    let count = values.len();
-    let mean = values.iter().sum::<f64>() / count as f64;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (count > 1).then(|| (squares / (count - 1) as f64).sqrt())
 }

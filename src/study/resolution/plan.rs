@@ -44,7 +44,20 @@ pub(super) struct ModePlan {
 impl Layout {
     pub fn new(test: &StudiedTest, truths: &Truths) -> Result<Self, ResolutionError> {
         let frequencies = &truths.nominal.frequencies;
-        let bands = bands_of(test, frequencies);
+        let mut bands = test.bands.clone();
+        if bands.is_empty() {
+            // One to a quarter above the highest mode wanted.
+            let last = test.modes.clamp(1, frequencies.len().max(1)) - 1;
+            let top = 1.25 * frequencies.get(last).copied().unwrap_or(1000.0);
+            // Two digits, upwards: what one would set on an analyser.
+            let step = 10f64.powf(top.log10().floor() - 1.0);
+            bands.push((0.0, (top / step).ceil() * step));
+        }
+        bands.sort_by(|a, b| {
+            let by_width = (a.1 - a.0).total_cmp(&(b.1 - b.0));
+            by_width.then(a.0.total_cmp(&b.0))
+        });
+        bands.dedup();
         let highest = bands.iter().map(|band| band.1).fold(0.0, f64::max);
         let mut modes: Vec<ModePlan> = Vec::new();
         let mut omitted = Vec::new();
@@ -90,25 +103,6 @@ impl Layout {
     pub fn used(&self) -> impl Iterator<Item = (usize, &ModePlan)> {
         self.modes.iter().enumerate().filter(|(_, mode)| mode.used)
     }
-}
-
-/// The bands wanted, the narrowest first; of none, one to a quarter above the highest mode wanted.
-fn bands_of(test: &StudiedTest, frequencies: &[f64]) -> Vec<(f64, f64)> {
-    let mut bands = test.bands.clone();
-    if bands.is_empty() {
-        let last = test.modes.clamp(1, frequencies.len().max(1)) - 1;
-        let top = 1.25 * frequencies.get(last).copied().unwrap_or(1000.0);
-        // Two digits, upwards: what one would set on an analyser.
-        let step = 10f64.powf(top.log10().floor() - 1.0);
-        bands.push((0.0, (top / step).ceil() * step));
-    }
-    bands.sort_by(|a, b| {
-        (a.1 - a.0)
-            .total_cmp(&(b.1 - b.0))
-            .then(a.0.total_cmp(&b.0))
-    });
-    bands.dedup();
-    bands
 }
 
 fn holds(band: &(f64, f64), frequency: f64) -> bool {
@@ -185,11 +179,8 @@ impl BlockPlan {
             let lines = &self.bands[mode.band].lines;
             wanted = wanted.max(lines.spacing / mode.frequency);
             // The three uniform parts reach 1.5 widths, the joint's stiffnesses twice that.
-            let share = truths
-                .joint_shares
-                .get(mode.number - 1)
-                .copied()
-                .unwrap_or(0.0);
+            let share = truths.joint_shares.get(mode.number - 1);
+            let share = share.copied().unwrap_or(0.0);
             let reach = 1.5 + 3.0 * share;
             let top = (lines.high - lines.spacing) / mode.frequency;
             possible = possible.min(top.ln().max(0.0) / reach);

@@ -45,7 +45,7 @@ impl From<WindowKind> for WindowName {
 pub struct ResolutionStudy {
     /// Virtual tests for each block size.
     pub draws: usize,
-    /// Of these, fitted.
+    /// Number of them that were fitted.
     pub fit_draws: usize,
     /// Seed.
     pub seed: u64,
@@ -95,7 +95,7 @@ pub struct Omitted {
     pub mode: usize,
     /// Nominal natural frequency (Hz).
     pub frequency: f64,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -165,7 +165,7 @@ pub struct FrequencyError {
     pub spread_lines: Option<f64>,
     /// Draws that had a reading.
     pub found: usize,
-    /// Of these, read by the method named; the others could be read on the line only.
+    /// Number of them that were read by the method named; the others could be read on the line only.
     pub own: usize,
     /// Draws.
     pub draws: usize,
@@ -233,12 +233,6 @@ const LEAST_SPREAD: f64 = 0.35;
 /// Half a line in percent of the band, 100/(2 lines): Ingole & Chatterjee, section 3.3.
 pub fn formula_percent(lines: usize) -> f64 {
     100.0 / (2.0 * lines as f64)
-}
-
-impl FrequencyError {
-    fn is_missed(&self) -> bool {
-        (self.found as f64) < LEAST_SHARE * self.draws as f64
-    }
 }
 
 impl ResolutionStudy {
@@ -321,8 +315,14 @@ impl ResolutionStudy {
             parts.push(match (answer.block, answer.seconds) {
                 (Some(block), Some(seconds)) => {
                     let less = if block == least { " or less" } else { "" };
-                    let time = in_seconds(seconds);
-                    format!("a block of {block}{less} ({time} a tap) {how}")
+                    // Three digits, without zeros at the end.
+                    let decimals =
+                        (2.0 - seconds.max(1e-3).log10().floor()).clamp(0.0, 3.0) as usize;
+                    let mut time = format!("{seconds:.decimals$}");
+                    if time.contains('.') {
+                        time = time.trim_end_matches('0').trim_end_matches('.').to_owned();
+                    }
+                    format!("a block of {block}{less} ({time} s a tap) {how}")
                 }
                 _ if least == most => format!("more than a block of {most} {how}"),
                 _ => format!("another block than {least} to {most} {how}"),
@@ -343,7 +343,9 @@ impl ResolutionStudy {
         for mode in &self.modes {
             let own = self.frequency_errors.iter();
             let own = own.filter(|row| row.used && row.mode == mode.mode);
-            let missed = own.clone().filter(|row| row.is_missed());
+            let missed = own
+                .clone()
+                .filter(|row| (row.found as f64) < LEAST_SHARE * row.draws as f64);
             if let Some(largest) = missed.map(|row| row.block).max() {
                 doubts.push((
                     "mode-missed",
@@ -366,7 +368,26 @@ impl ResolutionStudy {
                 ));
             }
         }
-        doubts.extend(self.modes.iter().filter_map(|mode| self.wide_peak(mode)));
+        // Modes whose peak is so wide that from some block on finer lines read it no better.
+        for mode in &self.modes {
+            let width = 2.0 * self.damping * mode.frequency;
+            let rows = self.frequency_errors.iter().filter(|row| {
+                let of_line = (row.mode, row.reading) == (mode.mode, ReadBy::Line);
+                of_line && row.band == mode.band && row.spacing < width
+            });
+            // Errors uniform over a line have this rms; a tenth more is beyond the draws' chance.
+            let worse = rows.filter(|row| row.rms > Some(1.1 * row.spacing / 12f64.sqrt()));
+            if let Some(block) = worse.map(|row| row.block).min() {
+                doubts.push((
+                    "wide-peak",
+                    format!(
+                        "mode {} is {width:.2} Hz wide at half power: from a block of {block} on noise moves the \
+                         reading of its line, and finer lines help less than they promise",
+                        mode.mode
+                    ),
+                ));
+            }
+        }
         for stiffness in &self.stiffnesses {
             if stiffness.pairs_bias_percent.is_none() {
                 doubts.push((
@@ -380,39 +401,4 @@ impl ResolutionStudy {
         }
         doubts
     }
-
-    /// Doubt about a mode whose peak is so wide that from some block on finer lines read it no better.
-    fn wide_peak(&self, mode: &StudiedMode) -> Option<(&'static str, String)> {
-        let width = 2.0 * self.damping * mode.frequency;
-        let rows = self.frequency_errors.iter().filter(|row| {
-            let of_line = (row.mode, row.reading) == (mode.mode, ReadBy::Line);
-            of_line && row.band == mode.band && row.spacing < width
-        });
-        // Errors uniform over a line have this rms; a tenth more is beyond the draws' chance.
-        let worse = rows.filter(|row| {
-            row.rms
-                .is_some_and(|r| r > 1.1 * row.spacing / 12f64.sqrt())
-        });
-        let block = worse.map(|row| row.block).min()?;
-        Some((
-            "wide-peak",
-            format!(
-                "mode {} is {width:.2} Hz wide at half power: from a block of {block} on noise moves the \
-                 reading of its line, and finer lines help less than they promise",
-                mode.mode
-            ),
-        ))
-    }
-}
-
-/// A length of time in three digits (s).
-fn in_seconds(seconds: f64) -> String {
-    let decimals = (2.0 - seconds.max(1e-3).log10().floor()).clamp(0.0, 3.0) as usize;
-    let text = format!("{seconds:.decimals$}");
-    let short = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    format!("{short} s")
 }

@@ -4,6 +4,7 @@ use super::result::WindowName;
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
+use tapjoint_analysis::jointed_structure;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::spectral::{
@@ -50,7 +51,10 @@ pub(super) struct Truth {
 
 impl<'a> Truths<'a> {
     pub fn new(test: &'a StudiedTest) -> Result<Self, ResolutionError> {
-        let model = FrequencyModel::new(&test.jointed(), MOST_MODES)?;
+        let model = FrequencyModel::new(
+            &jointed_structure(&test.structure, &test.details),
+            MOST_MODES,
+        )?;
         let assembly = test.structure.assembly;
         let shapes = mode_shapes(&test.structure.beam, assembly, &test.joint, MOST_MODES)?;
         let point = point_of(&model, test, &test.joint);

@@ -215,20 +215,20 @@ fn modes() -> Vec<ModeSection> {
     modes
 }
 
-fn value(value: f64, relative: f64) -> Option<ValueSection> {
+fn value(value: f64, relative: f64) -> Option<Uncertain> {
     let std = relative * value;
-    Some(ValueSection {
+    Some(Uncertain {
         value,
         std: Some(std),
         low: Some(value - 1.96 * std),
         high: Some(value + 1.96 * std),
-        ..ValueSection::default()
+        ..Uncertain::default()
     })
 }
 
 fn estimate() -> EstimateSection {
     EstimateSection {
-        method: Method::Pairs,
+        method: EstimateMethod::Pairs,
         modes_used: vec![1, 2, 3, 4],
         reason: None,
         kx: value(970.5, 0.041),
@@ -268,7 +268,7 @@ fn perturbation() -> Vec<PerturbationSection> {
         .iter()
         .map(|percent| PerturbationSection {
             percent: *percent,
-            method: Method::Pairs,
+            method: EstimateMethod::Pairs,
             kx: (*percent < 0.1).then_some(970.5 * (1.0 + 0.9 * percent)),
             ky: (*percent < 0.1).then_some(1.251 * (1.0 + 0.06 * percent)),
             kz: None,
@@ -285,7 +285,7 @@ fn span() -> ResolutionSpanSection {
         })
         .collect();
     ResolutionSpanSection {
-        method: Method::Pairs,
+        method: EstimateMethod::Pairs,
         patterns: 16,
         failed: 0,
         kx: Some([860.0, 1090.0]),
@@ -401,10 +401,6 @@ fn band_search(band: [f64; 2]) -> BandSearch {
                 pole: Complex64::ZERO,
                 frequency: *frequency,
                 damping_ratio: 0.004,
-                frequency_spread: 0.0,
-                damping_spread: 0.0,
-                count: 10,
-                share: 0.5,
                 participation: Vec::new(),
                 shape: Vec::new(),
                 above_noise_db: 40.0,

@@ -2,9 +2,9 @@
 
 use tapjoint::effects::EffectId;
 use tapjoint::gap::{Hypothesis, HypothesisResult, LocationMap, Residual, Verdict};
-use tapjoint::report::chart::{Mark, Series, render_svg};
-use tapjoint::report::charts::gap::{gap, place_map};
+use tapjoint::report::charts::diagnosis::{gap, place_map};
 use tapjoint::report::document::{Document, GapPlaceSection, GapSection};
+use tapjoint::report::picture::{Mark, Series, render_svg};
 
 fn document(gap: GapSection) -> Document {
     Document {

@@ -11,7 +11,7 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{hypotheses, next_tests};
-use tapjoint::report::words::gap::{gap_in_short, gap_story};
+use tapjoint::report::words::diagnosis::{gap_in_short, gap_story};
 use tapjoint::structure::Assembly;
 
 use crate::shared::assert_snapshot;

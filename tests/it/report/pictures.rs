@@ -4,15 +4,15 @@ use std::collections::HashMap;
 
 use proptest::prelude::*;
 use tapjoint::pipeline::{FrfSettings, RecordingResult, frfs_of};
-use tapjoint::report::chart::axis::{Axis, Tick, nice_step};
-use tapjoint::report::chart::drawing::{Point, Rgb, Shape};
-use tapjoint::report::chart::labels::spread;
-use tapjoint::report::chart::thinning::decimate;
-use tapjoint::report::chart::{Chart, Color, Drawing, render_png, render_svg};
 use tapjoint::report::charts::joint::{cloud, frequencies};
+use tapjoint::report::charts::modes::stabilisation;
+use tapjoint::report::charts::spectra::taps;
 use tapjoint::report::charts::spectra::{frf, spectrum};
-use tapjoint::report::charts::stabilisation::stabilisation;
-use tapjoint::report::charts::taps::taps;
+use tapjoint::report::picture::decimate;
+use tapjoint::report::picture::drawing::{Point, Rgb, Shape};
+use tapjoint::report::picture::labels::spread;
+use tapjoint::report::picture::{Axis, Tick, nice_step};
+use tapjoint::report::picture::{Chart, Color, Drawing, render_png, render_svg};
 
 use super::{fixture, spectra_of};
 
@@ -106,8 +106,8 @@ fn prop_nothing_lies_outside_a_picture() {
     }
 }
 
-fn text_inside(text: &tapjoint::report::chart::drawing::Text, drawing: &Drawing) -> bool {
-    use tapjoint::report::chart::drawing::{Align, Direction};
+fn text_inside(text: &tapjoint::report::picture::drawing::Text, drawing: &Drawing) -> bool {
+    use tapjoint::report::picture::drawing::{Align, Direction};
     let width = text.width();
     let (before, after) = match text.align {
         Align::Start => (0.0, width),

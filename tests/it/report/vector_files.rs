@@ -1,7 +1,7 @@
 //! SVG files: that they need no font, and hold every letter.
 
 use std::path::Path;
-use tapjoint::report::chart::{PictureFormat, render_picture, render_svg_file};
+use tapjoint::report::picture::{PictureFormat, render_picture, render_svg_file};
 
 use super::pictures::drawings;
 

@@ -3,8 +3,8 @@
 use serde_json::Value;
 use tapjoint::recording::{ChannelHealth, ChannelInfo};
 use tapjoint::report::document::{
-    AverageSection, ChannelSection, Document, Method, ModeSection, MonteCarloSection,
-    PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
+    AverageSection, ChannelSection, Document, EstimateMethod, ModeSection, MonteCarloSection,
+    PredictionSection, ReadBy, TapSection, Uncertain, WarningSection,
 };
 use tapjoint::report::tables::parameters;
 use tapjoint::report::words::findings as summary;
@@ -227,11 +227,7 @@ fn regress_without_stated_uncertainties_the_misfit_gives_the_limits() {
     let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names[6..], ["95 % low", "95 % high"]);
     assert_eq!(table.rows[0][6..], ["0.034", "4.9"]);
-    assert!(
-        table.note.contains("and so do the 95 % limits"),
-        "{}",
-        table.note
-    );
+    assert_snapshot("parameters_note_without_uncertainties", &table.note);
 }
 
 #[test]
@@ -330,6 +326,17 @@ fn bare() -> Document {
     }
 }
 
+/// A bare recording with one more peak, which is no mode.
+fn with_unclear_peak() -> Document {
+    let mut document = bare();
+    document.modes.as_mut().unwrap().push(ModeSection {
+        label: Some("no clear resonance".into()),
+        frequency: 77.0,
+        ..ModeSection::default()
+    });
+    document
+}
+
 /// The fixture as of recordings that were only looked at.
 fn inspected() -> Document {
     let channel = ChannelSection {
@@ -383,7 +390,7 @@ fn frozen_terminal_of_a_whole_test_and_of_parts_of_one() {
         "a bare recording; few taps: all are listed",
         &bare(),
     );
-    let mut document = bare();
+    let mut document = with_unclear_peak();
     for recording in document.recordings.iter_mut().flatten() {
         recording.has_hammer = false;
         recording.tap_unit = None;
@@ -391,12 +398,6 @@ fn frozen_terminal_of_a_whole_test_and_of_parts_of_one() {
             tap.peak_response = tap.peak_force.take();
         }
     }
-    let unclear = ModeSection {
-        label: Some("no clear resonance".into()),
-        frequency: 77.0,
-        ..ModeSection::default()
-    };
-    document.modes.as_mut().unwrap().push(unclear);
     show(
         &mut text,
         "without a hammer; a peak that is no mode",
@@ -421,6 +422,8 @@ fn frozen_terminal_of_a_whole_test_and_of_parts_of_one() {
 
 #[test]
 fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
+    let csv = render_parameters_csv(&misfitting()).unwrap();
+    assert_snapshot("parameters_of_a_misfit_csv", &csv);
     let mut text = String::new();
     let mut document = misfitting();
     document.warnings[0].beside = true;
@@ -444,16 +447,16 @@ fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
         "limits scaled by the misfit; a note beside the regression; a recording aside; a mode without a fit",
         &document,
     );
-    let value = |value: f64| ValueSection {
+    let value = |value: f64| Uncertain {
         value,
         std: None,
         low: Some(0.9 * value),
         high: Some(1.2 * value),
-        ..ValueSection::default()
+        ..Uncertain::default()
     };
     let mut document = Document {
         perturbation_averages: Some(vec![AverageSection {
-            method: Method::Pairs,
+            method: EstimateMethod::Pairs,
             kx_of_mean_percent: Some(0.011),
             ky_of_mean_percent: Some(0.012),
             kz_of_mean_percent: None,
@@ -463,7 +466,7 @@ fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
             kz_percent: None,
         }]),
         monte_carlo: Some(vec![MonteCarloSection {
-            method: Method::Pairs,
+            method: EstimateMethod::Pairs,
             cloud: Vec::new(),
             samples: 2000,
             failed: 3,
@@ -473,6 +476,12 @@ fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
         }]),
         ..fixture::document()
     };
+    // The page has every tap, though the terminal sums them up, and no column for what was not drawn.
+    let html = page(&document);
+    for cell in ["10.510", "873.45", "2000 draws"] {
+        assert!(html.contains(cell), "the page lacks {cell}");
+    }
+    assert!(!html.contains("Kz off by"), "an empty column");
     document.test.as_mut().unwrap().kind = Some(Assembly::Free);
     show(
         &mut text,
@@ -489,6 +498,7 @@ fn frozen_sentences_of_the_summary() {
         ("a described test", fixture::document()),
         ("a bare recording", bare()),
         ("limits scaled by the misfit", misfitting()),
+        ("two kinds of peaks that are no modes", with_unclear_peak()),
         ("no modes", incomplete().remove(3).1),
     ] {
         let sentences = summary::sentences(&document)

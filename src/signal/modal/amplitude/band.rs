@@ -5,10 +5,11 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
+use tapjoint_numerics::bessel_i0;
 use tapjoint_numerics::stats::median;
 
-use super::{AmplitudeSettings, Decay, KnownMode};
-use crate::spectral::{bessel_i0, kaiser_beta};
+use super::{Decay, FILTER, KnownMode, LONGEST_FILTER};
+use crate::spectral::kaiser_beta;
 
 /// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
 const ATTENUATION: f64 = 70.0;
@@ -82,26 +83,12 @@ impl Band {
     }
 }
 
-/// Extracts the band of mode `index` after every tap; decays that are too short are left out.
-pub(super) fn extract_bands(
-    decays: &[Decay],
-    modes: &[KnownMode],
-    index: usize,
-    settings: &AmplitudeSettings,
-) -> Vec<Band> {
-    let mut bands = Vec::new();
-    for (tap, decay) in decays.iter().enumerate() {
-        bands.extend(extract_band(decay, tap, modes, index, settings));
-    }
-    bands
-}
-
-fn extract_band(
+/// Extracts the band of mode `index` after one tap; `None` of a decay that is too short.
+pub(super) fn extract_band(
     decay: &Decay,
     tap: usize,
     modes: &[KnownMode],
     index: usize,
-    settings: &AmplitudeSettings,
 ) -> Option<Band> {
     let mode = modes.get(index)?;
     let samples = decay.responses.iter().map(Vec::len).min()?;
@@ -113,11 +100,14 @@ fn extract_band(
     if !usable || samples < 16 {
         return None;
     }
-    let stop = stop_edge(modes, index, scale, rate, settings);
-    if filter_half(stop, rate) > samples as f64 {
+    let stop = stop_edge(modes, index, scale, rate);
+    // Half the length of the filter (samples).
+    let transition = (1.0 - PASS) * stop;
+    let half = (KAISER_LENGTH * rate / transition / 2.0).ceil().max(2.0);
+    if half > samples as f64 {
         return None;
     }
-    let taps = low_pass(stop, rate);
+    let taps = low_pass(half, 0.5 * (1.0 + PASS) * stop / rate);
     // Stop and pass edge fold onto each other at this rate, so nothing reaches the pass band.
     let stride = (rate / ((1.0 + PASS) * stop)).floor().max(1.0) as usize;
     let wanted = ((REACH * scale + taps.len() as f64 / rate) * rate) as usize;
@@ -144,43 +134,30 @@ fn extract_band(
 
 /// Returns the edge of the stop band (Hz): as wide as the wanted time resolution needs, narrower where that
 /// keeps a neighbour out, but not narrower than the longest filter allows.
-fn stop_edge(
-    modes: &[KnownMode],
-    index: usize,
-    scale: f64,
-    rate: f64,
-    settings: &AmplitudeSettings,
-) -> f64 {
+fn stop_edge(modes: &[KnownMode], index: usize, scale: f64, rate: f64) -> f64 {
     let frequency = modes[index].frequency;
     let ends = FROM_ENDS * frequency.min(0.5 * rate - frequency);
     // Length of the filter times its stop edge (1), see `low_pass`.
     let product = KAISER_LENGTH / (1.0 - PASS);
-    let widest = (product / (settings.filter * scale)).min(ends);
-    let narrowest = (product / (settings.longest_filter * scale)).min(widest);
-    let mut stop = widest;
-    for (other, mode) in modes.iter().enumerate() {
-        let distance = MARGIN * (mode.frequency - frequency).abs();
-        if other != index && distance >= narrowest {
-            stop = stop.min(distance);
-        }
-    }
-    stop
+    let widest = (product / (FILTER * scale)).min(ends);
+    let narrowest = (product / (LONGEST_FILTER * scale)).min(widest);
+    let others = modes
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != index);
+    others
+        .map(|(_, mode)| MARGIN * (mode.frequency - frequency).abs())
+        .filter(|distance| *distance >= narrowest)
+        .fold(widest, f64::min)
 }
 
 /// Length of a Kaiser window's filter times its transition band, (A - 7.95)/14.36 (Oppenheim &
 /// Schafer).
 const KAISER_LENGTH: f64 = (ATTENUATION - 7.95) / 14.36;
 
-/// Returns half the length of the filter (samples).
-fn filter_half(stop: f64, rate: f64) -> f64 {
-    let transition = (1.0 - PASS) * stop;
-    (KAISER_LENGTH * rate / transition / 2.0).ceil().max(2.0)
-}
-
-/// Returns a low-pass filter with Kaiser's window, odd in length, gain 1 at 0 Hz.
-fn low_pass(stop: f64, rate: f64) -> Vec<f64> {
-    let half = filter_half(stop, rate);
-    let cutoff = 0.5 * (1.0 + PASS) * stop / rate;
+/// Returns a low-pass filter with Kaiser's window, gain 1 at 0 Hz, with so many samples to either side of its
+/// middle. The cutoff is in parts of the sample rate.
+fn low_pass(half: f64, cutoff: f64) -> Vec<f64> {
     let beta = kaiser_beta(ATTENUATION);
     let taps: Vec<f64> = (0..=2 * half as usize)
         .map(|n| {
@@ -208,33 +185,33 @@ fn mix_down(
     // Filter taps that mix down as well: 2 h(m) e^{-j theta (m - (M-1)/2)}. The factor 2 makes a real
     // oscillation's peak amplitude the modulus of the result.
     let middle = (taps.len() - 1) as f64 / 2.0;
-    let mut carrier = Vec::with_capacity(taps.len());
-    for (m, h) in taps.iter().enumerate() {
-        carrier.push(Complex64::from_polar(2.0 * h, -theta * (m as f64 - middle)));
-    }
-    let mut sensors = Vec::with_capacity(responses.len());
-    for samples in responses {
-        let mut values = Vec::with_capacity(count);
-        for from in (0..count).map(|n| n * stride) {
+    let carrier: Vec<Complex64> = (taps.iter().enumerate())
+        .map(|(m, h)| Complex64::from_polar(2.0 * h, -theta * (m as f64 - middle)))
+        .collect();
+    let starts = (0..count).map(|n| n * stride);
+    let sensors = responses.iter().map(|samples| {
+        let values = starts.clone().map(|from| {
             let (mut re, mut im) = (0.0, 0.0);
             for (x, h) in samples[from..].iter().zip(&carrier) {
                 re += x * h.re;
                 im += x * h.im;
             }
-            values.push(Complex64::new(re, im) * Complex64::from_polar(1.0, -theta * from as f64));
-        }
-        sensors.push(values);
-    }
-    sensors
+            Complex64::new(re, im) * Complex64::from_polar(1.0, -theta * from as f64)
+        });
+        values.collect()
+    });
+    sensors.collect()
 }
 
 /// Returns the poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
 fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
     let frequency = modes[index].frequency;
-    modes
+    let others = modes
         .iter()
         .enumerate()
-        .filter(|(other, mode)| *other != index && (mode.frequency - frequency).abs() < stop)
+        .filter(|(other, _)| *other != index);
+    others
+        .filter(|(_, mode)| (mode.frequency - frequency).abs() < stop)
         .map(|(_, mode)| {
             let sigma = TAU * mode.frequency * mode.damping_ratio.max(LEAST_DAMPING);
             Complex64::new(-sigma, TAU * (mode.frequency - frequency))

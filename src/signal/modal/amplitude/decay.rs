@@ -14,7 +14,7 @@ use rustfft::FftPlanner;
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
 
 use super::band::{Band, noise_variance};
-use super::{AmplitudePoint, AmplitudeSettings, AmplitudeVerdict, Companion, Origin};
+use super::{AIM, AmplitudePoint, AmplitudeVerdict, Companion, END, LONGEST, SHORTEST};
 
 /// Numbers of exponents tried for the mode: one is a pole that does not change.
 const DEGREES: [usize; 5] = [1, 2, 3, 5, 7];
@@ -54,8 +54,6 @@ pub(super) struct DecayModel {
     exponentials: Exponentials,
     /// Noise variance of the values.
     noise: f64,
-    /// Number of listed neighbours; they stand before the lines that were found.
-    listed: usize,
 }
 
 struct Candidate {
@@ -88,13 +86,26 @@ impl DecayModel {
             amplitude: series.first().copied().unwrap_or(Complex64::ONE),
             exponents: vec![Complex64::from(band.decay)],
             rate: -RATE * band.decay,
-            others: band
-                .neighbours
-                .iter()
+            others: (band.neighbours.iter())
                 .map(|p| (Complex64::ZERO, *p))
                 .collect(),
         };
-        let mut models = best_of_each_kind(whole.with_listed_lines(&start));
+        // The mode and its listed neighbours, with more and more exponents.
+        let mut models: Vec<Candidate> = Vec::new();
+        for degree in DEGREES {
+            let mut model = models
+                .last()
+                .map_or(&start, |lower| &lower.fit.model)
+                .clone();
+            model.exponents.resize(degree, Complex64::ZERO);
+            models.extend(whole.fit(model));
+            // Twice worse in a row: more exponents only follow the noise.
+            let criteria: Vec<f64> = models.iter().map(|model| model.criterion).collect();
+            if matches!(criteria[..], [.., a, b, c] if a < b && b < c) {
+                break;
+            }
+        }
+        models = best_of_each_kind(models);
         for _ in 0..MOST_FOUND {
             let with_line: Vec<Candidate> = models
                 .iter()
@@ -106,18 +117,16 @@ impl DecayModel {
             models.extend(with_line);
             models = best_of_each_kind(models);
         }
-        let (exponentials, noise) = match models.into_iter().min_by(by_criterion) {
+        match models.into_iter().min_by(by_criterion) {
             // What a model of the whole decay misses is no noise.
-            Some(best) => (
-                best.fit.model,
-                noise.min(best.fit.squares / whole.series.len() as f64),
-            ),
-            None => (start, noise),
-        };
-        DecayModel {
-            exponentials,
-            noise,
-            listed: band.neighbours.len(),
+            Some(best) => DecayModel {
+                noise: noise.min(best.fit.squares / whole.series.len() as f64),
+                exponentials: best.fit.model,
+            },
+            None => DecayModel {
+                exponentials: start,
+                noise,
+            },
         }
     }
 
@@ -126,27 +135,20 @@ impl DecayModel {
     fn bend(&self, t: f64, s: f64) -> Complex64 {
         let model = &self.exponentials;
         let bend = model.exponent(t + s) - model.exponent(t) - model.pole(t) * s;
-        if bend.norm() < LARGEST_BEND {
-            bend
-        } else {
-            Complex64::ZERO
+        match bend.norm() < LARGEST_BEND {
+            true => bend,
+            false => Complex64::ZERO,
         }
     }
 
     /// Returns the lines fitted along with the mode that matter.
     pub fn companions(&self, band: &Band) -> Vec<Companion> {
         let mode = self.exponentials.amplitude.norm();
-        let others = self.exponentials.others.iter().enumerate();
+        let others = self.exponentials.others.iter();
         others
-            .map(|(k, (amplitude, pole))| Companion {
-                tap: band.tap,
+            .map(|(amplitude, pole)| Companion {
                 frequency: band.frequency(*pole),
                 share: amplitude.norm() / mode,
-                origin: if k < self.listed {
-                    Origin::Listed
-                } else {
-                    Origin::Found
-                },
             })
             .filter(|companion| companion.share > LEAST_SHARE)
             .collect()
@@ -163,11 +165,9 @@ impl DecayModel {
             return None;
         }
         let mode = band.frequency(self.exponentials.pole(0.0));
-        let near = self
-            .companions(band)
-            .into_iter()
-            .filter(|companion| TAU * (companion.frequency - mode).abs() < -NEAR * band.decay);
-        let strongest = near.max_by(|a, b| a.share.total_cmp(&b.share))?;
+        let mut near = self.companions(band);
+        near.retain(|companion| TAU * (companion.frequency - mode).abs() < -NEAR * band.decay);
+        let strongest = near.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
         Some(AmplitudeVerdict::Beating {
             frequency: strongest.frequency,
         })
@@ -199,25 +199,6 @@ struct WholeDecay<'a> {
 }
 
 impl WholeDecay<'_> {
-    /// Fits the mode and its listed neighbours, with more and more exponents.
-    fn with_listed_lines(&self, start: &Exponentials) -> Vec<Candidate> {
-        let mut models: Vec<Candidate> = Vec::new();
-        for degree in DEGREES {
-            let mut model = match models.last() {
-                Some(lower) => lower.fit.model.clone(),
-                None => start.clone(),
-            };
-            model.exponents.resize(degree, Complex64::ZERO);
-            models.extend(self.fit(model));
-            // Twice worse in a row: more exponents only follow the noise.
-            let criteria: Vec<f64> = models.iter().map(|model| model.criterion).collect();
-            if matches!(criteria[..], [.., a, b, c] if a < b && b < c) {
-                break;
-            }
-        }
-        models
-    }
-
     fn fit(&self, model: Exponentials) -> Option<Candidate> {
         let degree = model.exponents.len();
         let count = self.series.len();
@@ -249,7 +230,23 @@ impl WholeDecay<'_> {
     /// one that stays, whichever takes more out.
     fn with_strongest_line(&self, candidate: &Candidate) -> Option<Candidate> {
         let residuals = &candidate.fit.residuals;
-        let offset = self.strongest_line(&candidate.fit)?;
+        let mut model = candidate.fit.model.clone();
+        let size = (4 * residuals.len()).next_power_of_two();
+        let mut lines = residuals.clone();
+        lines.resize(size, Complex64::ZERO);
+        FftPlanner::new().plan_fft_forward(size).process(&mut lines);
+        let spacing = TAU / (size as f64 * self.band.step);
+        let mode = model.pole(self.band.scale).im;
+        let sigma = -self.band.decay;
+        let offsets = lines.iter().enumerate().map(|(k, value)| {
+            // The upper half of the lines are those of negative frequencies.
+            let turn = if k < size / 2 { 0.0 } else { size as f64 };
+            ((k as f64 - turn) * spacing, value.norm_sqr())
+        });
+        // Outside what a drift makes.
+        let (offset, _) = offsets
+            .filter(|(offset, _)| (NEAREST * sigma..FAR * sigma).contains(&(offset - mode).abs()))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let (mut line, mut most) = (None, f64::NEG_INFINITY);
         for decay in [self.band.decay, 0.0] {
             let pole = Complex64::new(decay, offset);
@@ -265,54 +262,27 @@ impl WholeDecay<'_> {
                 (line, most) = (Some((product / energy, pole)), explained);
             }
         }
-        let mut model = candidate.fit.model.clone();
         model.others.push(line?);
-        self.fit(model).filter(|grown| self.is_plausible(grown))
-    }
-
-    /// Returns the angular frequency (rad/s, relative to the band's middle) of the largest line in the
-    /// residuals, outside what a drift makes.
-    fn strongest_line(&self, fit: &Fit) -> Option<f64> {
-        let size = (4 * fit.residuals.len()).next_power_of_two();
-        let mut lines = fit.residuals.clone();
-        lines.resize(size, Complex64::ZERO);
-        FftPlanner::new().plan_fft_forward(size).process(&mut lines);
-        let spacing = TAU / (size as f64 * self.band.step);
-        let mode = fit.model.pole(self.band.scale).im;
-        let sigma = -self.band.decay;
-        lines
-            .iter()
-            .enumerate()
-            .map(|(k, value)| {
-                // The upper half of the lines are those of negative frequencies.
-                let signed = if k < size / 2 {
-                    k as f64
-                } else {
-                    k as f64 - size as f64
-                };
-                (signed * spacing, value.norm_sqr())
-            })
-            .filter(|(offset, _)| (NEAREST * sigma..FAR * sigma).contains(&(offset - mode).abs()))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(offset, _)| offset)
-    }
-
-    /// Returns true where unlisted lines neither grow nor lie where a drift makes terms of its own.
-    fn is_plausible(&self, candidate: &Candidate) -> bool {
-        let model = &candidate.fit.model;
-        let sigma = -self.band.decay;
-        let mode = model.pole(self.band.scale);
+        let grown = self.fit(model)?;
+        // Unlisted lines may neither grow nor lie where a drift makes terms of its own.
+        let mode = grown.fit.model.pole(self.band.scale);
         let mut near = 0;
-        for (_, pole) in model.others.iter().skip(self.band.neighbours.len()) {
+        for (_, pole) in grown
+            .fit
+            .model
+            .others
+            .iter()
+            .skip(self.band.neighbours.len())
+        {
             let distance = (pole.im - mode.im).abs() / sigma;
             let hum = pole.re.abs() < HUM * sigma;
             near += usize::from(distance < NEAR && !hum);
             if distance < NEAREST || pole.re > HUM * sigma {
-                return false;
+                return None;
             }
         }
         // A pair beats. Several lines about a mode are what a drift looks like.
-        near == 0 || (near == 1 && !candidate.drifts())
+        (near == 0 || (near == 1 && !grown.drifts())).then_some(grown)
     }
 }
 
@@ -340,21 +310,6 @@ impl Exponentials {
         all.extend(&self.exponents);
         all.extend(self.others.iter().flat_map(|(c, p)| [*c, *p]));
         all
-    }
-
-    /// Returns a sum of as many terms with other parameters, real and imaginary parts in turn.
-    fn with_parameters(&self, parts: &[f64]) -> Self {
-        let all: Vec<Complex64> = parts
-            .chunks_exact(2)
-            .map(|part| Complex64::new(part[0], part[1]))
-            .collect();
-        let (mode, others) = all.split_at(1 + self.exponents.len());
-        Exponentials {
-            amplitude: mode[0],
-            exponents: mode[1..].to_vec(),
-            rate: self.rate,
-            others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
-        }
     }
 
     /// Returns the pole at a time: the derivative of the mode's exponent.
@@ -490,8 +445,16 @@ impl Problem for ExponentialFit<'_> {
     type State = Fit;
 
     fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
-        let model = self.terms.with_parameters(parameters);
-        let size = parameters.len() / 2;
+        let parts = parameters.chunks_exact(2);
+        let all: Vec<Complex64> = parts.map(|part| Complex64::new(part[0], part[1])).collect();
+        let (mode, others) = all.split_at(1 + self.terms.exponents.len());
+        let model = Exponentials {
+            amplitude: mode[0],
+            exponents: mode[1..].to_vec(),
+            rate: self.terms.rate,
+            others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
+        };
+        let size = all.len();
         let mut products = vec![Complex64::ZERO; size * size];
         let mut right = DVector::zeros(size);
         let (mut squares, mut prior_squares) = (0.0, 0.0);
@@ -594,20 +557,18 @@ pub(super) fn follow_decay(
     series: &[Complex64],
     band: &Band,
     model: &DecayModel,
-    settings: &AmplitudeSettings,
 ) -> Vec<AmplitudePoint> {
     let mut segments: Vec<Segment> = Vec::new();
     let mut pole = model.exponentials.pole(0.0);
     pole.re = pole.re.min(0.3 * band.decay);
     let mut amplitude = model.exponentials.amplitude.norm();
     let mut from = 0;
-    while let Some(length) = segment_length(amplitude, pole.re, model.noise, band, settings) {
+    while let Some(length) = segment_length(amplitude, pole.re, model.noise, band) {
         let Some(values) = series.get(from..from + length) else {
             break;
         };
-        let times: Vec<f64> = (from..from + length)
-            .map(|n| n as f64 * band.step)
-            .collect();
+        let indices = from..from + length;
+        let times: Vec<f64> = indices.map(|n| n as f64 * band.step).collect();
         let Some(segment) = fit_segment(&times, values, pole, model) else {
             break;
         };
@@ -622,8 +583,20 @@ pub(super) fn follow_decay(
     }
     let mut points = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
-        let near = &segments[index.saturating_sub(1)..(index + 2).min(segments.len())];
-        let std = (0.5 * noise_of(near) * band.noise_ratio * segment.inverse).sqrt();
+        // The noise variance comes from the residuals of neighbouring segments: one alone has too few values.
+        let (mut squares, mut products, mut freedom) = (0.0, 0.0, 0.0);
+        for near in &segments[index.saturating_sub(1)..(index + 2).min(segments.len())] {
+            squares += near.squares;
+            products += near.products;
+            freedom += near.freedom;
+        }
+        // Residuals that agree with their neighbours (correlation r) are what the model misses. They leave
+        // (1 - r)/(1 + r) of the values' information. One standard deviation of a correlation by chance is
+        // 1/sqrt(2n) with n complex values.
+        let agreement = products / f64::max(squares, f64::MIN_POSITIVE);
+        let agreement = (agreement - 1.0 / f64::sqrt(2.0 * freedom)).clamp(0.0, 0.9);
+        let noise = squares / freedom * (1.0 + agreement) / (1.0 - agreement);
+        let std = (0.5 * noise * band.noise_ratio * segment.inverse).sqrt();
         let pole = Complex64::new(segment.pole.re, segment.pole.im + band.omega);
         points.push(AmplitudePoint {
             tap: band.tap,
@@ -643,43 +616,19 @@ pub(super) fn follow_decay(
 ///
 /// Bound of Cramer and Rao for one exponential of amplitude A in noise of variance v:
 /// var(sigma) = 6 v/(A^2 N^3 step^2) with A that of the segment's middle.
-fn segment_length(
-    amplitude: f64,
-    decay: f64,
-    noise: f64,
-    band: &Band,
-    settings: &AmplitudeSettings,
-) -> Option<usize> {
-    let [least, most] = [settings.shortest, settings.longest]
+fn segment_length(amplitude: f64, decay: f64, noise: f64, band: &Band) -> Option<usize> {
+    let [least, most] = [SHORTEST, LONGEST]
         .map(|share| ((share * band.scale / band.step) as usize).max(LEAST_IN_SEGMENT));
     let mut length = least.min(most);
     loop {
         let n = length as f64;
         let middle = amplitude * (0.5 * decay * n * band.step).exp();
         let uncertainty = (6.0 * noise / n.powi(3)).sqrt() / (middle * band.step) / decay.abs();
-        if uncertainty <= settings.aim || length >= most {
-            return (uncertainty <= settings.end).then_some(length);
+        if uncertainty <= AIM || length >= most {
+            return (uncertainty <= END).then_some(length);
         }
         length += 1;
     }
-}
-
-/// Returns the noise variance from the residuals of neighbouring segments: one alone has too few values.
-///
-/// Residuals that agree with their neighbours (correlation r) are what the model misses. They leave
-/// (1 - r)/(1 + r) of the values' information.
-fn noise_of(segments: &[Segment]) -> f64 {
-    let (mut squares, mut products, mut freedom) = (0.0, 0.0, 0.0);
-    for segment in segments {
-        squares += segment.squares;
-        products += segment.products;
-        freedom += segment.freedom;
-    }
-    let agreement = products / f64::max(squares, f64::MIN_POSITIVE);
-    // One standard deviation of a correlation by chance: 1/sqrt(2n) with n complex values.
-    let chance = 1.0 / f64::sqrt(2.0 * freedom);
-    let agreement = (agreement - chance).clamp(0.0, 0.9);
-    squares / freedom * (1.0 + agreement) / (1.0 - agreement)
 }
 
 /// Fits the mode to values at `times` (s after the band's first value), starting at `pole`.

@@ -1,17 +1,20 @@
-//! Fit of one group of modes over its band.
+//! Fits of groups of modes, each over its band, swept until the poles stay.
 //!
-//! A band reaches ten half widths to either side of its modes. Modes near each other form a group and are
-//! fitted jointly. Distant modes are subtracted, near ones keep free amplitudes, and a polynomial of the
-//! frequency stands for everything else that the data show in the band.
+//! A sweep fits one group after the other, with the amplitudes that the other groups had before. A band reaches
+//! ten half widths to either side of its modes. Modes near each other form a group and are fitted jointly.
+//! Distant modes are subtracted, near ones keep free amplitudes, and a polynomial of the frequency stands for
+//! everything else that the data show in the band.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use tapjoint_numerics::stats::chi_square_tail;
 
 use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes};
-use super::{ModalData, StopReason, Unfit};
+use super::{FitSettings, ModalData, PoleStart, StopReason, Unfit};
 use crate::modal::Subspace;
 
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
@@ -60,30 +63,6 @@ pub(super) fn lines_between(data: &ModalData, low: f64, high: f64) -> Range<usiz
     first..end.max(first)
 }
 
-/// Bands (Hz) that a fit from these starts (frequency in Hz, damping ratio) may use.
-///
-/// A collector of decays must keep them. They are twice as wide as the starts ask for, because a fitted
-/// mode may turn out wider. `resolution` is 1/T (Hz).
-pub fn bands_for(starts: &[(f64, f64)], resolution: f64) -> Vec<(f64, f64)> {
-    starts
-        .iter()
-        .map(|&(frequency, damping_ratio)| {
-            let pole = Complex64::new(-damping_ratio * frequency, frequency) / resolution;
-            let half = 2.0 * half_band(pole) * resolution;
-            (frequency - half, frequency + half)
-        })
-        .collect()
-}
-
-/// A mode that does not belong to the group.
-#[derive(Debug, Clone)]
-pub(super) struct Neighbour {
-    /// Its pole (lines).
-    pub pole: Complex64,
-    /// Its amplitude in every column, once it has been fitted.
-    pub amplitudes: Option<Vec<Complex64>>,
-}
-
 /// Lines of a group's band without distant modes, and the functions of the near ones.
 pub(super) struct BandData<'a> {
     pub data: &'a ModalData,
@@ -97,40 +76,34 @@ pub(super) struct BandData<'a> {
 }
 
 impl<'a> BandData<'a> {
-    /// Takes the band of `poles` (lines) out of the data, thinned to `most` lines at most.
+    /// Takes the band of some modes at their present poles out of the data.
     ///
-    /// Neighbours outside the band are subtracted. Those inside, or less than a quarter of the band
-    /// away, keep free amplitudes. `steady` are positions of undamped lines (lines).
-    pub fn new(
-        data: &'a ModalData,
-        poles: &[Complex64],
-        neighbours: &[Neighbour],
-        steady: &[f64],
-        most: usize,
-    ) -> Result<Self, Unfit> {
+    /// Neighbours outside the band are subtracted, once they have been fitted. Those inside, or less than a quarter
+    /// of the band away, keep free amplitudes.
+    pub fn new(accepted: &Accepted<'a>, members: &[usize]) -> Result<Self, Unfit> {
+        let data = accepted.data;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for &pole in poles {
+        for pole in accepted.poles(members) {
             low = low.min(pole.im - half_band(pole));
             high = high.max(pole.im + half_band(pole));
         }
         let range = lines_between(data, low, high);
         // Two complex lines for a pole's two parts and its amplitude, and one to see a misfit.
-        let least = 2 * poles.len() + 1;
+        let least = 2 * members.len() + 1;
         if range.len() < least {
             return Err(Unfit::TooFewLines {
                 lines: range.len(),
                 least,
             });
         }
-        let lines = Lines::new(data, range, most.max(least));
+        let lines = Lines::new(data, range, accepted.most_lines.max(least));
         let (first, stride, count) = (lines.first, lines.stride, lines.count());
-        let mut used = Vec::new();
-        for (index, column) in data.columns().iter().enumerate() {
-            let mut values = column.values[first..].iter().step_by(stride).take(count);
-            if values.any(|value| value.norm_sqr() > 0.0) {
-                used.push(index);
-            }
-        }
+        let mut used: Vec<usize> = (0..data.columns().len()).collect();
+        used.retain(|&index| {
+            let values = data.columns()[index].values[first..].iter();
+            let mut values = values.step_by(stride).take(count);
+            values.any(|value| value.norm_sqr() > 0.0)
+        });
         if used.is_empty() {
             return Err(Unfit::NoSignal);
         }
@@ -141,19 +114,24 @@ impl<'a> BandData<'a> {
         let margin = 0.25 * (high - low);
         let reach = low - margin..=high + margin;
         let mut near = Vec::new();
-        for other in neighbours {
-            if reach.contains(&other.pole.im) {
-                near.push(other.pole);
-            } else if let Some(all) = &other.amplitudes {
+        for (index, pole) in accepted.alive() {
+            if members.contains(&index) {
+                continue;
+            }
+            if reach.contains(&pole.im) {
+                near.push(pole);
+            } else if let Some(all) = &accepted.modes[index].amplitudes {
                 let amplitudes = DMatrix::from_fn(2, used.len(), |row, place| {
                     let value = all[used[place]];
                     if row == 0 { value.re } else { value.im }
                 });
-                values -= lines.model(&[other.pole]) * amplitudes;
+                values -= lines.model(&[pole]) * amplitudes;
             }
         }
-        let hum = steady.iter().filter(|&position| reach.contains(position));
-        near.extend(hum.map(|&position| Complex64::new(-STEADY, position)));
+        let steady = accepted.settings.steady_lines.iter();
+        let hum = steady.map(|&frequency| frequency / data.spacing());
+        let hum = hum.filter(|position| reach.contains(position));
+        near.extend(hum.map(|position| Complex64::new(-STEADY, position)));
         Ok(BandData {
             data,
             lines,
@@ -216,23 +194,22 @@ impl<'a> BandData<'a> {
         terms: usize,
         noise: &[f64],
     ) {
-        let factors: &[f64] = if damping_known {
-            &[0.5, 1.0, 2.0]
-        } else {
-            &[0.1, 0.3, 1.0, 3.0, 10.0]
+        let factors: &[f64] = match damping_known {
+            true => &[0.5, 1.0, 2.0],
+            false => &[0.1, 0.3, 1.0, 3.0, 10.0],
         };
         let line = self.data.resolution() / self.data.spacing();
-        let offsets = [-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75].map(|share| share * line);
+        let shares = [-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75].iter();
         let problem = self.problem(terms, noise);
         for round in 0..3 {
             let pole = poles[place];
-            let tries: Vec<Complex64> = if round == 1 {
-                offsets
-                    .map(|offset| pole + Complex64::new(0.0, offset))
-                    .into()
-            } else {
-                let damped = factors.iter().map(|f| Complex64::new(pole.re * f, pole.im));
-                damped.collect()
+            let tries: Vec<Complex64> = match round {
+                1 => (shares.clone())
+                    .map(|share| pole + Complex64::new(0.0, share * line))
+                    .collect(),
+                _ => (factors.iter())
+                    .map(|factor| Complex64::new(pole.re * factor, pole.im))
+                    .collect(),
             };
             let (mut best, mut least) = (pole, f64::INFINITY);
             for pole in tries {
@@ -400,17 +377,13 @@ impl GroupFit {
     fn needs(&self, more: &GroupFit) -> bool {
         let terms = self.freedom - more.freedom;
         let gain = (self.at.square_sum - more.at.square_sum) / terms / more.variance;
-        if FisherSnedecor::new(terms, more.freedom)
-            .is_ok_and(|f| gain > 0.0 && f.sf(gain) < TERM_LEVEL)
-        {
+        let chance = FisherSnedecor::new(terms, more.freedom);
+        if chance.is_ok_and(|chance| gain > 0.0 && chance.sf(gain) < TERM_LEVEL) {
             return true;
         }
-        let (efficient, robust) = (&self.slopes.information, &more.slopes.information);
-        let (Some(efficient), Some(robust), Ok(chi_squared)) = (
-            efficient.clone().try_inverse(),
-            robust.clone().try_inverse(),
-            ChiSquared::new(1.0),
-        ) else {
+        let [efficient, robust] =
+            [self, more].map(|fit| fit.slopes.information.clone().try_inverse());
+        let (Some(efficient), Some(robust)) = (efficient, robust) else {
             return false;
         };
         let level = TERM_LEVEL / efficient.nrows() as f64;
@@ -418,7 +391,7 @@ impl GroupFit {
             let change = more.at.poles[i / 2] - self.at.poles[i / 2];
             let change = if i % 2 == 0 { change.im } else { change.re };
             let explained = (robust[(i, i)] - efficient[(i, i)]) * more.variance;
-            explained > 0.0 && chi_squared.sf(change * change / explained) < level
+            explained > 0.0 && chi_square_tail(change * change / explained, 1.0) < level
         })
     }
 }
@@ -426,4 +399,273 @@ impl GroupFit {
 /// Complex value in the rows (real, imaginary) of the pole at `place`.
 pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) -> Complex64 {
     Complex64::new(matrix[(2 * place, column)], matrix[(2 * place + 1, column)])
+}
+
+/// Most sweeps in which no start fails; two suffice for modes far apart.
+const MOST_SWEEPS: usize = 8;
+/// A sweep that moves no pole by more than this share of its standard deviation is the last.
+const STILL: f64 = 0.02;
+/// Terms of the background while neighbours have not been fitted.
+const FIRST_TERMS: usize = 2;
+
+/// One mode between the sweeps.
+#[derive(Debug, Clone)]
+pub(super) struct ModeState {
+    start: Complex64,
+    /// True where the start has a damping of its own.
+    damping_known: bool,
+    pole: Complex64,
+    amplitudes: Option<Vec<Complex64>>,
+    /// Noise of every column in its band; 0 where a column was not used.
+    noise: Vec<f64>,
+    pub failed: Option<Unfit>,
+}
+
+impl ModeState {
+    /// Begins at a start; `added` is a window's decay (1/s).
+    pub fn new(data: &ModalData, start: &PoleStart, added: f64) -> Self {
+        let position = start.frequency / data.spacing();
+        let unknown = 0.3 * data.resolution() / data.spacing();
+        let decay = start
+            .damping_ratio
+            .filter(|ratio| *ratio > 0.0)
+            .map_or(unknown, |ratio| ratio * position);
+        let pole = Complex64::new(-decay - added / TAU / data.spacing(), position);
+        let possible = position > 0.0 && start.frequency < data.highest() && pole.is_finite();
+        ModeState {
+            start: pole,
+            damping_known: start.damping_ratio.is_some(),
+            pole,
+            amplitudes: None,
+            noise: Vec::new(),
+            failed: (!possible).then_some(Unfit::OutsideBand),
+        }
+    }
+
+    /// Reason why there is no mode; where none is known, the mode cannot be told from another.
+    pub fn reason(&self) -> Unfit {
+        self.failed.clone().unwrap_or(Unfit::NotIndependent)
+    }
+
+    /// Returns the reason why the fitted pole is no mode near its start.
+    ///
+    /// `deviations` are the standard deviations of position and decay (lines).
+    fn refusal(&self, data: &ModalData, deviations: [f64; 2]) -> Option<Unfit> {
+        let spacing = data.spacing();
+        let line = data.resolution() / spacing;
+        let pole = self.pole;
+        let allowed = 3.0 * line + 3.0 * self.start.re.abs().max(pole.re.abs());
+        let lines = data.frequencies();
+        let (first, last) = (lines[0], lines[lines.len() - 1]);
+        let away = (pole.im - self.start.im).abs();
+        if pole.im < first / spacing || pole.im > last / spacing || away > allowed {
+            return Some(Unfit::LeftStart {
+                frequency: pole.im * spacing,
+                distance: away * spacing,
+            });
+        }
+        if pole.re >= 0.0 {
+            return Some(Unfit::NoDecay);
+        }
+        let wide = line.max(pole.re.abs());
+        let vague = deviations.iter().any(|std| std.is_nan() || *std > wide);
+        vague.then_some(Unfit::Undetermined {
+            std: deviations[0] * spacing,
+        })
+    }
+}
+
+/// A group after the last sweep.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    pub members: Vec<usize>,
+    pub fit: GroupFit,
+}
+
+/// Fitted modes, beside which other modes are tested.
+#[derive(Debug, Clone)]
+pub struct Accepted<'a> {
+    pub(super) data: &'a ModalData,
+    pub(super) settings: FitSettings,
+    pub(super) modes: Vec<ModeState>,
+    /// Most lines of a band that are taken.
+    pub(super) most_lines: usize,
+}
+
+impl Accepted<'_> {
+    /// Fits one more start beside modes that were swept; `None` where it fails.
+    ///
+    /// Returns its group once the poles stay. Modes of other groups do not change.
+    pub(super) fn add(&mut self, start: &PoleStart) -> Option<Group> {
+        let place = self.modes.len();
+        let added = self.settings.added_decay;
+        self.modes.push(ModeState::new(self.data, start, added));
+        let mut fitted = Vec::new();
+        for sweep in 0..MOST_SWEEPS {
+            let groups = groups(&self.alive());
+            let mut own = groups.into_iter().find(|group| group.contains(&place))?;
+            // Other modes of the group stay as they are where they are too narrow for thinned lines.
+            let stride = 2.0 * half_band(self.modes[place].pole) / self.most_lines as f64;
+            own.retain(|&index| {
+                index == place || stride <= 1.0 || half_width(self.modes[index].pole) >= stride
+            });
+            let moved = self.sweep(vec![own], &mut fitted);
+            if sweep > 0 && moved < STILL {
+                break;
+            }
+        }
+        let settled = self.modes[place].amplitudes.is_some();
+        fitted.pop().filter(|_| settled)
+    }
+
+    /// Indices and poles of the modes that have not failed.
+    fn alive(&self) -> Vec<(usize, Complex64)> {
+        let modes = self.modes.iter().enumerate();
+        let alive = modes.filter(|(_, mode)| mode.failed.is_none());
+        alive.map(|(index, mode)| (index, mode.pole)).collect()
+    }
+
+    /// Sweeps until the poles stay; returns the groups of the last sweep.
+    pub(super) fn run(&mut self) -> Vec<Group> {
+        let mut fitted = Vec::new();
+        let mut sweeps = 0;
+        // A sweep in which a start fails adds one: modes that were fitted together with it begin again.
+        let mut most = MOST_SWEEPS;
+        while sweeps < most {
+            let mut groups = groups(&self.alive());
+            if sweeps == 0 {
+                // Strong modes first: their flanks disturb the weak ones.
+                groups.sort_by(|a, b| self.power(b[0]).total_cmp(&self.power(a[0])));
+            }
+            let before = self.alive().len();
+            let moved = self.sweep(groups, &mut fitted);
+            most += usize::from(self.alive().len() < before);
+            sweeps += 1;
+            if sweeps > 1 && moved < STILL {
+                break;
+            }
+        }
+        fitted.retain(|group: &Group| {
+            let mut members = group.members.iter();
+            members.all(|&index| self.modes[index].amplitudes.is_some())
+        });
+        fitted
+    }
+
+    /// Power of all columns within half a line of a mode.
+    fn power(&self, index: usize) -> f64 {
+        let position = self.modes[index].pole.im;
+        let lines = lines_between(self.data, position - 0.5, position + 0.5);
+        let columns = self.data.columns().iter();
+        columns
+            .flat_map(|column| &column.values[lines.clone()])
+            .map(Complex64::norm_sqr)
+            .sum()
+    }
+
+    /// Fits each group once. Returns how far the poles moved, in their standard deviations.
+    fn sweep(&mut self, groups: Vec<Vec<usize>>, fitted: &mut Vec<Group>) -> f64 {
+        fitted.clear();
+        let mut moved: f64 = 0.0;
+        for members in groups {
+            match self.fit_group(&members) {
+                Ok(fit) => {
+                    moved = moved.max(self.accept(&members, &fit));
+                    fitted.push(Group { members, fit });
+                }
+                Err(reason) => {
+                    moved = f64::INFINITY;
+                    if let Some(&last) = members.iter().max() {
+                        self.give_up(&members, last, reason);
+                    }
+                }
+            }
+        }
+        moved
+    }
+
+    /// Drops one start; the modes fitted together with it begin again.
+    fn give_up(&mut self, members: &[usize], failed: usize, reason: Unfit) {
+        for &index in members {
+            let mode = &mut self.modes[index];
+            mode.pole = mode.start;
+            mode.amplitudes = None;
+        }
+        self.modes[failed].failed = Some(reason);
+    }
+
+    /// Takes over the poles of a fit. Returns how far they moved in standard deviations.
+    fn accept(&mut self, members: &[usize], fit: &GroupFit) -> f64 {
+        let deviations = fit.deviations();
+        let columns = self.data.columns().len();
+        let mut most: f64 = 0.0;
+        let mut refused: Option<(usize, Unfit)> = None;
+        for (place, &index) in members.iter().enumerate() {
+            let mode = &mut self.modes[index];
+            let pole = fit.at.poles[place];
+            let change = pole - mode.pole;
+            most = most
+                .max(change.im.abs() / deviations[place][0])
+                .max(change.re.abs() / deviations[place][1]);
+            mode.pole = pole;
+            mode.amplitudes = Some(fit.amplitudes(place, columns));
+            mode.noise = fit.noise_by_column(columns);
+            // The latest start of several doubtful poles goes: two poles for one resonance make each
+            // other doubtful.
+            if let Some(reason) = mode.refusal(self.data, deviations[place])
+                && refused.as_ref().is_none_or(|(other, _)| index >= *other)
+            {
+                refused = Some((index, reason));
+            }
+        }
+        if let Some((index, reason)) = refused {
+            // Two starts within a line are one resonance, of which the later one goes.
+            let line = self.data.resolution() / self.data.spacing();
+            let start = self.modes[index].start.im;
+            let later = members.iter().copied().filter(|&other| {
+                other >= index && (self.modes[other].start.im - start).abs() < line
+            });
+            let last = later.max().unwrap_or(index);
+            self.give_up(members, last, reason);
+            return f64::INFINITY;
+        }
+        if most.is_nan() { f64::INFINITY } else { most }
+    }
+
+    /// Fits a group from its present poles.
+    fn fit_group(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
+        let band = BandData::new(self, members)?;
+        let mut poles = self.poles(members);
+        let mut modes = members.iter().map(|&index| &self.modes[index]);
+        if modes.all(|mode| mode.amplitudes.is_some()) {
+            // The noise of the sweep before, where all columns had one.
+            let first = members.first();
+            let known = first.map_or(&[][..], |&index| &self.modes[index].noise);
+            let noise: Option<Vec<f64>> = (band.used.iter())
+                .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
+                .collect();
+            let noise = match noise {
+                Some(noise) => noise,
+                None => band.noise_of(&band.fit(&poles, 0, &band.scale())?),
+            };
+            return band.settled_fit(&poles, &noise);
+        }
+        let mut numbers = (0..=FIRST_TERMS).rev();
+        let terms = numbers.find(|&terms| band.has_room(&poles, terms));
+        let terms = terms.unwrap_or(0);
+        let scale = band.scale();
+        for (place, &index) in members.iter().enumerate() {
+            let known = self.modes[index].damping_known;
+            band.improve_start(&mut poles, place, known, terms, &scale);
+        }
+        let fit = band.fit(&poles, terms, &scale)?;
+        let noise = band.noise_of(&fit);
+        band.fit(&fit.at.poles, terms, &noise)
+    }
+
+    /// Present poles of these modes (lines).
+    fn poles(&self, members: &[usize]) -> Vec<Complex64> {
+        let members = members.iter();
+        members.map(|&index| self.modes[index].pole).collect()
+    }
 }

@@ -13,14 +13,13 @@
 mod group;
 mod modal_constant;
 mod mode_fit;
-mod sweep;
 mod variable_projection;
 
-pub use group::bands_for;
+pub use group::Accepted;
 pub use modal_constant::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub use mode_fit::{
-    Accepted, ColumnAmplitude, ExtraMode, ExtraVerdict, FittedValue, ModeFit, TapFit,
-    UncertaintySource, fit_modes, scatter_about_mean, weighted_mean,
+    ColumnAmplitude, ExtraMode, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
+    scatter_about_mean, weighted_mean,
 };
 pub use tapjoint_numerics::least_squares::StopReason;
 

@@ -11,11 +11,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, Matrix2};
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-use tapjoint_numerics::stats::{root_mean_square, student};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use tapjoint_numerics::stats::{chi_square_tail, root_mean_square, student};
 
-use super::group::{BandData, GroupFit, complex_row};
-use super::sweep::{Group, Sweeper};
+use super::group::{Accepted, BandData, Group, GroupFit, ModeState, complex_row};
 use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
 /// A scatter of the taps less probable than this is more than noise.
@@ -83,12 +82,13 @@ impl FittedValue {
             high: value,
             source: UncertaintySource::Residual,
             freedom,
-            scatter_probability: scatter_probability(taps),
+            // By the chi-squared test of the taps about their weighted mean.
+            scatter_probability: (taps.len() > 1)
+                .then(|| scatter_about_mean(taps))
+                .filter(|scatter| scatter.is_finite())
+                .map(|scatter| chi_square_tail(scatter, taps.len() as f64 - 1.0)),
         };
-        if fitted
-            .scatter_probability
-            .is_some_and(|p| p < SCATTER_LEVEL)
-        {
+        if (fitted.scatter_probability).is_some_and(|p| p < SCATTER_LEVEL) {
             let (mean, scatter) = weighted_mean(taps);
             fitted.value = mean;
             // Scatter cannot make a value better than the noise permits.
@@ -101,16 +101,6 @@ impl FittedValue {
         fitted.high = fitted.value + half;
         fitted
     }
-}
-
-/// Returns the probability of the taps' scatter about their weighted mean by noise alone (chi-squared test).
-fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
-    if taps.len() < 2 {
-        return None;
-    }
-    let scatter = scatter_about_mean(taps);
-    let distribution = ChiSquared::new(taps.len() as f64 - 1.0).ok()?;
-    scatter.is_finite().then(|| distribution.sf(scatter))
 }
 
 /// Returns the chi-squared of values with their standard deviations about their weighted mean.
@@ -127,10 +117,8 @@ pub fn scatter_about_mean(taps: &[(f64, f64)]) -> f64 {
 pub fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
     let degrees = taps.len() as f64 - 1.0;
     let (total, _, scatter) = weighted_moments(taps, 0.0);
-    let squares: f64 = taps
-        .iter()
-        .map(|(_, std)| (1.0 / (std * std)).powi(2))
-        .sum();
+    let squares = taps.iter().map(|(_, std)| (1.0 / (std * std)).powi(2));
+    let squares: f64 = squares.sum();
     let between = ((scatter - degrees) / (total - squares / total)).max(0.0);
     let (total, mean, scatter) = weighted_moments(taps, between);
     (mean, (scatter / (degrees * total)).sqrt())
@@ -147,9 +135,8 @@ fn weighted_moments(taps: &[(f64, f64)], between: f64) -> (f64, f64, f64) {
     let mean = sum / total;
     let scatter = taps
         .iter()
-        .map(|(value, std)| (value - mean).powi(2) / (std * std + between))
-        .sum();
-    (total, mean, scatter)
+        .map(|(value, std)| (value - mean).powi(2) / (std * std + between));
+    (total, mean, scatter.sum())
 }
 
 /// Complex amplitude of a mode in one column.
@@ -214,33 +201,7 @@ pub fn fit_modes(
     starts: &[PoleStart],
     settings: &FitSettings,
 ) -> Vec<Result<ModeFit, Unfit>> {
-    let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
-    let groups = sweeper.run();
-    mode_fits(&mut sweeper, &groups, settings)
-}
-
-/// Reads the modes from the fits of their groups. Returns for each start its mode, or why there is none.
-pub(super) fn mode_fits(
-    sweeper: &mut Sweeper,
-    groups: &[Group],
-    settings: &FitSettings,
-) -> Vec<Result<ModeFit, Unfit>> {
-    let mut modes: Vec<Option<ModeFit>> = vec![None; sweeper.modes.len()];
-    for group in groups {
-        let reader = GroupReader::new(sweeper.data, settings, group);
-        for (place, &index) in group.members.iter().enumerate() {
-            match reader.mode(place) {
-                Ok(fit) => modes[index] = Some(fit),
-                Err(reason) => sweeper.modes[index].failed = Some(reason),
-            }
-        }
-    }
-    let mut results = Vec::with_capacity(modes.len());
-    for (mode, state) in modes.into_iter().zip(&sweeper.modes) {
-        let reason = state.failed.clone().unwrap_or(Unfit::NotIndependent);
-        results.push(mode.ok_or(reason));
-    }
-    results
+    Accepted::new(data, starts, settings).1
 }
 
 /// Poles of one tap fitted alone, with their covariance (lines).
@@ -267,7 +228,28 @@ struct GroupReader<'a> {
 
 impl<'a> GroupReader<'a> {
     fn new(data: &'a ModalData, settings: &FitSettings, group: &'a Group) -> Self {
-        let (correlation, inflation) = residual_correlation(&group.fit);
+        let fit = &group.fit;
+        let (correlation, inflation) = residual_correlation(fit);
+        // The columns of each tap are fitted alone, from the joint poles. Taps that cannot be fitted are left out.
+        let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, &column) in fit.used.iter().enumerate() {
+            let tap = data.columns()[column].tap;
+            places.entry(tap).or_default().push(place);
+        }
+        let mut problem = fit.problem.clone();
+        let mut taps = Vec::new();
+        for (tap, places) in places {
+            problem.columns = fit.problem.columns.select_columns(&places);
+            if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
+                && let Some(covariance) = best.slopes.covariance(fit.variance)
+            {
+                taps.push(TapPoles {
+                    tap,
+                    poles: best.at.poles,
+                    covariance,
+                });
+            }
+        }
         GroupReader {
             data,
             group,
@@ -275,7 +257,7 @@ impl<'a> GroupReader<'a> {
             repetition: data.resolution() / data.spacing(),
             correlation,
             inflation,
-            taps: fit_taps(data, &group.fit),
+            taps,
         }
     }
 
@@ -457,44 +439,13 @@ fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
     }
 }
 
-/// Fits the columns of each tap alone, from the joint poles. Taps that cannot be fitted are left out.
-fn fit_taps(data: &ModalData, fit: &GroupFit) -> Vec<TapPoles> {
-    // Places of each tap's columns.
-    let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (place, &column) in fit.used.iter().enumerate() {
-        let tap = data.columns()[column].tap;
-        places.entry(tap).or_default().push(place);
-    }
-    let mut problem = fit.problem.clone();
-    let mut fitted = Vec::new();
-    for (tap, places) in places {
-        problem.columns = fit.problem.columns.select_columns(&places);
-        if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
-            && let Some(covariance) = best.slopes.covariance(fit.variance)
-        {
-            fitted.push(TapPoles {
-                tap,
-                poles: best.at.poles,
-                covariance,
-            });
-        }
-    }
-    fitted
-}
-
 /// Test result for one more mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtraMode {
-    /// Outcome of the test; every figure below must support the mode.
-    pub verdict: ExtraVerdict,
-    /// Fall of the residual per unknown over the residual per degree of freedom.
-    pub f_statistic: f64,
-    /// Probability of a larger fall by noise alone at one given place.
+    /// True where the data need the mode: noise alone does not explain it, and it decays.
+    pub needed: bool,
+    /// Probability of a larger fall of the residual by noise alone at one given place.
     pub probability: f64,
-    /// Fall of Schwarz's criterion; a positive value supports the mode.
-    pub information_gain: f64,
-    /// Root mean square over the columns of amplitude over standard deviation.
-    pub amplitude_over_std: f64,
     /// Modal assurance criterion between its shape and that of the nearest other mode of its group.
     ///
     /// For free decays it is taken over the sensors, as the mean of all taps weighted by their power; for
@@ -504,17 +455,6 @@ pub struct ExtraMode {
     pub likeness: Option<f64>,
     /// Fit of the mode together with the others.
     pub fit: Result<ModeFit, Unfit>,
-}
-
-/// Outcome of the test for one more mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ExtraVerdict {
-    /// The data need the mode.
-    Needed,
-    /// Noise alone explains it as well.
-    NotSignificant,
-    /// It has no pole of its own near its start, or one that does not decay by two standard deviations.
-    NoMode,
 }
 
 /// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
@@ -527,13 +467,6 @@ const LEAST_AMPLITUDE: f64 = 4.0;
 /// times its standard deviation, so that a mode that only all lines together show is not found.
 const SCREENED: usize = 1000;
 
-/// Fitted modes, beside which other modes are tested.
-#[derive(Debug, Clone)]
-pub struct Accepted<'a> {
-    sweeper: Sweeper<'a>,
-    settings: FitSettings,
-}
-
 impl<'a> Accepted<'a> {
     /// Fits the modes that begin at `starts`. Returns also for each start its mode or the reason why there is
     /// none, as [`fit_modes`](super::fit_modes) does.
@@ -542,11 +475,35 @@ impl<'a> Accepted<'a> {
         starts: &[PoleStart],
         settings: &FitSettings,
     ) -> (Self, Vec<Result<ModeFit, Unfit>>) {
-        let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
-        let groups = sweeper.run();
-        let fits = mode_fits(&mut sweeper, &groups, settings);
-        let settings = settings.clone();
-        (Accepted { sweeper, settings }, fits)
+        let starts = starts.iter();
+        let mut accepted = Accepted {
+            data,
+            settings: settings.clone(),
+            modes: starts
+                .map(|start| ModeState::new(data, start, settings.added_decay))
+                .collect(),
+            most_lines: usize::MAX,
+        };
+        let groups = accepted.run();
+        let fits = accepted.read(&groups);
+        (accepted, fits)
+    }
+
+    /// Reads the modes from the fits of their groups. Returns for each start its mode, or why there is none.
+    fn read(&mut self, groups: &[Group]) -> Vec<Result<ModeFit, Unfit>> {
+        let mut fits: Vec<Option<ModeFit>> = vec![None; self.modes.len()];
+        for group in groups {
+            let reader = GroupReader::new(self.data, &self.settings, group);
+            for (place, &index) in group.members.iter().enumerate() {
+                match reader.mode(place) {
+                    Ok(fit) => fits[index] = Some(fit),
+                    Err(reason) => self.modes[index].failed = Some(reason),
+                }
+            }
+        }
+        let fits = fits.into_iter().zip(&self.modes);
+        fits.map(|(fit, state)| fit.ok_or_else(|| state.reason()))
+            .collect()
     }
 
     /// Tests whether the data ask for a mode that begins at `extra`. Returns the test, and all modes together.
@@ -557,84 +514,61 @@ impl<'a> Accepted<'a> {
     /// tried on all lines.
     pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
         let (test, mut together, stride) = self.test_on(extra, SCREENED);
-        if test.verdict == ExtraVerdict::Needed && stride > 1 {
+        if test.needed && stride > 1 {
             let (test, together, _) = self.test_on(extra, usize::MAX);
             return (test, together);
         }
-        together.sweeper.most_lines = usize::MAX;
+        together.most_lines = usize::MAX;
         (test, together)
     }
 
     /// Tests on at most so many lines of the band. Returns also the step between the lines taken.
     fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
         let mut beside = self.clone();
-        beside.sweeper.most_lines = most_lines;
-        let Some(group) = beside.sweeper.add(extra) else {
-            let last = beside.sweeper.modes.last();
-            let failed = last.and_then(|mode| mode.failed.clone());
-            let reason = failed.unwrap_or(Unfit::NotIndependent);
-            return (ExtraMode::none(Err(reason)), beside, 1);
-        };
-        let test = beside.judge(&group);
-        (test, beside, group.fit.problem.lines.stride)
-    }
-
-    /// Judges the last mode, which belongs to this group.
-    fn judge(&mut self, group: &Group) -> ExtraMode {
-        let last = self.sweeper.modes.len() - 1;
-        let groups = std::slice::from_ref(group);
-        let fit = mode_fits(&mut self.sweeper, groups, &self.settings)
-            .pop()
-            .unwrap_or(Err(Unfit::NotIndependent));
-        let place = group.members.iter().position(|&index| index == last);
-        let (Some(place), Ok(mode)) = (place, &fit) else {
-            return ExtraMode::none(fit);
-        };
-        let mut test = ExtraMode::none(fit.clone());
-        let band = self.sweeper.band(&group.members).ok();
-        if band
-            .and_then(|band| test.compare(&band, &group.fit, place))
-            .is_none()
-        {
-            return test;
-        }
-        let amplitudes = mode.amplitudes.iter();
-        let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
-        test.amplitude_over_std = root_mean_square(&ratios);
-        test.likeness = likeness(self.sweeper.data, &group.fit, place);
-        let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
-        let needed = test.probability < LEVEL
-            && test.information_gain > 0.0
-            && test.amplitude_over_std > LEAST_AMPLITUDE;
-        test.verdict = match (needed, decays) {
-            (true, true) => ExtraVerdict::Needed,
-            (true, false) => ExtraVerdict::NoMode,
-            (false, _) => ExtraVerdict::NotSignificant,
-        };
-        test
-    }
-}
-
-impl ExtraMode {
-    /// Returns the result where the start has no mode.
-    fn none(fit: Result<ModeFit, Unfit>) -> Self {
-        ExtraMode {
-            verdict: ExtraVerdict::NoMode,
-            f_statistic: 0.0,
+        beside.most_lines = most_lines;
+        let group = beside.add(extra);
+        let fits = group
+            .as_ref()
+            .map(|group| beside.read(std::slice::from_ref(group)));
+        let last = self.modes.len();
+        let mut test = ExtraMode {
+            needed: false,
             probability: 1.0,
-            information_gain: f64::NEG_INFINITY,
-            amplitude_over_std: 0.0,
             likeness: None,
-            fit,
+            fit: match fits {
+                Some(mut fits) => fits.swap_remove(last),
+                None => Err(beside.modes[last].reason()),
+            },
+        };
+        let stride = group
+            .as_ref()
+            .map_or(1, |group| group.fit.problem.lines.stride);
+        if let (Some(group), Ok(mode)) = (&group, &test.fit)
+            && let Some(place) = group.members.iter().position(|&index| index == last)
+            && let Some((probability, information_gain)) = beside.gain(group, place)
+        {
+            test.probability = probability;
+            test.likeness = likeness(self.data, &group.fit, place);
+            let amplitudes = mode.amplitudes.iter();
+            let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
+            test.needed = probability < LEVEL
+                && information_gain > 0.0
+                && root_mean_square(&ratios) > LEAST_AMPLITUDE
+                && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
         }
+        (test, beside, stride)
     }
 
-    /// Compares the fits with and without the pole at `place`; `None` where one of them fails.
+    /// Compares the fits with and without the pole at `place`; `None` where one of them fails. Returns the
+    /// probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
+    /// criterion.
     ///
     /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
     /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
     /// n ln S + k ln n.
-    fn compare(&mut self, band: &BandData, fit: &GroupFit, place: usize) -> Option<()> {
+    fn gain(&self, group: &Group, place: usize) -> Option<(f64, f64)> {
+        let fit = &group.fit;
+        let band = BandData::new(self, &group.members).ok()?;
         let mut fewer: Vec<Complex64> = fit.at.poles.clone();
         fewer.remove(place);
         let columns = fit.used.len() as f64;
@@ -642,19 +576,15 @@ impl ExtraMode {
         let values = 2.0 * band.lines.count() as f64 * columns;
         // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
         let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
-        let without = if fewer.is_empty() {
-            band.square_sum_without(fit.terms, &fit.noise)
-        } else {
-            band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum
+        let without = match fewer.is_empty() {
+            true => band.square_sum_without(fit.terms, &fit.noise),
+            false => band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum,
         };
         let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
-        self.f_statistic = (without - with.at.square_sum) / unknowns / with.variance;
-        if self.f_statistic > 0.0 {
-            self.probability = chance.sf(self.f_statistic);
-        }
-        self.information_gain =
-            values * (without / with.at.square_sum).ln() - unknowns * values.ln();
-        Some(())
+        let fall = (without - with.at.square_sum) / unknowns / with.variance;
+        let probability = if fall > 0.0 { chance.sf(fall) } else { 1.0 };
+        let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
+        Some((probability, criterion))
     }
 }
 
@@ -665,10 +595,8 @@ impl ExtraMode {
 fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
     let poles = &fit.at.poles;
     let distances = poles.iter().map(|pole| (pole - poles[place]).norm());
-    let (nearest, _) = distances
-        .enumerate()
-        .filter(|(other, _)| *other != place)
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let others = distances.enumerate().filter(|(other, _)| *other != place);
+    let (nearest, _) = others.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let one_shape = matches!(data.basis(), Basis::FrequencyResponse { .. });
     let taps: Vec<usize> = (fit.used.iter())
         .map(|&column| data.columns()[column].tap)

@@ -73,7 +73,16 @@ impl Lines {
         match self.kappa {
             // phi = kappa/(1 - e^u), d phi/dq = e^u phi^2, u = kappa (q - j m).
             Some(kappa) => {
-                let less_one = exp_less_one(kappa * distance);
+                // e^u - 1 without cancellation near zero: with u = x + j y it is
+                // (e^x - 1) cos y - 2 sin^2(y/2) + j e^x sin y.
+                let u = kappa * distance;
+                let (half_sin, half_cos) = (0.5 * u.im).sin_cos();
+                let grown = u.re.exp_m1();
+                let versine = 2.0 * half_sin * half_sin;
+                let less_one = Complex64::new(
+                    grown * (1.0 - versine) - versine,
+                    (grown + 1.0) * 2.0 * half_sin * half_cos,
+                );
                 let value = -kappa / less_one;
                 [value, (less_one + 1.0) * value * value]
             }
@@ -138,19 +147,6 @@ impl Lines {
         }
         columns
     }
-}
-
-/// Computes e^u - 1 without cancellation near zero.
-///
-/// With u = x + j y it is (e^x - 1) cos y - 2 sin^2(y/2) + j e^x sin y.
-fn exp_less_one(u: Complex64) -> Complex64 {
-    let (half_sin, half_cos) = (0.5 * u.im).sin_cos();
-    let grown = u.re.exp_m1();
-    let versine = 2.0 * half_sin * half_sin;
-    Complex64::new(
-        grown * (1.0 - versine) - versine,
-        (grown + 1.0) * 2.0 * half_sin * half_cos,
-    )
 }
 
 /// Least remainder of a fixed column beside the columns before it, relative to its length. A column with

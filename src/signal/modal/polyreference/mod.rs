@@ -26,8 +26,7 @@
 //! therefore analysed in narrow bands of their own as well.
 //!
 //! # What it does not do
-//! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit,
-//! and the spread over the orders is a measure of stability, not an uncertainty.
+//! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit.
 
 mod selection;
 mod stabilisation;
@@ -39,7 +38,7 @@ use num_complex::Complex64;
 use super::{CompositeLevel, PeakSettings, find_peaks};
 use crate::spectral::{DISPLAY_RATIO, Lines};
 
-pub use selection::{PolyreferenceMode, SelectionSettings, select_modes};
+pub use selection::{PolyreferenceMode, select_modes};
 pub use stabilisation::{PoleStability, StabilisationPole, stabilise_poles};
 
 /// Reason why a polyreference fit is impossible.
@@ -85,16 +84,6 @@ pub enum PolyreferenceError {
         /// Least number of lines.
         least: usize,
     },
-    /// Weights that do not fit the outputs.
-    #[error(
-        "{weights} weights for {outputs} outputs: give each output one positive weight, or none at all"
-    )]
-    Weights {
-        /// Usable weights.
-        weights: usize,
-        /// Outputs.
-        outputs: usize,
-    },
     /// Nothing to fit.
     #[error(
         "the responses from {low} to {high} Hz have no content that a fit could use: check the band and the channels"
@@ -107,81 +96,27 @@ pub enum PolyreferenceError {
     },
 }
 
-/// Largest changes from one order to the next at which a pole of the stabilisation diagram is stable.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StabilityTolerances {
-    /// Relative change of the frequency. 1 %, as usual in the field.
-    pub frequency: f64,
-    /// Change of the frequency in half-power widths. 0.25: of a mode with 0.1 % damping 1 % is five
-    /// half-power widths, within which another mode has room; the narrower of both limits holds.
-    pub half_power_share: f64,
-    /// Relative change of the damping ratio. 5 %, as usual in the field.
-    pub damping: f64,
-    /// 1 - MAC of the participation vectors. 2 %, as usual in the field.
-    pub participation: f64,
-}
-
-impl Default for StabilityTolerances {
-    fn default() -> Self {
-        StabilityTolerances {
-            frequency: 0.01,
-            half_power_share: 0.25,
-            damping: 0.05,
-            participation: 0.02,
-        }
-    }
-}
+/// Lowest order. 2: one pole alone says nothing of a band with several.
+const LEAST_ORDER: usize = 2;
+/// Damping ratio from which on a pole is no mode. 0.2: bolted structures have a few per cent.
+pub const MOST_DAMPING: f64 = 0.2;
 
 /// Settings of the search for poles.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolyreferenceSettings {
     /// Highest order of the denominator; that times the inputs is the number of poles. 40: three to
     /// four times the modes of a band, as the surplus takes up noise and background.
     pub order: usize,
-    /// Lowest order. 2: one pole alone says nothing of a band with several.
-    pub least_order: usize,
     /// Decay (1/s) that an exponential window has added to every pole; taken out of each. 0.
     pub added_decay: f64,
-    /// Weight of each output's sum of squares, 1 over its noise variance where that is known; equal
-    /// weights by default.
-    pub weights: Option<Vec<f64>>,
-    /// Damping ratio from which on a pole is no mode. 0.2: bolted structures have a few per cent.
-    pub most_damping: f64,
-    /// Tolerances of the stabilisation diagram.
-    pub tolerances: StabilityTolerances,
-    /// Limits from which on a pole is a mode.
-    pub selection: SelectionSettings,
 }
 
 impl Default for PolyreferenceSettings {
     fn default() -> Self {
         PolyreferenceSettings {
             order: 40,
-            least_order: 2,
             added_decay: 0.0,
-            weights: None,
-            most_damping: 0.2,
-            tolerances: StabilityTolerances::default(),
-            selection: SelectionSettings::default(),
         }
-    }
-}
-
-impl PolyreferenceSettings {
-    fn weights_for(&self, matrix: &ResponseMatrix) -> Result<Vec<f64>, PolyreferenceError> {
-        let outputs = matrix.outputs();
-        let Some(weights) = &self.weights else {
-            return Ok(vec![1.0; outputs]);
-        };
-        let usable = weights.iter().filter(|w| w.is_finite() && **w > 0.0);
-        let usable = usable.count();
-        if usable != outputs || weights.len() != outputs {
-            return Err(PolyreferenceError::Weights {
-                weights: usable,
-                outputs,
-            });
-        }
-        Ok(weights.clone())
     }
 }
 
@@ -189,7 +124,7 @@ impl PolyreferenceSettings {
 /// more so that noise is averaged at all.
 fn least_lines(matrix: &ResponseMatrix, order: usize) -> usize {
     let numerator = order + 1 + 2 * stabilisation::EXTRA_POWERS;
-    let denominator = (order * matrix.inputs()).div_ceil(matrix.outputs().max(1));
+    let denominator = (order * matrix.inputs).div_ceil(matrix.outputs.max(1));
     (numerator + denominator) * 5 / 4
 }
 
@@ -198,9 +133,12 @@ fn least_lines(matrix: &ResponseMatrix, order: usize) -> usize {
 #[derive(Debug, Clone)]
 pub struct ResponseMatrix<'a> {
     first: f64,
-    spacing: f64,
-    outputs: usize,
-    inputs: usize,
+    /// Distance between lines (Hz).
+    pub spacing: f64,
+    /// Number of outputs.
+    pub outputs: usize,
+    /// Number of inputs.
+    pub inputs: usize,
     /// Entry (output, input) stands at output * inputs + input.
     entries: Vec<&'a [Complex64]>,
 }
@@ -217,13 +155,12 @@ impl<'a> ResponseMatrix<'a> {
         values: &[Vec<&'a [Complex64]>],
     ) -> Result<Self, PolyreferenceError> {
         let inputs = values.first().map_or(0, Vec::len);
-        let points = values
-            .first()
-            .and_then(|row| row.first())
-            .map_or(0, |entry| entry.len());
+        let first_entry = values.first().and_then(|row| row.first());
+        let points = first_entry.map_or(0, |entry| entry.len());
         for (output, row) in values.iter().enumerate() {
-            let least = row.iter().map(|entry| entry.len()).min().unwrap_or(0);
-            let most = row.iter().map(|entry| entry.len()).max().unwrap_or(0);
+            let lengths = row.iter().map(|entry| entry.len());
+            let least = lengths.clone().min().unwrap_or(0);
+            let most = lengths.max().unwrap_or(0);
             if row.len() != inputs || least != points || most != points {
                 return Err(PolyreferenceError::Shape {
                     output: output + 1,
@@ -273,24 +210,9 @@ impl<'a> ResponseMatrix<'a> {
         }
     }
 
-    /// Number of outputs.
-    pub fn outputs(&self) -> usize {
-        self.outputs
-    }
-
-    /// Number of inputs.
-    pub fn inputs(&self) -> usize {
-        self.inputs
-    }
-
     /// Number of lines.
     pub fn points(&self) -> usize {
         self.entries.first().map_or(0, |entry| entry.len())
-    }
-
-    /// Distance between lines (Hz).
-    pub fn spacing(&self) -> f64 {
-        self.spacing
     }
 
     /// Frequency of line `index` (Hz).
@@ -309,34 +231,12 @@ impl<'a> ResponseMatrix<'a> {
     }
 }
 
-/// Settings of the sub-bands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SubBandSettings {
-    /// Least width (lines). 120: enough for an order of some 25, and at resolution 1/T, a sub-band in
-    /// which modes a line and a half apart still part.
-    pub least_lines: usize,
-    /// Least width in half-power widths of the widest peak. 16: the flanks tell damping from
-    /// background.
-    pub half_power_widths: f64,
-    /// Settings of the peaks that get a band of their own.
-    pub peaks: PeakSettings,
-}
-
-impl Default for SubBandSettings {
-    fn default() -> Self {
-        SubBandSettings {
-            least_lines: 120,
-            half_power_widths: 16.0,
-            peaks: PeakSettings {
-                // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a
-                // mode costs time only.
-                blind_prominence_db: 6.0,
-                above_noise_db: 10.0,
-                ..PeakSettings::default()
-            },
-        }
-    }
-}
+/// Least width of a sub-band (lines). 120: enough for an order of some 25, and at resolution 1/T, a sub-band in
+/// which modes a line and a half apart still part.
+const LEAST_BAND_LINES: f64 = 120.0;
+/// Least width of a sub-band in half-power widths of the widest peak. 16: the flanks tell damping from
+/// background.
+const HALF_POWER_WIDTHS: f64 = 16.0;
 
 /// A band of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -377,9 +277,9 @@ struct PeakGroup {
 
 /// Returns the bands around the groups of peaks of `matrix`, ascending; their cores do not overlap, and do
 /// not cover what lies far from every peak.
-pub fn sub_bands(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<SubBand> {
+pub fn sub_bands(matrix: &ResponseMatrix) -> Vec<SubBand> {
     let (low_end, high_end) = matrix.ends();
-    let groups = peak_groups(matrix, settings);
+    let groups = peak_groups(matrix);
     let mut bands = Vec::with_capacity(groups.len());
     for (index, group) in groups.iter().enumerate() {
         let low = (group.first - group.reach).max(low_end);
@@ -401,7 +301,7 @@ pub fn sub_bands(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<Sub
     bands
 }
 
-fn peak_groups(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<PeakGroup> {
+fn peak_groups(matrix: &ResponseMatrix) -> Vec<PeakGroup> {
     if matrix.points() < 3 {
         return Vec::new();
     }
@@ -419,20 +319,22 @@ fn peak_groups(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<PeakG
         .map(|entry| entry.iter().map(Complex64::norm_sqr).collect())
         .collect();
     let level = CompositeLevel::new(lines, &powers, None);
+    // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a mode costs time only.
+    let settings = PeakSettings {
+        blind_prominence_db: 6.0,
+        above_noise_db: 10.0,
+        ..PeakSettings::default()
+    };
     let mut groups: Vec<PeakGroup> = Vec::new();
-    for peak in find_peaks(&level, &settings.peaks) {
+    for peak in find_peaks(&level, &settings) {
         let frequency = matrix.frequency(peak.index);
         // Lines over which the level stays within 3 dB of the peak.
         let (before, after) = level.level_db.split_at(peak.index);
         let least = after[0] - 3.0;
-        let width = before
-            .iter()
-            .rev()
-            .take_while(|level| **level >= least)
-            .count()
-            + after.iter().take_while(|level| **level >= least).count();
-        let lines = (settings.half_power_widths * width as f64).max(settings.least_lines as f64);
-        let reach = 0.5 * lines * matrix.spacing;
+        let below = before.iter().rev().take_while(|level| **level >= least);
+        let above = after.iter().take_while(|level| **level >= least);
+        let width = (below.count() + above.count()) as f64;
+        let reach = 0.5 * (HALF_POWER_WIDTHS * width).max(LEAST_BAND_LINES) * matrix.spacing;
         match groups.last_mut() {
             // A group is not longer than half a reach, so that its band stays narrow.
             Some(group) if frequency - group.first < 0.5 * group.reach.min(reach) => {
@@ -459,7 +361,6 @@ fn peak_groups(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<PeakG
 pub fn find_modes(
     matrix: &ResponseMatrix,
     settings: &PolyreferenceSettings,
-    bands: &SubBandSettings,
 ) -> Result<Vec<BandSearch>, PolyreferenceError> {
     let ends = matrix.ends();
     let whole_band = SubBand {
@@ -467,15 +368,33 @@ pub fn find_modes(
         high: ends.1,
         core: ends,
     };
-    let mut whole = search(matrix, whole_band, settings)?;
-    let mut parts = sub_bands(matrix, bands)
-        .into_iter()
-        .map(|band| search(matrix, band, settings))
-        .collect::<Result<Vec<BandSearch>, PolyreferenceError>>()?;
-    for part in &mut parts {
-        share_modes(&mut whole.modes, part);
+    let mut searches = vec![search(matrix, whole_band, settings)?];
+    for band in sub_bands(matrix) {
+        let mut part = search(matrix, band, settings)?;
+        // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
+        // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds
+        // noise. Otherwise the sub-band decides, except on modes too wide for it.
+        let whole = &mut searches[0].modes;
+        let (rivals, mut kept): (Vec<_>, Vec<_>) =
+            (whole.drain(..)).partition(|mode| band.core_holds(mode));
+        for rival in rivals {
+            let width = 2.0 * rival.damping_ratio * rival.frequency;
+            let near: Vec<usize> = (0..part.modes.len())
+                .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
+                .collect();
+            match near[..] {
+                [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
+                [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
+                    part.modes.remove(one);
+                    kept.push(rival);
+                }
+                _ => {}
+            }
+        }
+        *whole = kept;
+        searches.push(part);
     }
-    Ok(std::iter::once(whole).chain(parts).collect())
+    Ok(searches)
 }
 
 /// Returns the modes of all searches, ascending.
@@ -494,52 +413,21 @@ const LINES_PER_ORDER: usize = 5;
 /// Widest mode that is left to a sub-band, in parts of the band's width.
 const WIDEST_SHARE: f64 = 0.125;
 
-/// Settles which search keeps a mode that lies in a sub-band's core.
-///
-/// A mode that both read as one goes to the one whose pole explains more: of a mode that decays within
-/// the lags of the whole band, a longer look only adds noise. Otherwise the sub-band decides, except
-/// on modes too wide for it.
-fn share_modes(whole: &mut Vec<PolyreferenceMode>, part: &mut BandSearch) {
-    let band = part.band;
-    let (rivals, mut kept): (Vec<_>, Vec<_>) =
-        (whole.drain(..)).partition(|mode| band.core_holds(mode));
-    for rival in rivals {
-        let width = 2.0 * rival.damping_ratio * rival.frequency;
-        let near: Vec<usize> = (0..part.modes.len())
-            .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
-            .collect();
-        match near[..] {
-            [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
-            [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
-                part.modes.remove(one);
-                kept.push(rival);
-            }
-            _ => {}
-        }
-    }
-    *whole = kept;
-}
-
 fn search(
     matrix: &ResponseMatrix,
     band: SubBand,
     settings: &PolyreferenceSettings,
 ) -> Result<BandSearch, PolyreferenceError> {
     let part = matrix.band(band.low, band.high);
-    let is_whole = part.points() == matrix.points();
-    let most = if is_whole {
-        settings.order
-    } else {
-        settings.order.min(part.points() / LINES_PER_ORDER)
+    let points = part.points();
+    let most = match points == matrix.points() {
+        true => settings.order,
+        false => settings.order.min(points / LINES_PER_ORDER),
     };
-    let order = (1..=most)
-        .rev()
-        .find(|&order| least_lines(&part, order) <= part.points())
-        .unwrap_or(settings.order);
-    let settings = PolyreferenceSettings {
-        order,
-        ..settings.clone()
-    };
+    let mut orders = (1..=most).rev();
+    let order = orders.find(|&order| least_lines(&part, order) <= points);
+    let order = order.unwrap_or(settings.order);
+    let settings = PolyreferenceSettings { order, ..*settings };
     let diagram = stabilise_poles(&part, &settings)?;
     let mut modes = select_modes(&part, &diagram, &settings);
     modes.retain(|mode| band.core_holds(mode));

@@ -7,10 +7,9 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use statrs::statistics::Statistics;
 use tapjoint_numerics::stats::median;
 
-use super::{PolyreferenceSettings, ResponseMatrix, StabilisationPole};
+use super::{LEAST_ORDER, PolyreferenceSettings, ResponseMatrix, StabilisationPole};
 use crate::modal::Subspace;
 
 /// A mode: a pole that returns over the orders and that the responses need.
@@ -22,15 +21,6 @@ pub struct PolyreferenceMode {
     pub frequency: f64,
     /// Damping ratio, -Re p/|p|.
     pub damping_ratio: f64,
-    /// Standard deviation over the orders of the frequency (Hz). A measure of stability: the orders
-    /// share their data, so that it is no standard uncertainty.
-    pub frequency_spread: f64,
-    /// Standard deviation over the orders of the damping ratio.
-    pub damping_spread: f64,
-    /// Number of orders at which the pole was found.
-    pub count: usize,
-    /// Their share of all orders, 0 to 1.
-    pub share: f64,
     /// Participation of each input, of unit length, its largest entry real.
     pub participation: Vec<Complex64>,
     /// Shape factor of each output (unit of the responses times 1/s): residue = shape times
@@ -41,47 +31,33 @@ pub struct PolyreferenceMode {
     pub above_noise_db: f64,
 }
 
-/// Limits from which on a pole is a mode.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SelectionSettings {
-    /// Distance within which poles of different orders are one, in half-power half-widths (1 = the
-    /// pole's own decay). 0.5: two modes a half-power width apart are 2 apart in this measure.
-    pub radius: f64,
-    /// Least such distance (lines), for poles narrower than a line. 0.1.
-    pub least_radius: f64,
-    /// Least share of the orders at which the pole is found. 0.3: weak modes come in only where the
-    /// order suffices for the strong ones; poles of noise scatter over the band.
-    pub least_share: f64,
-    /// Least ratio of what the mode explains to the noise (dB). 13 dB, a factor of 20: the
-    /// strongest of some hundred lines of noise alone reaches 8 to 10.
-    pub above_noise_db: f64,
-    /// Least level of the mode at its peak over the highest level around it. 1e-4: what poles of
-    /// rounding and of the model's own error have on noise-free data.
-    pub least_level: f64,
-    /// Least decay over a length of 1/spacing (sigma/spacing). 0.02: a steady tone, mains hum say, is
-    /// rational too, and its pole scatters about no decay at all, by some 0.005 where it stands
-    /// 35 dB over the noise; a mode of 0.01 % damping at 50 Hz has 0.03 per second.
-    pub least_decay: f64,
-}
+/// Distance within which poles of different orders are one, in half-power half-widths (1 = the
+/// pole's own decay). 0.5: two modes a half-power width apart are 2 apart in this measure.
+const RADIUS: f64 = 0.5;
+/// Least such distance (lines), for poles narrower than a line. 0.1.
+const LEAST_RADIUS: f64 = 0.1;
+/// Least share of the orders at which the pole is found. 0.3: weak modes come in only where the
+/// order suffices for the strong ones; poles of noise scatter over the band.
+const LEAST_SHARE: f64 = 0.3;
+/// Least ratio of what the mode explains to the noise (dB). 13 dB, a factor of 20: the
+/// strongest of some hundred lines of noise alone reaches 8 to 10.
+const ABOVE_NOISE_DB: f64 = 13.0;
+/// Least level of the mode at its peak over the highest level around it. 1e-4: what poles of
+/// rounding and of the model's own error have on noise-free data.
+const LEAST_LEVEL: f64 = 1e-4;
+/// Least decay over a length of 1/spacing (sigma/spacing). 0.02: a steady tone, mains hum say, is
+/// rational too, and its pole scatters about no decay at all, by some 0.005 where it stands
+/// 35 dB over the noise; a mode of 0.01 % damping at 50 Hz has 0.03 per second.
+const LEAST_DECAY: f64 = 0.02;
 
-impl Default for SelectionSettings {
-    fn default() -> Self {
-        SelectionSettings {
-            radius: 0.5,
-            least_radius: 0.1,
-            least_share: 0.3,
-            above_noise_db: 13.0,
-            least_level: 1e-4,
-            least_decay: 0.02,
-        }
-    }
-}
-
-/// Poles of different orders that are one.
-struct Cluster {
-    /// Indices in the diagram, ascending in order, two or more and one of each order.
-    members: Vec<usize>,
+/// A pole that returns at several orders.
+#[derive(Debug, Clone)]
+struct Candidate {
+    /// The pole, decay of an exponential window taken out.
     pole: Complex64,
+    /// The same as the responses show it, the window's decay included.
+    seen: Complex64,
+    participation: Vec<Complex64>,
 }
 
 /// Selects the modes of `matrix` from the diagram that [`super::stabilise_poles`] made of it,
@@ -97,67 +73,63 @@ pub fn select_modes(
     diagram: &[StabilisationPole],
     settings: &PolyreferenceSettings,
 ) -> Vec<PolyreferenceMode> {
-    let selection = &settings.selection;
-    let orders = settings.order + 1 - settings.least_order.clamp(1, settings.order);
-    let least = (selection.least_share * orders as f64).ceil().max(2.0) as usize;
-    let mut clusters = cluster_poles(diagram, settings, TAU * matrix.spacing(), least);
-    let least_decay = selection.least_decay * matrix.spacing();
-    clusters.retain(|cluster| -cluster.pole.re >= least_decay);
-    clusters.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
-    let mut observed = Vec::with_capacity(clusters.len());
-    for cluster in &clusters {
-        // The participation is that of the highest order: vectors of a repeated root are arbitrary within
-        // a plane, and only those of one order are independent of each other.
-        let last = cluster.members.last();
-        observed.push(ObservedPole {
-            pole: cluster.pole - settings.added_decay,
-            participation: last.map_or_else(Vec::new, |&k| diagram[k].participation.clone()),
-        });
-    }
-    let mut modes: Vec<PolyreferenceMode> = Vec::new();
-    for (index, part) in needed_poles(matrix, &observed, selection) {
-        let Cluster { members, pole } = &clusters[index];
-        let poles = members.iter().map(|&member| &diagram[member]);
-        modes.push(PolyreferenceMode {
-            pole: *pole,
-            frequency: pole.norm() / TAU,
-            damping_ratio: -pole.re / pole.norm(),
-            frequency_spread: poles.clone().map(|pole| pole.frequency).std_dev(),
-            damping_spread: poles.map(|pole| pole.damping_ratio).std_dev(),
-            count: members.len(),
-            share: members.len() as f64 / orders as f64,
-            participation: observed[index].participation.clone(),
-            shape: part.shape,
-            above_noise_db: 10.0 * part.above_noise.log10(),
-        });
-    }
+    let orders = settings.order + 1 - LEAST_ORDER.min(settings.order);
+    let least = (LEAST_SHARE * orders as f64).ceil().max(2.0) as usize;
+    let mut candidates = cluster_poles(diagram, settings, TAU * matrix.spacing, least);
+    candidates.retain(|candidate| -candidate.pole.re >= LEAST_DECAY * matrix.spacing);
+    candidates.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
+    let needed = needed_poles(matrix, candidates).into_iter();
+    let mut modes: Vec<PolyreferenceMode> = needed
+        .map(
+            |(
+                Candidate {
+                    pole,
+                    participation,
+                    ..
+                },
+                part,
+            )| PolyreferenceMode {
+                pole,
+                frequency: pole.norm() / TAU,
+                damping_ratio: -pole.re / pole.norm(),
+                participation,
+                shape: part.shape,
+                above_noise_db: 10.0 * part.above_noise.log10(),
+            },
+        )
+        .collect();
     modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     modes
 }
 
-/// Returns the distance of two poles in units of the radius allowed between them.
-fn distance(a: Complex64, b: Complex64, settings: &PolyreferenceSettings, spacing: f64) -> f64 {
-    let selection = &settings.selection;
-    let decay = -0.5 * (a.re + b.re) + settings.added_decay;
-    (a - b).norm() / (selection.radius * decay).max(selection.least_radius * spacing)
-}
-
+/// Gathers the poles of different orders that are one. Distances are in units of the radius allowed between two
+/// poles; `spacing` is that of the lines (rad/s), `least` the least number of orders.
 fn cluster_poles(
     diagram: &[StabilisationPole],
     settings: &PolyreferenceSettings,
     spacing: f64,
     least: usize,
-) -> Vec<Cluster> {
-    let neighbours = neighbour_lists(diagram, settings, spacing);
+) -> Vec<Candidate> {
+    // For every pole those of other orders within the radius, by order, with their distance.
+    let mut neighbours: Vec<Vec<(usize, f64)>> = vec![Vec::new(); diagram.len()];
+    for (a, near) in diagram.iter().zip(&mut neighbours) {
+        for (index, b) in diagram.iter().enumerate() {
+            let decay = -0.5 * (a.pole.re + b.pole.re) + settings.added_decay;
+            let radius = (RADIUS * decay).max(LEAST_RADIUS * spacing);
+            let distance = (a.pole - b.pole).norm() / radius;
+            if a.order != b.order && distance <= 1.0 {
+                near.push((index, distance));
+            }
+        }
+    }
     let mut free = vec![true; diagram.len()];
     let mut clusters = Vec::new();
     loop {
-        let founder = (0..diagram.len())
+        let rated = (0..diagram.len())
             .filter(|&index| free[index])
             .map(|index| {
-                let others = neighbours[index].iter().filter(|(other, _)| free[*other]);
                 let (mut count, mut sum, mut order) = (0_usize, 0.0, 0);
-                for &(other, distance) in others {
+                for &(other, distance) in neighbours[index].iter().filter(|(k, _)| free[*k]) {
                     // Two neighbours of the same order count once.
                     if diagram[other].order != order {
                         count += 1;
@@ -166,105 +138,63 @@ fn cluster_poles(
                     }
                 }
                 (index, count, sum)
-            })
-            .max_by(|a, b| a.1.cmp(&b.1).then(b.2.total_cmp(&a.2)));
-        let Some((founder, count, _)) = founder else {
-            break;
+            });
+        let founder = rated.max_by(|a, b| a.1.cmp(&b.1).then(b.2.total_cmp(&a.2)));
+        let Some((founder, ..)) = founder.filter(|(_, count, _)| count + 1 >= least) else {
+            return clusters;
         };
-        if count + 1 < least {
-            break;
-        }
-        let members = members_of(diagram, founder, &neighbours[founder], &free);
-        for &member in &members {
-            free[member] = false;
-        }
+        // The founder and its nearest free neighbour of every other order.
+        let mut near = neighbours[founder].clone();
+        near.retain(|(other, _)| free[*other]);
+        let orders = near.chunk_by(|a, b| diagram[a.0].order == diagram[b.0].order);
+        let nearest = orders.filter_map(|order| order.iter().min_by(|a, b| a.1.total_cmp(&b.1)));
+        let mut members: Vec<usize> = nearest.map(|&(index, _)| index).collect();
+        members.push(founder);
+        members.sort_by_key(|&index| diagram[index].order);
+        members.iter().for_each(|&member| free[member] = false);
         let poles = members.iter().map(|&member| diagram[member].pole);
         let (mut re, mut im): (Vec<f64>, Vec<f64>) = poles.map(|pole| (pole.re, pole.im)).unzip();
         // A few stray members do not move the medians.
         let pole = Complex64::new(median(&mut re), median(&mut im));
-        clusters.push(Cluster { members, pole });
+        // The participation is that of the highest order: vectors of a repeated root are arbitrary within
+        // a plane, and only those of one order are independent of each other.
+        clusters.push(Candidate {
+            pole,
+            seen: pole - settings.added_decay,
+            participation: diagram[members[members.len() - 1]].participation.clone(),
+        });
     }
-    clusters
-}
-
-/// Returns for every pole those of other orders within the radius, by order, with their distance.
-fn neighbour_lists(
-    diagram: &[StabilisationPole],
-    settings: &PolyreferenceSettings,
-    spacing: f64,
-) -> Vec<Vec<(usize, f64)>> {
-    let mut lists: Vec<Vec<(usize, f64)>> = vec![Vec::new(); diagram.len()];
-    for (i, a) in diagram.iter().enumerate() {
-        for (j, b) in diagram.iter().enumerate() {
-            if a.order != b.order {
-                let apart = distance(a.pole, b.pole, settings, spacing);
-                if apart <= 1.0 {
-                    lists[i].push((j, apart));
-                }
-            }
-        }
-    }
-    lists
-}
-
-/// Returns the founder and its nearest free neighbour of every other order.
-fn members_of(
-    diagram: &[StabilisationPole],
-    founder: usize,
-    neighbours: &[(usize, f64)],
-    free: &[bool],
-) -> Vec<usize> {
-    let mut best: Vec<(usize, f64)> = Vec::new();
-    for &(other, apart) in neighbours.iter().filter(|(other, _)| free[*other]) {
-        match best.last_mut() {
-            Some(last) if diagram[last.0].order == diagram[other].order => {
-                if apart < last.1 {
-                    *last = (other, apart);
-                }
-            }
-            _ => best.push((other, apart)),
-        }
-    }
-    let mut members: Vec<usize> = best.into_iter().map(|(index, _)| index).collect();
-    members.push(founder);
-    members.sort_by_key(|&index| diagram[index].order);
-    members
 }
 
 /// Drops the candidate that the responses need least, as long as one is below the limits. Returns
-/// the places and contributions of those that stay.
+/// those that stay, with their contributions.
 fn needed_poles(
     matrix: &ResponseMatrix,
-    observed: &[ObservedPole],
-    selection: &SelectionSettings,
-) -> Vec<(usize, Contribution)> {
-    let mut kept: Vec<usize> = (0..observed.len()).collect();
-    let mut poles = observed.to_vec();
-    let mut parts: Vec<Option<Contribution>> = (0..observed.len())
-        .map(|index| contribution(matrix, observed, index))
+    mut poles: Vec<Candidate>,
+) -> Vec<(Candidate, Contribution)> {
+    let mut parts: Vec<Option<Contribution>> = (0..poles.len())
+        .map(|index| contribution(matrix, &poles, index))
         .collect();
     loop {
-        let needs = parts.iter().map(|part| match part {
-            Some(part) => part.need(selection),
-            None => 0.0,
-        });
+        let needs = parts
+            .iter()
+            .map(|part| part.as_ref().map_or(0.0, Contribution::need));
         let weakest = needs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((place, _)) = weakest.filter(|(_, need)| *need < 1.0) else {
             break;
         };
-        kept.remove(place);
         parts.remove(place);
         let removed = poles.remove(place);
         for (index, part) in parts.iter_mut().enumerate() {
-            let window = Window::around(matrix, poles[index].pole);
-            if window.is_some_and(|window| window.holds(removed.pole)) {
+            let window = Window::around(matrix, poles[index].seen);
+            if window.is_some_and(|window| window.holds(removed.seen)) {
                 *part = contribution(matrix, &poles, index);
             }
         }
     }
-    kept.into_iter()
-        .zip(parts)
-        .filter_map(|(index, part)| Some((index, part?)))
+    let parts = poles.into_iter().zip(parts);
+    parts
+        .filter_map(|(pole, part)| Some((pole, part?)))
         .collect()
 }
 
@@ -282,13 +212,6 @@ const BACKGROUND: usize = 3;
 /// Least part of a column that is its own beside the others', relative to its length.
 const INDEPENDENT: f64 = 1e-9;
 
-/// A pole as the responses show it, an exponential window's decay included.
-#[derive(Debug, Clone)]
-struct ObservedPole {
-    pole: Complex64,
-    participation: Vec<Complex64>,
-}
-
 /// Contribution of one pole to the responses.
 #[derive(Debug, Clone)]
 struct Contribution {
@@ -303,9 +226,9 @@ struct Contribution {
 
 impl Contribution {
     /// Returns the smaller of the ratios to both limits: above 1 the pole is needed.
-    fn need(&self, selection: &SelectionSettings) -> f64 {
-        let least = 10f64.powf(0.1 * selection.above_noise_db);
-        (self.above_noise / least).min(self.share_of_peak / selection.least_level)
+    fn need(&self) -> f64 {
+        let least = 10f64.powf(0.1 * ABOVE_NOISE_DB);
+        (self.above_noise / least).min(self.share_of_peak / LEAST_LEVEL)
     }
 }
 
@@ -317,7 +240,7 @@ struct Window {
 
 impl Window {
     fn around(matrix: &ResponseMatrix, pole: Complex64) -> Option<Self> {
-        let spacing = matrix.spacing();
+        let spacing = matrix.spacing;
         let last = matrix.points().checked_sub(1)?;
         let centre = (pole.im / TAU - matrix.frequency(0)) / spacing;
         let centre = (centre.round().max(0.0) as usize).min(last);
@@ -326,11 +249,11 @@ impl Window {
         let stride = reach.div_ceil(MOST_REACH);
         let range = centre.saturating_sub(reach)..=(centre + reach).min(last);
         let lines: Vec<usize> = range.step_by(stride).collect();
-        let omegas = lines
-            .iter()
-            .map(|&line| TAU * matrix.frequency(line))
-            .collect();
-        Some(Window { omegas, lines })
+        let omegas = lines.iter().map(|&line| TAU * matrix.frequency(line));
+        Some(Window {
+            omegas: omegas.collect(),
+            lines,
+        })
     }
 
     /// Returns true where a pole lies in the window or as near to it as half its length.
@@ -343,29 +266,27 @@ impl Window {
     }
 
     /// Returns the column of `participation` 1/(j omega - p)^power, input by input.
-    fn pole_column(&self, observed: &ObservedPole, power: i32) -> DVector<Complex64> {
+    fn pole_column(&self, pole: &Candidate, power: i32) -> DVector<Complex64> {
         let count = self.omegas.len();
-        DVector::from_fn(count * observed.participation.len(), |row, _| {
-            let distance = Complex64::new(0.0, self.omegas[row % count]) - observed.pole;
-            observed.participation[row / count] * distance.powi(-power)
+        DVector::from_fn(count * pole.participation.len(), |row, _| {
+            let distance = Complex64::new(0.0, self.omegas[row % count]) - pole.seen;
+            pole.participation[row / count] * distance.powi(-power)
         })
     }
 
     /// Returns the columns of x^degree for one input each, x running from -1 to 1.
     fn background(&self, inputs: usize) -> Vec<DVector<Complex64>> {
         let count = self.omegas.len();
-        let mut columns = Vec::new();
-        for input in 0..inputs {
-            for degree in 0..BACKGROUND {
-                let mut column = DVector::zeros(count * inputs);
-                for (index, value) in column.rows_mut(input * count, count).iter_mut().enumerate() {
-                    let x = 2.0 * index as f64 / (count.max(2) - 1) as f64 - 1.0;
-                    *value = Complex64::from(x.powi(degree as i32));
-                }
-                columns.push(column);
-            }
-        }
+        let columns = (0..inputs).flat_map(|input| (0..BACKGROUND).map(move |k| (input, k)));
         columns
+            .map(|(input, degree)| {
+                DVector::from_fn(count * inputs, |row, _| {
+                    let x = 2.0 * (row % count) as f64 / (count.max(2) - 1) as f64 - 1.0;
+                    let own = row / count == input;
+                    Complex64::from(if own { x.powi(degree as i32) } else { 0.0 })
+                })
+            })
+            .collect()
     }
 }
 
@@ -377,16 +298,15 @@ impl Window {
 /// what another pole would explain as well, if it were a little elsewhere, is no mode of its own.
 fn contribution(
     matrix: &ResponseMatrix,
-    poles: &[ObservedPole],
+    poles: &[Candidate],
     index: usize,
 ) -> Option<Contribution> {
     let own = poles.get(index)?;
-    let window = Window::around(matrix, own.pole)?;
-    let mut columns = window.background(matrix.inputs());
-    for (other, observed) in poles.iter().enumerate() {
-        if other != index && window.holds(observed.pole) {
-            columns.push(window.pole_column(observed, 1));
-            columns.push(window.pole_column(observed, 2));
+    let window = Window::around(matrix, own.seen)?;
+    let mut columns = window.background(matrix.inputs);
+    for (other, pole) in poles.iter().enumerate() {
+        if other != index && window.holds(pole.seen) {
+            columns.extend([1, 2].map(|power| window.pole_column(pole, power)));
         }
     }
     let others = Subspace::new(&DMatrix::from_columns(&columns), INDEPENDENT);
@@ -400,7 +320,7 @@ fn contribution(
         return None;
     }
     let count = window.lines.len();
-    let values = DMatrix::from_fn(column.len(), matrix.outputs(), |row, output| {
+    let values = DMatrix::from_fn(column.len(), matrix.outputs, |row, output| {
         matrix.entry(output, row / count)[window.lines[row % count]]
     });
     let residuals = others.complement(others.complement(values.clone()));
@@ -417,12 +337,12 @@ fn contribution(
         let unexplained = (residual.norm_squared() - explained).max(0.0);
         let variance = unexplained / degrees as f64;
         above_noise += explained / variance.max(rounding).max(f64::MIN_POSITIVE);
-        own_peak += (factor.norm() * strongest / own.pole.re).powi(2);
+        own_peak += (factor.norm() * strongest / own.seen.re).powi(2);
         shape.push(factor);
     }
     Some(Contribution {
         shape,
-        above_noise: above_noise / matrix.outputs() as f64,
+        above_noise: above_noise / matrix.outputs as f64,
         share_of_peak: (own_peak / peak.max(f64::MIN_POSITIVE)).sqrt(),
     })
 }

@@ -24,7 +24,8 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::{
-    PolyreferenceError, PolyreferenceSettings, ResponseMatrix, StabilityTolerances, least_lines,
+    LEAST_ORDER, MOST_DAMPING, PolyreferenceError, PolyreferenceSettings, ResponseMatrix,
+    least_lines,
 };
 use crate::spectral::smallest_smooth_block;
 
@@ -61,20 +62,18 @@ pub struct StabilisationPole {
     pub stability: PoleStability,
 }
 
-/// Poles of all orders from `least_order` to `order`, ascending in order and frequency.
+/// Poles of all orders from 2 to the highest, ascending in order and frequency.
 ///
-/// Shown are poles within the band that decay, with a damping ratio below `most_damping`: with the
+/// Shown are poles within the band that decay, with a damping ratio below [`MOST_DAMPING`]: with the
 /// lowest coefficient fixed the others belong to no structure (see the module's text).
 ///
 /// # Errors
 /// [`PolyreferenceError::TooFewLines`] where the band holds fewer lines than unknowns,
-/// [`PolyreferenceError::Weights`] where the weights do not fit, [`PolyreferenceError::Singular`]
-/// where the responses are all zero.
+/// [`PolyreferenceError::Singular`] where the responses are all zero.
 pub fn stabilise_poles(
     matrix: &ResponseMatrix,
     settings: &PolyreferenceSettings,
 ) -> Result<Vec<StabilisationPole>, PolyreferenceError> {
-    let weights = settings.weights_for(matrix)?;
     // Each column of unknowns meets outputs times lines equations.
     let least = least_lines(matrix, settings.order);
     if matrix.points() < least || settings.order == 0 {
@@ -87,13 +86,13 @@ pub fn stabilise_poles(
     let map = CircleMap::new(matrix);
     let (low, high) = matrix.ends();
     let singular = PolyreferenceError::Singular { low, high };
-    let denominators = Denominators::new(matrix, &map, settings.order, &weights).ok_or(singular)?;
+    let denominators = Denominators::new(matrix, &map, settings.order).ok_or(singular)?;
     let mut diagram: Vec<StabilisationPole> = Vec::new();
     let mut before: Vec<StabilisationPole> = Vec::new();
-    for order in settings.least_order.max(1)..=settings.order {
+    for order in LEAST_ORDER..=settings.order {
         let mut poles = poles_of_order(matrix, &map, &denominators, order, settings);
         for pole in &mut poles {
-            pole.stability = stability(pole, &before, &settings.tolerances, matrix.spacing());
+            pole.stability = stability(pole, &before, matrix.spacing);
         }
         diagram.extend(poles.iter().cloned());
         before = poles;
@@ -121,7 +120,7 @@ fn poles_of_order(
             let frequency = pole.norm() / TAU;
             let damping_ratio = -pole.re / pole.norm();
             let inside = (low..=high).contains(&(pole.im / TAU));
-            let physical = pole.re < 0.0 && pole.im > 0.0 && damping_ratio < settings.most_damping;
+            let physical = pole.re < 0.0 && pole.im > 0.0 && damping_ratio < MOST_DAMPING;
             (inside && physical).then(|| StabilisationPole {
                 order,
                 pole,
@@ -165,33 +164,41 @@ fn participation(coefficients: &DMatrix<Complex64>, inverse_root: Complex64) -> 
     vector.into_iter().map(|value| value * phase).collect()
 }
 
+/// Largest relative change of the frequency from one order to the next at which a pole is stable. 1 %, as usual
+/// in the field.
+const FREQUENCY_TOLERANCE: f64 = 0.01;
+/// The same in half-power widths. 0.25: of a mode with 0.1 % damping 1 % is five half-power widths, within which
+/// another mode has room; the narrower of both limits holds.
+const HALF_POWER_TOLERANCE: f64 = 0.25;
+/// Largest relative change of the damping ratio. 5 %, as usual in the field.
+const DAMPING_TOLERANCE: f64 = 0.05;
+/// Largest 1 - MAC of the participation vectors. 2 %, as usual in the field.
+const PARTICIPATION_TOLERANCE: f64 = 0.02;
 /// Least frequency tolerance (lines): what noise moves a pole narrower than a line.
 const LEAST_TOLERANCE: f64 = 0.1;
 
 fn stability(
     pole: &StabilisationPole,
     before: &[StabilisationPole],
-    tolerances: &StabilityTolerances,
     spacing: f64,
 ) -> PoleStability {
-    let by_distance = before
-        .iter()
-        .map(|other| ((other.pole - pole.pole).norm(), other));
+    let others = before.iter();
+    let by_distance = others.map(|other| ((other.pole - pole.pole).norm(), other));
     let Some((_, nearest)) = by_distance.min_by(|a, b| a.0.total_cmp(&b.0)) else {
         return PoleStability::New;
     };
     let half_power = 2.0 * pole.damping_ratio * pole.frequency;
-    let allowed = (tolerances.frequency * pole.frequency)
-        .min((tolerances.half_power_share * half_power).max(LEAST_TOLERANCE * spacing));
+    let allowed = (FREQUENCY_TOLERANCE * pole.frequency)
+        .min((HALF_POWER_TOLERANCE * half_power).max(LEAST_TOLERANCE * spacing));
     if (pole.frequency - nearest.frequency).abs() > allowed {
         return PoleStability::New;
     }
-    let damping = (pole.damping_ratio - nearest.damping_ratio).abs()
-        <= tolerances.damping * pole.damping_ratio;
+    let change = (pole.damping_ratio - nearest.damping_ratio).abs();
+    let damping = change <= DAMPING_TOLERANCE * pole.damping_ratio;
     // 1 - MAC of the participation vectors, both of unit length.
     let entries = pole.participation.iter().zip(&nearest.participation);
     let product: Complex64 = entries.map(|(a, b)| a.conj() * b).sum();
-    let vector = 1.0 - product.norm_sqr() <= tolerances.participation;
+    let vector = 1.0 - product.norm_sqr() <= PARTICIPATION_TOLERANCE;
     let several = pole.participation.len() > 1;
     match (damping, vector) {
         (true, true) => PoleStability::All,
@@ -233,7 +240,7 @@ impl CircleMap {
         let arc = (points.max(1) - 1) as f64 / transform as f64 * TAU;
         CircleMap {
             first: matrix.frequency(0),
-            time: 1.0 / (transform as f64 * matrix.spacing()),
+            time: 1.0 / (transform as f64 * matrix.spacing),
             cut: 0.5 * (arc + TAU),
             transform,
         }
@@ -268,14 +275,9 @@ pub(super) struct Denominators {
 
 impl Denominators {
     /// `None` where the responses are all zero or the equations cannot be solved.
-    pub(super) fn new(
-        matrix: &ResponseMatrix,
-        map: &CircleMap,
-        order: usize,
-        weights: &[f64],
-    ) -> Option<Self> {
-        let inputs = matrix.inputs();
-        let reduced = reduced_matrix(matrix, map, order, weights)?;
+    pub(super) fn new(matrix: &ResponseMatrix, map: &CircleMap, order: usize) -> Option<Self> {
+        let inputs = matrix.inputs;
+        let reduced = reduced_matrix(matrix, map, order)?;
         let unknowns = order * inputs;
         let block = reduced.view((inputs, inputs), (unknowns, unknowns));
         let factor = factorise(&block.into_owned())?.unpack();
@@ -322,9 +324,8 @@ fn reduced_matrix(
     matrix: &ResponseMatrix,
     map: &CircleMap,
     order: usize,
-    weights: &[f64],
 ) -> Option<DMatrix<Complex64>> {
-    let inputs = matrix.inputs();
+    let inputs = matrix.inputs;
     let columns = (order + 1) * inputs;
     let powers = order + 1 + 2 * EXTRA_POWERS;
     let mut sums = Sums::new(map.transform);
@@ -334,18 +335,22 @@ fn reduced_matrix(
     let numerator = DMatrix::from_fn(powers, powers, |j, k| at_lag(&lags, k as i64 - j as i64));
     let numerator = factorise(&numerator)?.unpack();
     let mut reduced = DMatrix::zeros(columns, columns);
-    for (output, &weight) in (0..matrix.outputs()).zip(weights) {
-        let scale = weight.sqrt();
-        let row: Vec<Vec<Complex64>> = (0..inputs)
-            .map(|input| {
-                matrix
-                    .entry(output, input)
-                    .iter()
-                    .map(|x| x * scale)
-                    .collect()
-            })
-            .collect();
-        add_products(&mut reduced, &mut sums, &row, order);
+    for output in 0..matrix.outputs {
+        let row: Vec<&[Complex64]> = (0..inputs).map(|i| matrix.entry(output, i)).collect();
+        // T of this output.
+        for (i, left) in row.iter().enumerate() {
+            for (k, right) in row.iter().enumerate() {
+                let pairs = left.iter().zip(*right);
+                let product: Vec<Complex64> = pairs.map(|(a, b)| a.conj() * b).collect();
+                let lags = sums.at(&product);
+                for q in 0..=order {
+                    for p in 0..=order {
+                        let entry = at_lag(&lags, q as i64 - p as i64);
+                        reduced[(p * inputs + i, q * inputs + k)] += entry;
+                    }
+                }
+            }
+        }
         let mut mixed = DMatrix::zeros(powers, columns);
         for (input, entry) in row.iter().enumerate() {
             let lags = sums.at(entry);
@@ -374,28 +379,6 @@ fn reduced_matrix(
         }
     }
     Some(reduced)
-}
-
-/// Adds T of one output.
-fn add_products(
-    reduced: &mut DMatrix<Complex64>,
-    sums: &mut Sums,
-    row: &[Vec<Complex64>],
-    order: usize,
-) {
-    let inputs = row.len();
-    for (i, left) in row.iter().enumerate() {
-        for (k, right) in row.iter().enumerate() {
-            let product: Vec<Complex64> =
-                left.iter().zip(right).map(|(a, b)| a.conj() * b).collect();
-            let lags = sums.at(&product);
-            for q in 0..=order {
-                for p in 0..=order {
-                    reduced[(p * inputs + i, q * inputs + k)] += at_lag(&lags, q as i64 - p as i64);
-                }
-            }
-        }
-    }
 }
 
 /// Negative lags stand at the end of a transform.
@@ -462,7 +445,13 @@ fn hessenberg_eigenvalues(mut h: DMatrix<Complex64>) -> Vec<Complex64> {
     let mut end = h.nrows();
     let mut steps = 0;
     while end > 0 {
-        let start = active_start(&h, end);
+        // First row of the block that ends before `end` and has no negligible subdiagonal.
+        let mut rows = (1..end).rev();
+        let start = rows.find(|&k| {
+            let scale = h[(k, k)].l1_norm() + h[(k - 1, k - 1)].l1_norm();
+            h[(k, k - 1)].l1_norm() <= f64::EPSILON * scale
+        });
+        let start = start.unwrap_or(0);
         if start + 1 == end || steps >= MOST_STEPS {
             if start + 1 == end {
                 found.push(h[(end - 1, end - 1)]);
@@ -483,17 +472,6 @@ fn hessenberg_eigenvalues(mut h: DMatrix<Complex64>) -> Vec<Complex64> {
     found
 }
 
-/// First row of the block that ends before `end` and has no negligible subdiagonal.
-fn active_start(h: &DMatrix<Complex64>, end: usize) -> usize {
-    (1..end)
-        .rev()
-        .find(|&k| {
-            let scale = h[(k, k)].l1_norm() + h[(k - 1, k - 1)].l1_norm();
-            h[(k, k - 1)].l1_norm() <= f64::EPSILON * scale
-        })
-        .unwrap_or(0)
-}
-
 /// Eigenvalue of the last two by two block that is nearer to its last entry.
 fn wilkinson_shift(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
     let (a, b) = (h[(end - 2, end - 2)], h[(end - 2, end - 1)]);
@@ -502,15 +480,11 @@ fn wilkinson_shift(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
     let half = (a - d) * 0.5;
     let product = b * c;
     let root = (half * half + product).sqrt();
-    let sum = if (half.conj() * root).re >= 0.0 {
-        half + root
-    } else {
-        half - root
-    };
-    if sum.norm_sqr() == 0.0 {
-        d
-    } else {
-        d - product / sum
+    let ahead = (half.conj() * root).re >= 0.0;
+    let sum = if ahead { half + root } else { half - root };
+    match sum.norm_sqr() == 0.0 {
+        true => d,
+        false => d - product / sum,
     }
 }
 
@@ -527,7 +501,18 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
     let mut turns: Vec<(f64, Complex64)> = Vec::with_capacity(end - start);
     for k in start..end - 1 {
         let place = k * rows + k;
-        let (c, s) = rotation(values[place], values[place + 1]);
+        // Cosine (real) and sine of the rotation [c s; -conj(s) c] that takes (a, b) to (r, 0).
+        let (a, b) = (values[place], values[place + 1]);
+        let length = (a.norm_sqr() + b.norm_sqr()).sqrt();
+        // Companion matrices of a fit are of order one: no overflow to guard against.
+        let size = a.norm_sqr().sqrt();
+        let (c, s) = if length == 0.0 {
+            (1.0, Complex64::ZERO)
+        } else if size == 0.0 {
+            (0.0, b.conj() / length)
+        } else {
+            (size / length, a / size * b.conj() / length)
+        };
         for column in values[k * rows..end * rows].chunks_exact_mut(rows) {
             let (x, y) = (column[k], column[k + 1]);
             column[k] = x * c + s * y;
@@ -547,19 +532,5 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
     }
     for index in start..end {
         values[index * rows + index] += shift;
-    }
-}
-
-/// Cosine (real) and sine of the rotation [c s; -conj(s) c] that takes (a, b) to (r, 0).
-fn rotation(a: Complex64, b: Complex64) -> (f64, Complex64) {
-    let length = (a.norm_sqr() + b.norm_sqr()).sqrt();
-    // Companion matrices of a fit are of order one: no overflow to guard against.
-    let size = a.norm_sqr().sqrt();
-    if length == 0.0 {
-        (1.0, Complex64::ZERO)
-    } else if size == 0.0 {
-        (0.0, b.conj() / length)
-    } else {
-        (size / length, a / size * b.conj() / length)
     }
 }

@@ -50,6 +50,33 @@ impl CsvLayout {
         let name = self.columns.get(column).and_then(|c| c.name.as_deref());
         name.map_or(String::new(), |name| format!(" (\"{name}\")"))
     }
+
+    /// Returns the factor from the time column's unit to seconds.
+    ///
+    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is seconds.
+    pub(super) fn time_factor(&self, file: &str) -> Result<f64, RecordingError> {
+        let column = self.time.map(|at| &self.columns[at]);
+        let Some(column) = column else {
+            return Ok(1.0);
+        };
+        let name = column.name.as_deref().unwrap_or_default();
+        let suffix = name.rsplit('_').next().unwrap_or_default();
+        let unit = channel_unit(column.unit.as_deref().unwrap_or(suffix));
+        match (unit, &column.unit) {
+            (Some((factor, "s")), _) => Ok(factor),
+            (_, None) => Ok(1.0),
+            (_, Some(unit)) => {
+                let problem = format!(
+                    "the time column's unit \"{unit}\" is not one of time; allowed: s, ms, us, ns, min, h"
+                );
+                Err(RecordingError::at_line(
+                    file,
+                    self.lines_before + 1,
+                    problem,
+                ))
+            }
+        }
+    }
 }
 
 /// One column as the header has it.
@@ -62,16 +89,6 @@ pub(in crate::recording) struct Column {
 }
 
 impl Column {
-    /// Reads a header cell. Brackets that hold no known unit stay in the name as well,
-    /// since "sensor (1)" and "sensor (2)" are two names.
-    fn from_cell(cell: &str) -> Self {
-        let (name, unit) = split_unit(cell);
-        match unit {
-            Some(unit) if channel_unit(unit).is_none() => Self::new(cell, unit),
-            unit => Self::new(name, unit.unwrap_or_default()),
-        }
-    }
-
     fn new(name: &str, unit: &str) -> Self {
         let [name, unit] = [name, unit].map(|text| Some(text.trim().to_owned()));
         Self {
@@ -82,23 +99,12 @@ impl Column {
 }
 
 /// A number in the head.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct HeadNumber<'a> {
     /// Line, 1-based.
-    pub line: u64,
+    line: u64,
     pub value: f64,
     pub text: &'a [u8],
-}
-
-/// A column named as time whose values do not rise throughout.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FlatTime {
-    /// Column, 0-based.
-    pub column: usize,
-    /// First line in which it does not rise, 1-based.
-    pub line: u64,
-    /// Value there and the one before.
-    pub values: [f64; 2],
 }
 
 /// The complete lines at the beginning of a text file.
@@ -135,7 +141,7 @@ impl<'a> Head<'a> {
         let candidates = Separator::ALL.map(|separator| Candidate::new(self, separator));
         // Most rows first, then a header that fits, then most columns, then the order of preference.
         let best = candidates.iter().rev().max_by_key(|one| {
-            let above = one.line_above(one.first).map(|at| one.kind(at));
+            let above = one.line_above(one.first).map(|at| one.kinds[at]);
             let header_fits = above == Some(LineKind::Text(one.cells));
             (one.rows, header_fits, one.cells)
         });
@@ -149,61 +155,81 @@ impl<'a> Head<'a> {
             digits.count()
         });
         let (at, text) = nearest.map_or((0, &b""[..]), |(at, (_, text))| (at, text));
-        Err(RecordingError::NoNumbers {
-            file: file.to_owned(),
-            line: at as u64 + 1,
-            value: shown(text.trim_ascii()),
-        })
+        let problem = format!(
+            "no line of numbers found; the best candidate holds \"{}\" where a number is needed; allowed: numbers separated by comma, semicolon, tab or blanks",
+            shown(text.trim_ascii())
+        );
+        Err(RecordingError::at_line(file, at as u64 + 1, problem))
     }
 
-    /// Returns the readable numbers of one column, rows of any kind included.
+    /// Returns the readable numbers of one column below the header, rows of any kind included.
     pub(super) fn numbers(&self, layout: &CsvLayout, column: usize) -> Vec<HeadNumber<'a>> {
+        let rows = layout.lines_before as usize..self.lines.len();
+        self.numbers_in(rows, layout.separator, column)
+    }
+
+    /// Returns the readable numbers of one column in some lines (0-based).
+    fn numbers_in(
+        &self,
+        lines: impl Iterator<Item = usize>,
+        separator: Separator,
+        column: usize,
+    ) -> Vec<HeadNumber<'a>> {
         let mut cells = Vec::new();
         let mut numbers = Vec::new();
-        for ((offset, line), number) in self.lines.iter().zip(1..) {
-            if *offset < layout.start {
-                continue;
-            }
-            split_cells(line, layout.separator, &mut cells);
-            let text = cells.get(column).and_then(|cell| line.get(cell.clone()));
-            if let Some(text) = text
+        for at in lines {
+            let line = self.lines[at].1;
+            split_cells(line, separator, &mut cells);
+            if let Some(text) = cells.get(column).and_then(|cell| line.get(cell.clone()))
                 && let Ok(value) = parse_number(text, &mut None)
             {
-                numbers.push(HeadNumber {
-                    line: number,
-                    value,
-                    text,
-                });
+                let line = at as u64 + 1;
+                numbers.push(HeadNumber { line, value, text });
             }
         }
         numbers
     }
 
-    /// Returns the channel whose values rise in equal steps though it is not named as time: probably the time.
-    pub(super) fn evenly_rising_column(&self, layout: &CsvLayout) -> Option<usize> {
-        layout.channel_columns().into_iter().find(|column| {
-            let numbers = self.numbers(layout, *column);
-            let steps = numbers.windows(2).map(|pair| pair[1].value - pair[0].value);
-            let shortest = steps.clone().fold(f64::INFINITY, f64::min);
-            let longest = steps.clone().fold(0.0, f64::max);
-            // A tenth: only a hint is made of it, and printed times are rounded.
-            steps.len() >= 2 && shortest > 0.0 && longest - shortest <= 0.1 * longest
-        })
-    }
-
-    /// Returns the column that is named as time without being one, and where that shows first; `None` of one that
-    /// stands still, a temperature perhaps.
-    pub(super) fn flat_time(&self, layout: &CsvLayout) -> Option<FlatTime> {
-        let column = *named_as_time(&layout.columns).first()?;
-        let numbers = self.numbers(layout, column);
-        let mut steps = numbers.windows(2);
-        let flat = steps.clone().find(|step| step[1].value <= step[0].value)?;
-        let rises = steps.any(|step| step[1].value > step[0].value);
-        rises.then_some(FlatTime {
-            column,
-            line: flat[1].line,
-            values: [flat[1].value, flat[0].value],
-        })
+    /// Returns the error of a file without a sample rate, with what the head shows of the time.
+    pub(super) fn no_sample_rate(&self, layout: &CsvLayout, file: &str) -> RecordingError {
+        let mut hint = String::new();
+        if layout.time.is_some() {
+            hint.push_str(" (a single row has no step)");
+        } else {
+            if let Some(column) = named_as_time(&layout.columns).first() {
+                let numbers = self.numbers(layout, *column);
+                let mut steps = numbers.windows(2);
+                let flat = steps.clone().find(|step| step[1].value <= step[0].value);
+                // A column that never rises is not blamed: T may be a temperature.
+                if let Some([before, flat]) = flat
+                    && steps.any(|step| step[1].value > step[0].value)
+                {
+                    let problem = format!(
+                        "column {}{} is named as time, but repeats or falls here, as in most rows: {} after {}; export the time with more digits, or remove the column and give sample_rate in Hz",
+                        column + 1,
+                        layout.shown_name(*column),
+                        flat.value,
+                        before.value
+                    );
+                    return RecordingError::at_line(file, flat.line, problem);
+                }
+            }
+            let evenly_rising = layout.channel_columns().into_iter().find(|column| {
+                let numbers = self.numbers(layout, *column);
+                let steps = numbers.windows(2).map(|pair| pair[1].value - pair[0].value);
+                let shortest = steps.clone().fold(f64::INFINITY, f64::min);
+                let longest = steps.clone().fold(0.0, f64::max);
+                // A tenth: only a hint is made of it, and printed times are rounded.
+                steps.len() >= 2 && shortest > 0.0 && longest - shortest <= 0.1 * longest
+            });
+            if let Some(column) = evenly_rising {
+                hint = format!(" (column {} rises evenly: is it the time?)", column + 1);
+            }
+        }
+        let problem = format!(
+            "no time column and no sample rate{hint}; name the time column t or time (unit in brackets allowed), or give sample_rate in Hz"
+        );
+        RecordingError::at_line(file, layout.lines_before + 1, problem)
     }
 }
 
@@ -230,14 +256,6 @@ fn named_as_time(columns: &[Column]) -> Vec<usize> {
     }
     ranked.sort_unstable();
     ranked.into_iter().map(|(.., at)| at).collect()
-}
-
-/// A line of the head under one separator.
-#[derive(Debug, Clone, Copy)]
-struct HeadLine<'a> {
-    text: &'a [u8],
-    offset: u64,
-    kind: LineKind,
 }
 
 /// Kind of a line under one separator, with its number of cells.
@@ -298,9 +316,10 @@ impl LineKind {
 
 /// The head under one separator.
 struct Candidate<'a> {
+    head: &'a Head<'a>,
     separator: Separator,
-    line_end: u8,
-    lines: Vec<HeadLine<'a>>,
+    /// Kind of each line.
+    kinds: Vec<LineKind>,
     /// Cells of the commonest kind of row.
     cells: usize,
     /// Lines of that kind.
@@ -310,24 +329,25 @@ struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    fn new(head: &Head<'a>, separator: Separator) -> Self {
+    fn new(head: &'a Head<'a>, separator: Separator) -> Self {
         let mut cells = Vec::new();
-        let mut lines = Vec::with_capacity(head.lines.len());
         let mut counts = BTreeMap::new();
-        for &(offset, text) in &head.lines {
-            let kind = LineKind::of(text, separator, &mut cells);
-            lines.push(HeadLine { text, offset, kind });
+        let lines = head.lines.iter();
+        let kinds: Vec<LineKind> = lines
+            .map(|(_, text)| LineKind::of(text, separator, &mut cells))
+            .collect();
+        for kind in &kinds {
             if let LineKind::Row(cells) = kind {
-                *counts.entry(cells).or_insert(0_usize) += 1;
+                *counts.entry(*cells).or_insert(0_usize) += 1;
             }
         }
         let commonest = counts.into_iter().max_by_key(|(_, rows)| *rows);
         let (cells, rows) = commonest.unwrap_or((0, 0));
-        let first = lines.iter().position(|l| l.kind == LineKind::Row(cells));
+        let first = kinds.iter().position(|kind| *kind == LineKind::Row(cells));
         Self {
+            head,
             separator,
-            line_end: head.line_end,
-            lines,
+            kinds,
             cells,
             rows,
             first: first.unwrap_or(0),
@@ -336,51 +356,58 @@ impl<'a> Candidate<'a> {
 
     /// Index of the nearest line above `below` that is neither blank nor a comment.
     fn line_above(&self, below: usize) -> Option<usize> {
-        let above = self.lines.get(..below).unwrap_or_default();
-        above
+        self.kinds[..below]
             .iter()
-            .rposition(|line| !matches!(line.kind, LineKind::Blank | LineKind::Comment))
+            .rposition(|kind| !matches!(kind, LineKind::Blank | LineKind::Comment))
     }
 
-    /// Kind of a line; blank beyond the last one.
-    fn kind(&self, at: usize) -> LineKind {
-        self.lines.get(at).map_or(LineKind::Blank, |line| line.kind)
-    }
-
+    /// The layout under this separator, where there is a row.
     fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
-        let first = self.first_row();
-        let mut columns = self.header_above(first, file)?.unwrap_or_default();
-        columns.resize(self.cells, Column::default());
-        columns.truncate(self.used_columns(&columns));
-        Ok(CsvLayout {
-            separator: self.separator,
-            decimal: None,
-            time: self.time_column(&columns, first),
-            columns,
-            start: self.lines.get(first).map_or(0, |line| line.offset),
-            lines_before: first as u64,
-            line_end: self.line_end,
-        })
-    }
-
-    /// Index of the first row.
-    ///
-    /// A line that mixes numbers and text right below a header, or that starts with a number, is a
-    /// damaged row and not a title: it becomes the first row, so that reading it names what is
-    /// wrong. The same holds for a row of another length right below a header.
-    fn first_row(&self) -> usize {
+        // A line that mixes numbers and text right below a header, or that starts with a number, is a damaged row and
+        // not a title: it becomes the first row, so that reading it names what is wrong. The same holds for a row of
+        // another length right below a header.
         let mut first = self.first;
         while let Some(at) = self.line_above(first) {
             let next = self.line_above(at);
-            let below_header = next.is_some_and(|n| self.kind(n) == LineKind::Text(self.cells));
-            match self.kind(at) {
+            let below_header = next.is_some_and(|n| self.kinds[n] == LineKind::Text(self.cells));
+            match self.kinds[at] {
                 LineKind::MixedNumberFirst(_) => {}
                 LineKind::Mixed(_) | LineKind::Row(_) if below_header => {}
                 _ => break,
             }
             first = at;
         }
-        first
+        let mut columns = self.header_above(first, file)?.unwrap_or_default();
+        columns.resize(self.cells, Column::default());
+        // Columns at the end that are empty in every row and in the header do not count.
+        let mut last = columns
+            .iter()
+            .rposition(|column| column.name.is_some() || column.unit.is_some());
+        let mut cells = Vec::new();
+        let rows = (0..self.kinds.len()).filter(|at| self.kinds[*at] == LineKind::Row(self.cells));
+        for at in rows.clone() {
+            split_cells(self.head.lines[at].1, self.separator, &mut cells);
+            last = last.max(cells.iter().rposition(|cell| !cell.is_empty()));
+        }
+        columns.truncate(last.map_or(0, |last| last + 1));
+        // Time is named as such and rises in at least half of the steps of the head. (That it rises in all of them is
+        // checked when the rows are read, and is an error there.)
+        let time = named_as_time(&columns).into_iter().find(|column| {
+            let rows = rows.clone().filter(|at| *at >= first);
+            let numbers = self.head.numbers_in(rows, self.separator, *column);
+            let steps = numbers.windows(2);
+            let rising = steps.filter(|pair| pair[1].value > pair[0].value).count();
+            2 * rising >= numbers.len().saturating_sub(1)
+        });
+        Ok(CsvLayout {
+            separator: self.separator,
+            decimal: None,
+            time,
+            columns,
+            start: self.head.lines[first].0,
+            lines_before: first as u64,
+            line_end: self.head.line_end,
+        })
     }
 
     /// Reads the header above the first row; `None` where there is none.
@@ -392,52 +419,47 @@ impl<'a> Candidate<'a> {
         let Some(at) = self.line_above(first) else {
             return Ok(self.header_in_comment(first));
         };
-        let kind = self.kind(at);
+        let (kind, here) = (self.kinds[at], self.texts(at));
         if kind.is_header_of(self.cells) {
-            return Ok(Some(self.header(at)));
+            // It may itself be a line of units below the names: empty cells, units in brackets, or known ones.
+            let units_only = here.iter().all(|cell| {
+                let (name, unit) = split_unit(cell);
+                cell.is_empty()
+                    || (name.is_empty() && unit.is_some())
+                    || channel_unit(cell).is_some()
+            });
+            let names = self
+                .line_above(at)
+                .filter(|above| units_only && self.kinds[*above].is_header_of(self.cells));
+            let Some(names) = names.map(|above| self.texts(above)) else {
+                return Ok(self.columns_of(here));
+            };
+            let cells = names.iter().zip(&here);
+            let columns = cells.map(|(name, unit)| match split_unit(unit) {
+                ("", Some(inner)) => Column::new(name, inner),
+                _ => Column::new(name, unit),
+            });
+            return Ok(Some(columns.collect()));
         }
         Ok(match (kind, self.separator) {
             // Twice as many columns as names under the comma: it is the decimal mark as well.
             (LineKind::Text(names), Separator::Comma) if names > 1 && self.cells == 2 * names => {
-                return Err(RecordingError::AmbiguousComma {
-                    file: file.to_owned(),
-                    line: at as u64 + 1,
-                    names,
-                    columns: self.cells,
-                });
+                let problem = format!(
+                    "{names} names head {} columns; when the comma is the decimal mark the separator must be semicolon, tab or blank; export it again",
+                    self.cells
+                );
+                return Err(RecordingError::at_line(file, at as u64 + 1, problem));
             }
-            (LineKind::Text(_), Separator::Blanks) => {
-                self.columns_of(joined_brackets(self.texts(at)))
-            }
+            (LineKind::Text(_), Separator::Blanks) => self.columns_of(joined_brackets(here)),
             _ => self.header_in_comment(first),
         })
     }
 
-    /// Names and units from the line at `at`, which may itself be a line of units below the names.
-    fn header(&self, at: usize) -> Vec<Column> {
-        let here = self.texts(at);
-        let above = self
-            .line_above(at)
-            .filter(|above| self.kind(*above).is_header_of(self.cells));
-        match above {
-            Some(above) if here.iter().all(|cell| is_unit_cell(cell)) => {
-                let names = self.texts(above);
-                let cells = names.iter().zip(&here);
-                let columns = cells.map(|(name, unit)| match split_unit(unit) {
-                    ("", Some(inner)) => Column::new(name, inner),
-                    _ => Column::new(name, unit),
-                });
-                columns.collect()
-            }
-            _ => here.iter().map(|cell| Column::from_cell(cell)).collect(),
-        }
-    }
-
     /// Some programs write the names into the last comment above the rows.
     fn header_in_comment(&self, first: usize) -> Option<Vec<Column>> {
-        let above = self.lines.get(..first)?;
-        let comment = above.iter().rfind(|line| line.kind == LineKind::Comment)?;
-        let text = decode_text(comment.text.trim_ascii());
+        let above = &self.kinds[..first];
+        let comment = above.iter().rposition(|kind| *kind == LineKind::Comment)?;
+        let text = decode_text(self.head.lines[comment].1.trim_ascii());
         let text = text.trim_start_matches(['#', '%', '/']);
         let mut names = split_texts(text.as_bytes(), self.separator);
         if self.separator == Separator::Blanks {
@@ -451,49 +473,16 @@ impl<'a> Candidate<'a> {
 
     /// Columns of header cells, where they are as many as those of the rows.
     fn columns_of(&self, names: Vec<String>) -> Option<Vec<Column>> {
-        let fits = names.len() == self.cells;
-        fits.then(|| names.iter().map(|name| Column::from_cell(name)).collect())
+        let columns = names.iter().map(|cell| match split_unit(cell) {
+            // Brackets that hold no known unit stay in the name as well, since "sensor (1)" and "sensor (2)" are two.
+            (_, Some(unit)) if channel_unit(unit).is_none() => Column::new(cell, unit),
+            (name, unit) => Column::new(name, unit.unwrap_or_default()),
+        });
+        (names.len() == self.cells).then(|| columns.collect())
     }
 
     fn texts(&self, at: usize) -> Vec<String> {
-        let text = self.lines.get(at).map_or(&b""[..], |line| line.text);
-        split_texts(text, self.separator)
-    }
-
-    /// Number of columns without those at the end that are empty in every row and in the header.
-    fn used_columns(&self, columns: &[Column]) -> usize {
-        let mut cells = Vec::new();
-        let mut last = columns
-            .iter()
-            .rposition(|c| c.name.is_some() || c.unit.is_some());
-        for line in &self.lines {
-            if line.kind == LineKind::Row(self.cells) {
-                split_cells(line.text, self.separator, &mut cells);
-                last = last.max(cells.iter().rposition(|cell| !cell.is_empty()));
-            }
-        }
-        last.map_or(0, |last| last + 1)
-    }
-
-    /// Finds the time column: one that is named as time and rises in at least half of the steps of the head. (That
-    /// it rises in all of them is checked when the rows are read, and is an error there.)
-    fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
-        let mut cells = Vec::new();
-        named_as_time(columns).into_iter().find(|column| {
-            // The readable numbers in the rows of the commonest kind.
-            let mut values = Vec::new();
-            for line in self.lines.iter().skip(first) {
-                if line.kind == LineKind::Row(self.cells) {
-                    split_cells(line.text, self.separator, &mut cells);
-                    let cell = cells
-                        .get(*column)
-                        .and_then(|cell| line.text.get(cell.clone()));
-                    values.extend(cell.and_then(|cell| parse_number(cell, &mut None).ok()));
-                }
-            }
-            let rising = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
-            2 * rising >= values.len().saturating_sub(1)
-        })
+        split_texts(self.head.lines[at].1, self.separator)
     }
 }
 
@@ -503,12 +492,6 @@ pub(in crate::recording) fn split_texts(line: &[u8], separator: Separator) -> Ve
     split_cells(line, separator, &mut cells);
     let cells = cells.into_iter().filter_map(|cell| line.get(cell));
     cells.map(decode_text).collect()
-}
-
-/// Returns `true` for a cell of a line of units: empty, in brackets, or a known unit.
-fn is_unit_cell(cell: &str) -> bool {
-    let (name, unit) = split_unit(cell);
-    cell.is_empty() || (name.is_empty() && unit.is_some()) || channel_unit(cell).is_some()
 }
 
 /// Joins cells that begin with a bracket to the cell before: under blanks a name such as "force (N)" falls into two.

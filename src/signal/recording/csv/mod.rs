@@ -5,19 +5,16 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::error::{RecordingError, ResponseError};
+use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_rate};
-use super::spacing::{TimeCheck, UnevenStep};
-use super::text::{Cell, CellProblem, is_comment, parse_number, shown, split_cells};
+use super::text::{Cell, CellProblem, TimeCheck, is_comment, parse_number, shown, split_cells};
 use super::units::channel_unit;
-use super::warning::{ChannelLabel, RecordingWarning};
-use super::{ChannelInfo, Format, MAX_CHANNELS, ReadSettings, Recording, Source, Timing};
-use super::{read_head, unreadable};
+use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, Timing, read_head};
 
 mod layout;
 
 pub(super) use layout::split_texts;
-use layout::{Column, CsvLayout, FlatTime, HEAD_BYTES, Head};
+use layout::{CsvLayout, HEAD_BYTES, Head};
 
 /// Rows between two entries of the index: some 100 kB of text, read in under a millisecond.
 const INDEX_ROWS: u64 = 4096;
@@ -35,28 +32,38 @@ pub(super) fn open_csv(
     settings: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
     let mut meters: Vec<HealthMeter> = Vec::new();
-    let (source, rates) = CsvSource::open(path, &file, |block| {
+    let source = CsvSource::open(path, &file, |block| {
         meters.resize(block.len(), HealthMeter::new(None));
         for (samples, meter) in block.iter().zip(&mut meters) {
             meter.add(samples);
         }
     })?;
     if source.frames == 0 {
-        return Err(RecordingError::NoSamples { file });
+        return Err(RecordingError::no_samples(&file));
     }
-    source.refuse_frequencies()?;
     let mut warnings = Vec::new();
-    let sample_rate = source.sample_rate(&rates, settings, &mut warnings)?;
+    let sample_rate = source.sample_rate(settings, &mut warnings)?;
     let layout = &source.layout;
     let mut channels = Vec::with_capacity(meters.len());
-    for (column, meter) in layout.channel_columns().into_iter().zip(meters) {
-        let header = layout.columns.get(column).cloned().unwrap_or_default();
-        let number = channels.len() + 1;
-        channels.push(csv_channel(number, header, meter, &mut warnings));
+    for ((number, column), meter) in (1..).zip(layout.channel_columns()).zip(meters) {
+        let header = layout.columns[column].clone();
+        // Values are in SI where the header's unit is known.
+        let known = header.unit.as_deref().and_then(channel_unit);
+        if let (Some(unit), None) = (&header.unit, known) {
+            let name = header.name.as_deref();
+            warnings.push(RecordingWarning::unknown_unit(number, name, unit));
+        }
+        let scale = known.map_or(1.0, |(factor, _)| factor);
+        channels.push(ChannelInfo {
+            name: header.name,
+            unit: known.map_or_else(|| header.unit.clone(), |(_, si)| Some(si.to_owned())),
+            header_unit: header.unit,
+            scale,
+            health: meter.finish().scaled(scale),
+        });
     }
     Ok(Recording {
         name: file,
-        path: Some(path.to_owned()),
         format: Format::Csv {
             separator: layout.separator,
             decimal: char::from(layout.decimal.unwrap_or(b'.')),
@@ -69,147 +76,124 @@ pub(super) fn open_csv(
         frames: source.frames,
         channels,
         warnings,
-        source: Source::Csv(Box::new(source)),
+        source: Arc::new(source),
     })
 }
 
-/// A channel of a text file, its values in SI where the header's unit is known.
-fn csv_channel(
-    number: usize,
-    header: Column,
-    meter: HealthMeter,
-    warnings: &mut Vec<RecordingWarning>,
-) -> ChannelInfo {
-    let known = header.unit.as_deref().and_then(channel_unit);
-    if let (Some(unit), None) = (&header.unit, known) {
-        let name = header.name.clone();
-        warnings.push(RecordingWarning::UnknownUnit {
-            channel: ChannelLabel { number, name },
-            unit: unit.clone(),
-        });
-    }
-    let scale = known.map_or(1.0, |(factor, _)| factor);
-    ChannelInfo {
-        name: header.name,
-        unit: known.map_or_else(|| header.unit.clone(), |(_, si)| Some(si.to_owned())),
-        header_unit: header.unit,
-        scale,
-        health: meter.finish().scaled(scale),
-    }
-}
-
 /// A text file that has been read once.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct CsvSource {
-    pub path: PathBuf,
+    path: PathBuf,
     pub file: String,
     pub layout: CsvLayout,
-    pub frames: u64,
+    frames: u64,
     /// Place of every 4096th row.
-    index: Arc<Vec<RowPlace>>,
-}
-
-/// Sample rates and time columns that the opening pass finds beside the samples.
-pub(super) struct CsvRates {
-    /// By the time column: from first and last time, and the one to use (Hz).
-    by_time: Option<(f64, f64)>,
-    /// A column that rises evenly though it is not named as time, 0-based.
-    unnamed_time: Option<usize>,
-    /// A column that is named as time though it does not rise.
-    flat_time: Option<FlatTime>,
+    index: Vec<RowPlace>,
+    /// Sample rate by the time column: from first and last time, and the one to use (Hz).
+    rate: Option<(f64, f64)>,
 }
 
 impl CsvSource {
     /// Reads the whole file once, hands every block of channel values to `sink`, and remembers
-    /// where rows begin.
+    /// where rows begin. Every cell is parsed, and every step of time checked.
     pub(super) fn open(
         path: &Path,
         file: &str,
         mut sink: impl FnMut(&[Vec<f64>]),
-    ) -> Result<(Self, CsvRates), RecordingError> {
+    ) -> Result<Self, RecordingError> {
         let head = read_head(path, file, HEAD_BYTES)?;
         let head = Head::new(&head);
+        let layout = head.layout(file)?;
         let mut source = Self {
             path: path.to_owned(),
             file: file.to_owned(),
-            layout: head.layout(file)?,
+            layout,
             frames: 0,
-            index: Arc::new(Vec::new()),
+            index: Vec::new(),
+            rate: None,
         };
-        source.check_columns()?;
-        let time_factor = source.time_factor()?;
         let layout = &source.layout;
+        let channels = layout.channel_columns();
+        check_channel_count(file, channels.len())?;
+        if let Some(time) = layout.time.filter(|_| channels.is_empty()) {
+            let problem = format!(
+                "column {} is time and there is no other; allowed: at least one channel beside the time",
+                time + 1
+            );
+            return Err(source.error(problem));
+        }
+        let factor = layout.time_factor(file)?;
         let mut time = layout.time.map(|column| {
             let numbers = head.numbers(layout, column);
             TimeCheck::new(numbers.iter().map(|number| (number.value, number.text)))
         });
+        let (mut index, mut frames) = (Vec::new(), 0_u64);
+        let mut block = vec![Vec::new(); channels.len()];
         let mut rows = source.rows(source.first_row())?;
-        let (index, frames) = read_all(&mut rows, time.as_mut(), time_factor, &mut sink)?;
+        let columns: Vec<usize> = (0..layout.columns.len()).collect();
+        while rows.next_row(&columns)? {
+            if frames.is_multiple_of(INDEX_ROWS) {
+                index.push(rows.place);
+                sink(&block);
+                block.iter_mut().for_each(Vec::clear);
+            }
+            frames += 1;
+            if let (Some(check), Some(column)) = (&mut time, layout.time) {
+                let (cell, line) = (rows.cell(column), rows.line_number());
+                check.add(rows.values[column], cell, line).map_err(|uneven| {
+                    let problem = format!(
+                        "uneven sampling: time {}{}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
+                        uneven.words(factor, "s", "row"),
+                        uneven.lost_rows()
+                    );
+                    RecordingError::at_line(file, uneven.line, problem)
+                })?;
+            }
+            for (channel, column) in block.iter_mut().zip(&channels) {
+                channel.push(rows.values[*column]);
+            }
+        }
+        sink(&block);
         let decimal = rows.decimal;
-        let untimed = layout.time.is_none();
-        let rates = CsvRates {
-            by_time: time.and_then(|time| time.sample_rate(time_factor)),
-            unnamed_time: untimed.then(|| head.evenly_rising_column(layout)).flatten(),
-            flat_time: untimed.then(|| head.flat_time(layout)).flatten(),
-        };
+        source.rate = time.and_then(|time| time.sample_rate(factor));
         source.layout.decimal = decimal;
-        source.frames = frames;
-        source.index = Arc::new(index);
-        Ok((source, rates))
+        (source.index, source.frames) = (index, frames);
+        Ok(source)
     }
 
-    /// Checks that there are channels, and not too many.
-    fn check_columns(&self) -> Result<(), RecordingError> {
-        let channels = self.layout.channel_columns().len();
-        if channels > MAX_CHANNELS {
-            return Err(RecordingError::TooManyChannels {
-                file: self.file.clone(),
-                channels,
-                limit: MAX_CHANNELS,
-            });
-        }
-        match self.layout.time {
-            Some(time) if channels == 0 => Err(RecordingError::OnlyTime {
-                file: self.file.clone(),
-                line: self.layout.lines_before + 1,
-                column: time + 1,
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Refuses a first column of frequencies, which means a frequency response function.
-    fn refuse_frequencies(&self) -> Result<(), ResponseError> {
-        let layout = &self.layout;
-        let Some(first) = layout.columns.first().filter(|_| layout.time.is_none()) else {
-            return Ok(());
-        };
-        let name = first.name.as_deref().unwrap_or_default();
-        let unit = first.unit.as_deref().unwrap_or_default();
-        let named = [name, unit].map(str::to_lowercase);
-        let in_hertz = named.iter().any(|text| text == "hz" || text == "khz");
-        if !in_hertz && !named[0].starts_with("freq") {
-            return Ok(());
-        }
-        Err(ResponseError::NotTimeSeries {
-            file: self.file.clone(),
-            line: layout.lines_before + 1,
-            column: [name, unit].join(" ").trim().to_owned(),
-        })
+    /// An error of the file as its first row shows it.
+    pub(super) fn error(&self, problem: impl Into<String>) -> RecordingError {
+        RecordingError::at_line(&self.file, self.layout.lines_before + 1, problem)
     }
 
     /// Settles the sample rate (Hz), by the time column or as given, and adds doubts about it.
+    ///
+    /// A first column of frequencies is refused: it means a frequency response function.
     fn sample_rate(
         &self,
-        rates: &CsvRates,
         settings: &ReadSettings,
         warnings: &mut Vec<RecordingWarning>,
     ) -> Result<f64, RecordingError> {
         let (file, layout) = (&self.file, &self.layout);
-        if let Some((mean, used)) = rates.by_time {
+        if let Some(first) = layout.columns.first().filter(|_| layout.time.is_none()) {
+            let name = first.name.as_deref().unwrap_or_default();
+            let unit = first.unit.as_deref().unwrap_or_default();
+            let named = [name, unit].map(str::to_lowercase);
+            let in_hertz = named.iter().any(|text| text == "hz" || text == "khz");
+            if in_hertz || named[0].starts_with("freq") {
+                return Err(RecordingError::FrequencyColumn {
+                    place: format!("{file}:{}", layout.lines_before + 1),
+                    column: [name, unit].join(" ").trim().to_owned(),
+                });
+            }
+        }
+        if let Some((mean, used)) = self.rate {
             check_rate(file, used)?;
             if (mean - used).abs() > MENTIONED_ROUNDING * used {
-                warnings.push(RecordingWarning::RateRounded { mean, used });
+                let message = format!(
+                    "the time column's mean step gives {mean:.4} Hz; its steps scatter enough for {used} Hz, which is used; the time was probably summed or printed with few digits"
+                );
+                warnings.push(RecordingWarning::new("rate-rounded", message));
             }
             warnings.extend(settings.ignored_rate(used));
             return Ok(used);
@@ -217,48 +201,8 @@ impl CsvSource {
         if let Some(given) = settings.sample_rate {
             return Ok(given);
         }
-        if let Some(flat) = rates.flat_time {
-            return Err(RecordingError::RepeatedTime {
-                file: file.clone(),
-                line: flat.line,
-                column: format!("{}{}", flat.column + 1, layout.shown_name(flat.column)),
-                times: flat.values,
-            });
-        }
-        let hint = match (layout.time, rates.unnamed_time) {
-            (Some(_), _) => " (a single row has no step)".to_owned(),
-            (None, Some(column)) => {
-                format!(" (column {} rises evenly: is it the time?)", column + 1)
-            }
-            (None, None) => String::new(),
-        };
-        Err(RecordingError::NoSampleRate {
-            file: file.clone(),
-            line: layout.lines_before + 1,
-            hint,
-        })
-    }
-
-    /// Returns the factor from the time column's unit to seconds.
-    ///
-    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is seconds.
-    fn time_factor(&self) -> Result<f64, RecordingError> {
-        let column = self.layout.time.and_then(|at| self.layout.columns.get(at));
-        let Some(column) = column else {
-            return Ok(1.0);
-        };
-        let name = column.name.as_deref().unwrap_or_default();
-        let suffix = name.rsplit('_').next().unwrap_or_default();
-        let unit = channel_unit(column.unit.as_deref().unwrap_or(suffix));
-        match (unit, &column.unit) {
-            (Some((factor, "s")), _) => Ok(factor),
-            (_, None) => Ok(1.0),
-            (_, Some(unit)) => Err(RecordingError::TimeUnit {
-                file: self.file.clone(),
-                line: self.layout.lines_before + 1,
-                unit: unit.clone(),
-            }),
-        }
+        let head = read_head(&self.path, file, HEAD_BYTES)?;
+        Err(Head::new(&head).no_sample_rate(layout, file))
     }
 
     fn first_row(&self) -> RowPlace {
@@ -269,12 +213,15 @@ impl CsvSource {
     }
 
     fn rows(&self, place: RowPlace) -> Result<RowReader<'_>, RecordingError> {
-        let mut file = File::open(&self.path).map_err(|source| unreadable(&self.file, source))?;
-        file.seek(SeekFrom::Start(place.offset))
-            .map_err(|source| unreadable(&self.file, source))?;
+        let opened = File::open(&self.path).and_then(|mut file| {
+            file.seek(SeekFrom::Start(place.offset))?;
+            Ok(file)
+        });
+        let file = opened.map_err(|source| unreadable(&self.file, source))?;
         Ok(RowReader {
             source: self,
             reader: BufReader::with_capacity(1 << 17, file),
+            at: 0,
             line: Vec::new(),
             next: place,
             place,
@@ -283,125 +230,20 @@ impl CsvSource {
             values: Vec::new(),
         })
     }
+}
 
-    /// Positions a reader at row `frame`.
-    pub(super) fn cursor(&self, frame: u64) -> Result<CsvCursor<'_>, RecordingError> {
-        let at = frame.min(self.frames);
-        let slot = usize::try_from(at / INDEX_ROWS).unwrap_or(usize::MAX);
-        let slot = slot.min(self.index.len().saturating_sub(1));
-        let entry = self.index.get(slot).copied();
-        let mut rows = self.rows(entry.unwrap_or_else(|| self.first_row()))?;
-        for _ in slot as u64 * INDEX_ROWS..at {
+impl Source for CsvSource {
+    fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError> {
+        let frame = frame.min(self.frames);
+        let slot = (frame / INDEX_ROWS).min(self.index.len().saturating_sub(1) as u64);
+        let place = self.index.get(slot as usize).copied();
+        let mut rows = self.rows(place.unwrap_or_else(|| self.first_row()))?;
+        rows.at = slot * INDEX_ROWS;
+        while rows.at < frame {
             rows.next_row(&[])?;
+            rows.at += 1;
         }
-        Ok(CsvCursor {
-            columns: self.layout.channel_columns(),
-            rows,
-            at,
-        })
-    }
-}
-
-/// A reader somewhere in the rows.
-#[derive(Debug)]
-pub(super) struct CsvCursor<'a> {
-    rows: RowReader<'a>,
-    /// Columns that are channels.
-    columns: Vec<usize>,
-    at: u64,
-}
-
-impl CsvCursor<'_> {
-    /// Appends up to `limit` rows of the wanted channels to `into`; fewer only at the end.
-    pub(super) fn read(
-        &mut self,
-        channels: &[usize],
-        limit: u64,
-        into: &mut [Vec<f64>],
-    ) -> Result<(), RecordingError> {
-        let wanted: Vec<usize> = channels
-            .iter()
-            .filter_map(|channel| self.columns.get(*channel).copied())
-            .collect();
-        let end = self.rows.source.frames.min(self.at.saturating_add(limit));
-        while self.at < end {
-            if !self.rows.next_row(&wanted)? {
-                return Err(RecordingError::Changed {
-                    file: self.rows.source.file.clone(),
-                    frame: self.at,
-                });
-            }
-            for (value, samples) in self.rows.values.iter().zip(into.iter_mut()) {
-                samples.push(*value);
-            }
-            self.at += 1;
-        }
-        Ok(())
-    }
-}
-
-/// Reads all rows: parses every cell, checks every step of time, and hands blocks of channel values to `sink`.
-/// Returns the index of rows and their number.
-fn read_all(
-    rows: &mut RowReader<'_>,
-    mut time: Option<&mut TimeCheck>,
-    time_factor: f64,
-    sink: &mut impl FnMut(&[Vec<f64>]),
-) -> Result<(Vec<RowPlace>, u64), RecordingError> {
-    let layout = &rows.source.layout;
-    let columns: Vec<usize> = (0..layout.columns.len()).collect();
-    let mut block = vec![Vec::new(); layout.channel_columns().len()];
-    let (mut index, mut frames) = (Vec::new(), 0_u64);
-    while rows.next_row(&columns)? {
-        if frames.is_multiple_of(INDEX_ROWS) {
-            index.push(rows.place);
-            sink(&block);
-            block.iter_mut().for_each(Vec::clear);
-        }
-        frames += 1;
-        let mut channels = block.iter_mut();
-        for (column, value) in rows.values.iter().enumerate() {
-            match &mut time {
-                Some(check) if Some(column) == layout.time => {
-                    let line = rows.place.lines_before + 1;
-                    check
-                        .add(*value, rows.cell(column), line)
-                        .map_err(|step| uneven_error(rows.source, step, check, time_factor))?;
-                }
-                _ => {
-                    if let Some(channel) = channels.next() {
-                        channel.push(*value);
-                    }
-                }
-            }
-        }
-    }
-    sink(&block);
-    Ok((index, frames))
-}
-
-fn uneven_error(
-    source: &CsvSource,
-    uneven: UnevenStep,
-    check: &TimeCheck,
-    factor: f64,
-) -> RecordingError {
-    let expected = check.reference();
-    let steps = uneven.step / expected;
-    let whole = steps.round();
-    let mut lost = String::new();
-    // A gap within a tenth of a whole number of steps is one of lost rows.
-    if (2.0..1e9).contains(&whole) && (steps - whole).abs() <= 0.1 {
-        let plural = if whole > 2.0 { "s" } else { "" };
-        lost = format!(" (as if {} row{plural} were missing)", whole - 1.0);
-    }
-    RecordingError::UnevenSampling {
-        file: source.file.clone(),
-        line: uneven.line,
-        time: uneven.time * factor,
-        step: uneven.step * factor,
-        expected: expected * factor,
-        lost,
+        Ok(Box::new(rows))
     }
 }
 
@@ -417,6 +259,8 @@ struct RowPlace {
 struct RowReader<'a> {
     source: &'a CsvSource,
     reader: BufReader<File>,
+    /// The next row, where samples are read.
+    at: u64,
     /// The line read last, with its end.
     line: Vec<u8>,
     /// Place of the next line.
@@ -429,87 +273,106 @@ struct RowReader<'a> {
     values: Vec<f64>,
 }
 
+impl Cursor for RowReader<'_> {
+    fn read(
+        &mut self,
+        channels: &[usize],
+        limit: u64,
+        into: &mut [Vec<f64>],
+    ) -> Result<(), RecordingError> {
+        let columns = self.source.layout.channel_columns();
+        let wanted: Vec<usize> = channels.iter().map(|channel| columns[*channel]).collect();
+        let end = self.source.frames.min(self.at.saturating_add(limit));
+        while self.at < end {
+            if !self.next_row(&wanted)? {
+                return Err(RecordingError::changed(&self.source.file, self.at));
+            }
+            for (value, samples) in self.values.iter().zip(into.iter_mut()) {
+                samples.push(*value);
+            }
+            self.at += 1;
+        }
+        Ok(())
+    }
+}
+
 impl RowReader<'_> {
     /// Reads the next row and its `wanted` columns into `values`; false after the last one.
     fn next_row(&mut self, wanted: &[usize]) -> Result<bool, RecordingError> {
         let layout = &self.source.layout;
         let mut blank_line = None;
-        while self.next_line()? {
+        loop {
+            self.place = self.next;
+            self.line.clear();
+            let mut bytes = self.reader.by_ref().take(MAX_LINE_BYTES as u64 + 1);
+            let taken = bytes
+                .read_until(layout.line_end, &mut self.line)
+                .map_err(|error| unreadable(&self.source.file, error))?;
+            if taken > MAX_LINE_BYTES {
+                let problem = format!(
+                    "this line has more than {MAX_LINE_BYTES} bytes; allowed: one row of numbers per line"
+                );
+                return Err(self.error_of_line(problem));
+            }
+            if taken == 0 {
+                return Ok(false);
+            }
+            self.next.offset += taken as u64;
+            self.next.lines_before += 1;
             if self.line.trim_ascii().is_empty() || self.line == [0x1a] {
-                blank_line.get_or_insert(self.place.lines_before + 1);
-                continue;
+                blank_line.get_or_insert(self.line_number());
+            } else if !is_comment(&self.line) {
+                break;
             }
-            if is_comment(&self.line) {
-                continue;
-            }
-            if let (Some(blank), None) = (blank_line, layout.time) {
-                let file = self.source.file.clone();
-                return Err(RecordingError::BlankLine { file, line: blank });
-            }
-            split_cells(&self.line, layout.separator, &mut self.cells);
-            self.check_count()?;
-            self.values.clear();
-            for column in wanted {
-                let mut decimal = self.decimal;
-                match parse_number(self.cell(*column), &mut decimal) {
-                    Ok(value) => self.values.push(value),
-                    Err(problem) => return Err(self.error(*column, problem)),
-                }
-                self.decimal = decimal;
-            }
-            return Ok(true);
         }
-        Ok(false)
+        if let (Some(blank), None) = (blank_line, layout.time) {
+            let problem = "empty line between rows; without a time column it cannot be told whether a row was lost; remove the line or add a time column";
+            return Err(RecordingError::at_line(&self.source.file, blank, problem));
+        }
+        split_cells(&self.line, layout.separator, &mut self.cells);
+        // Too few cells are missing ones; too many must be empty.
+        let columns = layout.columns.len();
+        if self.cells.len() < columns {
+            return Err(self.error_of_cell(self.cells.len(), CellProblem::Missing));
+        }
+        let surplus = (columns..self.cells.len()).find(|column| !self.cell(*column).is_empty());
+        if let Some(column) = surplus {
+            let problem = format!(
+                "{} cells where the rows have {columns}; the first surplus cell holds \"{}\"; correct this line",
+                self.cells.len(),
+                shown(self.cell(column))
+            );
+            return Err(self.error_of_line(problem));
+        }
+        self.values.clear();
+        for column in wanted {
+            let mut decimal = self.decimal;
+            match parse_number(self.cell(*column), &mut decimal) {
+                Ok(value) => self.values.push(value),
+                Err(problem) => return Err(self.error_of_cell(*column, problem)),
+            }
+            self.decimal = decimal;
+        }
+        Ok(true)
     }
 
-    /// Reads the next line with its end; false after the last one.
-    fn next_line(&mut self) -> Result<bool, RecordingError> {
-        self.place = self.next;
-        self.line.clear();
-        let mut bytes = self.reader.by_ref().take(MAX_LINE_BYTES as u64 + 1);
-        let taken = bytes
-            .read_until(self.source.layout.line_end, &mut self.line)
-            .map_err(|error| unreadable(&self.source.file, error))?;
-        if taken > MAX_LINE_BYTES {
-            return Err(RecordingError::LineTooLong {
-                file: self.source.file.clone(),
-                line: self.place.lines_before + 1,
-                limit: MAX_LINE_BYTES,
-            });
-        }
-        self.next.offset += taken as u64;
-        self.next.lines_before += u64::from(taken > 0);
-        Ok(taken > 0)
+    /// Number (1-based) of the line read last.
+    fn line_number(&self) -> u64 {
+        self.place.lines_before + 1
     }
 
     /// A cell of the row read last; empty where the row has fewer.
     fn cell(&self, column: usize) -> &[u8] {
         let cell = self.cells.get(column).cloned();
-        cell.and_then(|cell| self.line.get(cell))
-            .unwrap_or_default()
+        cell.map_or(&[], |cell| &self.line[cell])
     }
 
-    /// Checks the number of cells: too few are missing ones; too many must be empty.
-    fn check_count(&self) -> Result<(), RecordingError> {
-        let columns = self.source.layout.columns.len();
-        if self.cells.len() < columns {
-            return Err(self.error(self.cells.len(), CellProblem::Missing));
-        }
-        let surplus = (columns..self.cells.len()).find(|column| !self.cell(*column).is_empty());
-        match surplus {
-            None => Ok(()),
-            Some(column) => Err(RecordingError::SurplusCells {
-                file: self.source.file.clone(),
-                line: self.place.lines_before + 1,
-                found: self.cells.len(),
-                columns,
-                value: shown(self.cell(column)),
-            }),
-        }
+    fn error_of_line(&self, problem: String) -> RecordingError {
+        RecordingError::at_line(&self.source.file, self.line_number(), problem)
     }
 
     /// Returns the error of a cell of the row read last.
-    fn error(&self, column: usize, problem: CellProblem) -> RecordingError {
+    fn error_of_cell(&self, column: usize, problem: CellProblem) -> RecordingError {
         let value = shown(self.cell(column));
         let problem = match problem {
             CellProblem::Missing => format!(
@@ -527,12 +390,7 @@ impl RowReader<'_> {
                 char::from(decimal)
             ),
         };
-        RecordingError::BadCell {
-            file: self.source.file.clone(),
-            line: self.place.lines_before + 1,
-            column: column + 1,
-            name: self.source.layout.shown_name(column),
-            problem,
-        }
+        let name = self.source.layout.shown_name(column);
+        self.error_of_line(format!("column {}{name} {problem}", column + 1))
     }
 }

@@ -1,24 +1,27 @@
 //! Datasets of a universal file, found without reading their values.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use memchr::memchr;
 use memchr::memmem::Finder;
 
-use super::numbers;
 use super::{
     Abscissa, Function, HEADER_LINES, Precision, TypeLine, UffCoding, UnitSystem, parse_header,
     parse_type_line,
 };
-use crate::recording::error::{RecordingError, UffError};
-use crate::recording::{read_fully, unreadable};
+use crate::recording::error::{RecordingError, RecordingWarning, unreadable};
+use crate::recording::read_fully;
+use crate::recording::text::parse_line;
 
 /// More datasets than any file has; the limit keeps a file of nothing but marks out of memory.
 const MAX_DATASETS: usize = 1_000_000;
 /// Columns 1 to 6 of the line that opens and of the line that closes a dataset.
 pub(super) const MARK: &[u8] = b"    -1";
+
+/// The mark behind text, where it begins a line of its own.
+const LINE_MARK: &[u8] = b"\n    -1";
 
 /// A longer line is none; the limit keeps a file without line ends out of memory.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
@@ -80,6 +83,15 @@ impl UniversalFile {
         datasets.filter_map(|dataset| Some((dataset, dataset.function.as_ref()?)))
     }
 
+    /// The doubt about a file that ends within a header.
+    pub(in crate::recording) fn cut_header_doubt(&self) -> Option<RecordingWarning> {
+        let dataset = self.cut_header?;
+        let message = format!(
+            "the file ends within the header of dataset {dataset}, which is left out; a copy was probably interrupted; export or copy it again"
+        );
+        Some(RecordingWarning::new("header-cut", message))
+    }
+
     /// Contents in words: "2 coherence, 1 units (164)".
     pub fn contents(&self) -> String {
         let mut kinds: Vec<(String, usize)> = Vec::new();
@@ -138,145 +150,106 @@ pub(in crate::recording) fn describe(function: &Function) -> String {
 /// # Errors
 /// A file that cannot be read; a header that makes no sense.
 pub fn list_datasets(path: &Path) -> Result<UniversalFile, RecordingError> {
-    let file = path.display().to_string();
-    let scanner = File::open(path).and_then(Scanner::new);
-    let mut listing = Listing {
-        scanner: scanner.map_err(|source| unreadable(&file, source))?,
-        found: UniversalFile {
-            name: file,
-            datasets: Vec::new(),
-            cut_header: None,
-            path: path.to_owned(),
-            units: None,
-        },
+    let mut found = UniversalFile {
+        name: path.display().to_string(),
+        datasets: Vec::new(),
+        cut_header: None,
+        path: path.to_owned(),
+        units: None,
     };
-    listing.run()?;
-    Ok(listing.found)
-}
-
-/// A listing under way.
-struct Listing {
-    scanner: Scanner,
-    found: UniversalFile,
-}
-
-impl Listing {
-    fn run(&mut self) -> Result<(), RecordingError> {
-        while self.found.datasets.len() < MAX_DATASETS {
-            // Up to the next mark, and past marks that follow it directly.
-            let mut behind_mark = false;
-            let (line_start, line) = loop {
-                let start = self.scanner.position();
-                match self.line()? {
-                    None => return Ok(()),
-                    Some(line) if is_mark(&line) => behind_mark = true,
-                    Some(line) if behind_mark => break (start, line),
-                    Some(_) => {}
-                }
-            };
-            // A mark that closed a dataset has no type behind it.
-            if let Some(kind) = parse_type_line(&line)
-                && !self.dataset(kind, line_start)?
-            {
-                return Ok(());
+    let mut scanner = Scanner::new(path, &found.name)?;
+    while found.datasets.len() < MAX_DATASETS {
+        // Up to the next mark, and past marks that follow it directly.
+        let mut behind_mark = false;
+        let (line_start, line) = loop {
+            let start = scanner.position();
+            match scanner.line()? {
+                None => return Ok(found),
+                Some(line) if is_mark(&line) => behind_mark = true,
+                Some(line) if behind_mark => break (start, line),
+                Some(_) => {}
             }
-        }
-        Ok(())
-    }
-
-    fn io<T>(&self, result: io::Result<T>) -> Result<T, RecordingError> {
-        result.map_err(|source| unreadable(&self.found.name, source))
-    }
-
-    fn line(&mut self) -> Result<Option<Vec<u8>>, RecordingError> {
-        let line = self.scanner.line();
-        self.io(line)
-    }
-
-    /// Reads one dataset up to and with its closing mark; false at the end of the file.
-    fn dataset(&mut self, kind: TypeLine, line_start: u64) -> Result<bool, RecordingError> {
-        let number = self.found.datasets.len() + 1;
-        let mut function = None;
-        if kind.number == 58 {
-            function = self.header(kind, number, line_start)?;
-            if function.is_none() {
-                self.found.cut_header = Some(number);
-                return Ok(false);
-            }
-        }
-        let start = self.scanner.position();
-        if kind.number == 164 {
-            self.units()?;
-        }
-        let place = match (&function, kind.coding) {
-            (Some(function), UffCoding::Binary { .. }) => {
-                binary_place(&mut self.scanner, function, start, kind.bytes)
-            }
-            _ => self.scanner.find_mark().map(|mark| DataPlace {
-                start,
-                end: mark.unwrap_or(self.scanner.length),
-                abscissa_bytes: 0,
-                cut: mark.is_none(),
-            }),
         };
-        let place = self.io(place)?;
-        self.found.datasets.push(Dataset {
-            number,
-            kind: kind.number,
-            function,
-            bytes: place.end.saturating_sub(place.start),
-            place,
-        });
-        // The closing mark.
-        self.line().map(|line| line.is_some())
+        // A mark that closed a dataset has no type behind it.
+        if let Some(kind) = parse_type_line(&line)
+            && !read_dataset(&mut scanner, &mut found, kind, line_start)?
+        {
+            break;
+        }
     }
+    Ok(found)
+}
 
-    /// Reads the header of a function; `None` where the file ends within it.
-    fn header(
-        &mut self,
-        kind: TypeLine,
-        number: usize,
-        line_start: u64,
-    ) -> Result<Option<Function>, RecordingError> {
+/// Reads one dataset up to and with its closing mark; false at the end of the file.
+fn read_dataset(
+    scanner: &mut Scanner,
+    found: &mut UniversalFile,
+    kind: TypeLine,
+    line_start: u64,
+) -> Result<bool, RecordingError> {
+    let number = found.datasets.len() + 1;
+    let mut function = None;
+    if kind.number == 58 {
         let mut lines: [Vec<u8>; HEADER_LINES] = Default::default();
         for line in &mut lines {
-            match self.line()? {
+            match scanner.line()? {
                 Some(read) if !is_mark(&read) => *line = read,
-                _ => return Ok(None),
+                _ => {
+                    found.cut_header = Some(number);
+                    return Ok(false);
+                }
             }
         }
-        match parse_header(&lines, kind.coding) {
-            Ok(function) => Ok(Some(function)),
-            Err(bad) => Err(UffError::BadRecord {
-                file: self.found.name.clone(),
-                line: line_number(&self.found.path, line_start) + bad.record as u64,
-                dataset: number,
-                record: bad.record,
-                field: bad.field,
-                value: bad.value,
-                allowed: bad.allowed,
-            }
-            .into()),
-        }
+        let read = parse_header(&lines, kind.coding).map_err(|(record, problem)| {
+            let line = line_number(&found.path, line_start) + record as u64;
+            let problem = format!(
+                "record {record} of dataset {number} (type 58) has {problem}; export the file again"
+            );
+            RecordingError::at_line(&found.name, line, problem)
+        });
+        function = Some(read?);
     }
-
-    /// Reads dataset 164: a line of words, then factors of length and force in columns of 25.
-    fn units(&mut self) -> Result<(), RecordingError> {
-        let place = self.scanner.position();
-        let (words, factors) = (self.line()?, self.line()?);
+    let start = scanner.position();
+    if kind.number == 164 {
+        // A line of words, then factors of length and force in columns of 25.
+        let (words, factors) = (scanner.line()?, scanner.line()?);
         if let (Some(words), Some(factors)) = (words, factors)
             && !is_mark(&words)
         {
             let mut numbers = Vec::new();
-            let read = numbers::parse_line(&factors, &[25; 3], 3, &mut numbers);
+            let read = parse_line(&factors, &[25; 3], 3, &mut numbers);
             if let (Ok(()), [length, force, ..]) = (read, numbers.as_slice()) {
-                self.found.units = UnitSystem::new(*length, *force);
+                let (length, force) = (*length, *force);
+                let usable = [length, force].iter().all(|x| (1e-12..1e12).contains(x));
+                found.units = usable.then_some(UnitSystem { length, force });
             }
         }
         // Back, so that a mark among these lines is found where it is.
-        let back = self.scanner.jump(place.saturating_sub(1));
-        self.io(back)
+        scanner.jump(start.saturating_sub(1))?;
     }
+    let place = match (&function, kind.coding) {
+        (Some(function), UffCoding::Binary { .. }) => {
+            binary_place(scanner, function, start, kind.bytes)?
+        }
+        _ => {
+            let mark = scanner.find(LINE_MARK)?;
+            DataPlace {
+                start,
+                end: mark.unwrap_or(scanner.length),
+                abscissa_bytes: 0,
+                cut: mark.is_none(),
+            }
+        }
+    };
+    found.datasets.push(Dataset {
+        number,
+        kind: kind.number,
+        function,
+        bytes: place.end.saturating_sub(place.start),
+        place,
+    });
+    // The closing mark.
+    scanner.line().map(|line| line.is_some())
 }
 
 /// Returns `true` for a line that holds -1 in columns 5 and 6 and nothing else.
@@ -292,17 +265,21 @@ fn binary_place(
     function: &Function,
     start: u64,
     bytes: Option<u64>,
-) -> io::Result<DataPlace> {
+) -> Result<DataPlace, RecordingError> {
     // The standard width of a stored abscissa (bytes) first.
     let abscissa_widths: &[u64] = match (function.abscissa, function.precision) {
         (Abscissa::Uneven, Precision::Double) => &[4, 8],
         _ => &[4],
     };
-    let mut proposals = Vec::new();
-    for width in abscissa_widths {
-        let bytes = function.points.checked_mul(function.point_bytes(*width));
-        proposals.push((bytes, *width));
-    }
+    let mut proposals: Vec<(Option<u64>, u64)> = abscissa_widths
+        .iter()
+        .map(|width| {
+            (
+                function.points.checked_mul(function.point_bytes(*width)),
+                *width,
+            )
+        })
+        .collect();
     proposals.push((bytes, 4));
     let mut place = DataPlace {
         start,
@@ -319,17 +296,16 @@ fn binary_place(
         }
     }
     scanner.jump(start)?;
-    if let Some(end) = scanner.find_mark_behind_data()? {
-        place.end = end;
-    }
+    place.end = scanner.find(MARK)?.unwrap_or(place.end);
     Ok(place)
 }
 
 /// A file with a place in it; lines are read through a buffer, which a jump throws away.
-#[derive(Debug)]
-pub(super) struct Scanner {
+struct Scanner {
     file: File,
-    pub length: u64,
+    /// The file's name in errors.
+    name: String,
+    length: u64,
     buffer: Vec<u8>,
     /// Place of the buffer in the file.
     base: u64,
@@ -338,10 +314,13 @@ pub(super) struct Scanner {
 }
 
 impl Scanner {
-    pub(super) fn new(file: File) -> io::Result<Self> {
+    fn new(path: &Path, name: &str) -> Result<Self, RecordingError> {
+        let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (length, file) = opened.map_err(|source| unreadable(name, source))?;
         Ok(Self {
-            length: file.metadata()?.len(),
             file,
+            name: name.to_owned(),
+            length,
             buffer: Vec::new(),
             base: 0,
             at: 0,
@@ -349,50 +328,44 @@ impl Scanner {
     }
 
     /// Place of the next line (bytes).
-    pub(super) fn position(&self) -> u64 {
+    fn position(&self) -> u64 {
         self.base + self.at as u64
     }
 
     /// Goes on at byte `place`.
-    pub(super) fn jump(&mut self, place: u64) -> io::Result<()> {
+    fn jump(&mut self, place: u64) -> Result<(), RecordingError> {
         self.buffer.clear();
         self.at = 0;
-        self.base = self.file.seek(SeekFrom::Start(place))?;
+        let done = self.file.seek(SeekFrom::Start(place));
+        self.base = done.map_err(|source| unreadable(&self.name, source))?;
         Ok(())
     }
 
     /// The next line without its end, or the first [`MAX_LINE_BYTES`] of it; `None` at the end of
     /// the file.
-    pub(super) fn line(&mut self) -> io::Result<Option<Vec<u8>>> {
+    fn line(&mut self) -> Result<Option<Vec<u8>>, RecordingError> {
         loop {
-            let rest = self.buffer.get(self.at..).unwrap_or_default();
+            let rest = &self.buffer[self.at..];
             let end = memchr(b'\n', rest);
             if let Some(end) = end.or((rest.len() >= MAX_LINE_BYTES).then_some(rest.len())) {
-                let line = rest.get(..end).unwrap_or_default();
+                let line = &rest[..end];
                 let line = line.strip_suffix(b"\r").unwrap_or(line).to_vec();
                 self.at = (self.at + end + 1).min(self.buffer.len());
                 return Ok(Some(line));
             }
             if self.fill(1 << 13)? == 0 {
-                let last = self.buffer.get(self.at..).unwrap_or_default().to_vec();
+                let last = self.buffer[self.at..].to_vec();
                 self.at = self.buffer.len();
                 return Ok((!last.is_empty()).then_some(last));
             }
         }
     }
 
-    /// Goes to the line of the next mark that stands at the beginning of a line and returns the
-    /// mark's place; `None` at the end of the file.
-    pub(super) fn find_mark(&mut self) -> io::Result<Option<u64>> {
-        self.find(&Finder::new(b"\n    -1"), 1)
-    }
-
-    /// Like [`find_mark`](Self::find_mark) for a mark that binary data may precede directly.
-    pub(super) fn find_mark_behind_data(&mut self) -> io::Result<Option<u64>> {
-        self.find(&Finder::new(MARK), 0)
-    }
-
-    fn find(&mut self, finder: &Finder<'_>, skipped: usize) -> io::Result<Option<u64>> {
+    /// Goes to the next `mark` that ends its line, [`MARK`] or [`LINE_MARK`], and returns its place, a line end
+    /// before it not counted; `None` at the end of the file.
+    fn find(&mut self, mark: &[u8]) -> Result<Option<u64>, RecordingError> {
+        let finder = Finder::new(mark);
+        let skipped = mark.len() - MARK.len();
         // The line end before a mark may be the byte just read; what was read before it can go.
         let kept = self.at.saturating_sub(skipped);
         self.buffer.drain(..kept);
@@ -400,13 +373,13 @@ impl Scanner {
         self.at -= kept;
         let mut from = 0;
         loop {
-            let rest = self.buffer.get(from..).unwrap_or_default();
+            let rest = &self.buffer[from..];
             match finder.find(rest) {
                 Some(found) => {
                     let mark = from + found + skipped;
                     let behind = mark + MARK.len();
                     while self.buffer.len() < behind + TAIL_BYTES && self.fill(1 << 13)? > 0 {}
-                    if is_blank_to_line_end(self.buffer.get(behind..).unwrap_or_default()) {
+                    if is_blank_to_line_end(&self.buffer[behind..]) {
                         self.at = mark;
                         return Ok(Some(self.position()));
                     }
@@ -429,7 +402,7 @@ impl Scanner {
 
     /// Returns `true` where a dataset ends at `place`: at the end of the file, or at a mark with at most one line
     /// end before it. The scanner then stands at the mark.
-    pub(super) fn ends_at(&mut self, place: u64) -> io::Result<bool> {
+    fn ends_at(&mut self, place: u64) -> Result<bool, RecordingError> {
         if place >= self.length {
             self.jump(self.length)?;
             return Ok(place == self.length);
@@ -437,10 +410,8 @@ impl Scanner {
         self.jump(place)?;
         while self.buffer.len() < MARK.len() + TAIL_BYTES + 2 && self.fill(1 << 13)? > 0 {}
         let line_ends = self.buffer.iter().take(2);
-        let line_ends = line_ends
-            .take_while(|byte| matches!(byte, b'\r' | b'\n'))
-            .count();
-        let rest = self.buffer.get(line_ends..).unwrap_or_default();
+        let line_ends = line_ends.take_while(|byte| b"\r\n".contains(byte)).count();
+        let rest = &self.buffer[line_ends..];
         let ended = match rest.strip_prefix(MARK) {
             Some(behind) => is_blank_to_line_end(behind),
             None => {
@@ -452,7 +423,7 @@ impl Scanner {
     }
 
     /// Reads more into the buffer; how many bytes is the result.
-    fn fill(&mut self, bytes: usize) -> io::Result<usize> {
+    fn fill(&mut self, bytes: usize) -> Result<usize, RecordingError> {
         if self.at > SCAN_BYTES {
             self.buffer.drain(..self.at);
             self.base += self.at as u64;
@@ -460,10 +431,8 @@ impl Scanner {
         }
         let before = self.buffer.len();
         self.buffer.resize(before + bytes, 0);
-        let got = read_fully(
-            &mut self.file,
-            self.buffer.get_mut(before..).unwrap_or_default(),
-        )?;
+        let got = read_fully(&mut self.file, &mut self.buffer[before..])
+            .map_err(|source| unreadable(&self.name, source))?;
         self.buffer.truncate(before + got);
         Ok(got)
     }

@@ -17,24 +17,21 @@
 //! the first 16 million samples are kept in memory; beyond, it is parsed again whenever it is asked
 //! for, from places remembered every 64 kB. No file has to fit into memory.
 
-mod abscissa;
 mod list;
-mod numbers;
 mod time_series;
 mod values;
 
 use std::fmt;
 
-use super::text::{decode_text, shown};
-use numbers::parse_number;
+use super::text::{decode_text, parse_fortran, shown};
 
 pub use list::{Dataset, UniversalFile, list_datasets};
 pub use values::{FunctionValues, read_function};
 
-pub(super) use abscissa::{AbscissaUnit, EvenPoints, FunctionGroup, even_points};
-pub(super) use list::{Entry, describe};
-pub(super) use time_series::{UffCursor, UffSource, open_uff};
-pub(super) use values::read_values;
+pub(super) use list::Entry;
+pub(super) use time_series::{
+    AbscissaUnit, EvenPoints, FunctionGroup, even_points, left_out, open_uff,
+};
 
 // ---- Header of a dataset 58 or 58b: eleven records of fields in fixed columns.
 
@@ -193,8 +190,6 @@ pub struct Axis {
     /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 15
     /// pressure, 17 time, 18 frequency, 0 unknown.
     pub quantity: u32,
-    /// Exponents of length, force and temperature in the unit; meant for quantity 1 (general) only.
-    pub exponents: [i32; 3],
     /// Label, where there is one.
     pub label: Option<String>,
     /// Unit as written, where there is one.
@@ -254,14 +249,6 @@ pub(super) struct UnitSystem {
 }
 
 impl UnitSystem {
-    /// From the second record's numbers; `None` where they cannot be factors.
-    pub(super) fn new(length: f64, force: f64) -> Option<Self> {
-        let are_factors = [length, force]
-            .iter()
-            .all(|factor| (1e-12..1e12).contains(factor));
-        are_factors.then_some(Self { length, force })
-    }
-
     /// Factor to SI and the SI unit of a quantity along a direction of translation; `None` for
     /// quantities that no sensor here measures.
     pub(super) fn si(&self, quantity: u32) -> Option<(f64, &'static str)> {
@@ -317,8 +304,8 @@ impl Function {
             || (general && self.abscissa_axis.quantity == TIME)
     }
 
-    /// Numbers stored for each point, the abscissa included.
-    fn numbers(&self) -> usize {
+    /// Numbers stored for each point: the abscissa where it is uneven, then the ordinate.
+    fn numbers_per_point(&self) -> usize {
         let ordinate = match self.ordinate {
             Ordinate::Real => 1,
             Ordinate::Complex => 2,
@@ -326,22 +313,9 @@ impl Function {
         ordinate + self.abscissa_numbers()
     }
 
-    /// Widths of the columns of a line: 6E13.5, 4E20.12, 2(E13.5,E20.12) or E13.5,2E20.12.
-    fn column_widths(&self) -> &'static [usize] {
-        match (self.precision, self.abscissa, self.ordinate) {
-            (Precision::Single, _, _) => &[13; 6],
-            (Precision::Double, Abscissa::Even { .. }, _) => &[20; 4],
-            (Precision::Double, Abscissa::Uneven, Ordinate::Real) => &[13, 20, 13, 20],
-            (Precision::Double, Abscissa::Uneven, Ordinate::Complex) => &[13, 20, 20],
-        }
-    }
-
     /// 1 where the abscissa is stored with every point, else 0.
     fn abscissa_numbers(&self) -> usize {
-        match self.abscissa {
-            Abscissa::Even { .. } => 0,
-            Abscissa::Uneven => 1,
-        }
+        usize::from(self.abscissa == Abscissa::Uneven)
     }
 
     /// Bytes of one number of the ordinate in binary data.
@@ -354,23 +328,13 @@ impl Function {
 
     /// Bytes of one point of binary data.
     fn point_bytes(&self, abscissa_bytes: u64) -> u64 {
-        let ordinates = (self.numbers() - self.abscissa_numbers()) as u64;
+        let ordinates = (self.numbers_per_point() - self.abscissa_numbers()) as u64;
         ordinates * self.ordinate_bytes() as u64 + self.abscissa_numbers() as u64 * abscissa_bytes
     }
 }
 
 /// Header records of a dataset 58.
 const HEADER_LINES: usize = 11;
-
-/// A field of a record that makes no sense.
-#[derive(Debug, Clone, PartialEq)]
-struct BadField {
-    /// 1-based; 0 for the line with the dataset's type.
-    pub record: usize,
-    pub field: &'static str,
-    pub value: String,
-    pub allowed: &'static str,
-}
 
 /// The line with a dataset's type, such as "    58" or "    58b     1     2          11        6408".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -408,9 +372,14 @@ fn parse_type_line(line: &[u8]) -> Option<TypeLine> {
     })
 }
 
-/// Reads the eleven records behind the type line.
-fn parse_header(lines: &[Vec<u8>; HEADER_LINES], coding: UffCoding) -> Result<Function, BadField> {
-    let records = lines.each_ref().map(|line| Record::new(line));
+/// Reads the eleven records behind the type line. `Err` holds the record (1-based) and what is wrong with it.
+fn parse_header(
+    lines: &[Vec<u8>; HEADER_LINES],
+    coding: UffCoding,
+) -> Result<Function, (usize, String)> {
+    let records = lines.each_ref().map(|line| Record {
+        characters: decode_text(line).trim_end().chars().collect(),
+    });
     let [
         id @ ..,
         degrees,
@@ -425,8 +394,13 @@ fn parse_header(lines: &[Vec<u8>; HEADER_LINES], coding: UffCoding) -> Result<Fu
         .integer(0, 5)
         .or_else(|| degrees.word(0)?.parse().ok())
         .and_then(|number| u32::try_from(number).ok())
-        .ok_or_else(|| degrees.bad(6, 0, 5, "the function type", "a number such as 1 or 4"))?;
-    let (ordinate, precision) = form.data_type()?;
+        .ok_or_else(|| {
+            (
+                6,
+                degrees.bad(0, 5, "the function type", "a number such as 1 or 4"),
+            )
+        })?;
+    let (ordinate, precision, points, abscissa) = form.form().map_err(|problem| (7, problem))?;
     Ok(Function {
         function_type: FunctionType(function_type),
         id_lines: id.each_ref().map(|line| line.text(0, 80)),
@@ -435,25 +409,12 @@ fn parse_header(lines: &[Vec<u8>; HEADER_LINES], coding: UffCoding) -> Result<Fu
         coding,
         ordinate,
         precision,
-        points: form.points()?,
-        abscissa: form.abscissa()?,
+        points,
+        abscissa,
         abscissa_axis: abscissa_axis.axis(),
         numerator: numerator.axis(),
         denominator: denominator.axis(),
     })
-}
-
-/// One unit of the last digit of a printed number.
-fn last_digit(text: &str) -> f64 {
-    let (mantissa, exponent) = match text.trim().split_once(['e', 'E', 'd', 'D']) {
-        Some((mantissa, exponent)) => (mantissa, exponent.parse().unwrap_or(0)),
-        None => (text.trim(), 0_i32),
-    };
-    let decimals = mantissa
-        .split_once('.')
-        .map_or(0, |(_, digits)| digits.len());
-    let decimals = i32::try_from(decimals).unwrap_or(0);
-    10_f64.powi(exponent.saturating_sub(decimals))
 }
 
 /// A header line as characters: columns count characters, whatever bytes they take.
@@ -463,12 +424,6 @@ struct Record {
 }
 
 impl Record {
-    fn new(line: &[u8]) -> Self {
-        Self {
-            characters: decode_text(line).trim_end().chars().collect(),
-        }
-    }
-
     fn slice(&self, at: usize, width: usize) -> String {
         self.characters.iter().skip(at).take(width).collect()
     }
@@ -503,85 +458,68 @@ impl Record {
 
     /// Records 8 to 11: Format(I10,3I5,2(1X,20A1)).
     fn axis(&self) -> Axis {
-        let numbers = [(0, 10), (10, 5), (15, 5), (20, 5)]
-            .map(|(at, width)| i32::try_from(self.integer(at, width).unwrap_or(0)).unwrap_or(0));
-        let [quantity, exponents @ ..] = numbers;
         Axis {
-            quantity: u32::try_from(quantity).unwrap_or(0),
-            exponents,
+            quantity: u32::try_from(self.integer(0, 10).unwrap_or(0)).unwrap_or(0),
             label: self.text(26, 20),
             unit: self.text(47, 20),
         }
     }
 
-    /// A field of record 7, Format(3I10,3E13.5): the number of the field, its first column, its width.
-    fn form_field(&self, number: usize, at: usize, width: usize) -> Option<String> {
+    /// Record 7, Format(3I10,3E13.5): kind and precision of the ordinate, number of points, abscissa.
+    fn form(&self) -> Result<(Ordinate, Precision, u64, Abscissa), String> {
         // Writers that do not keep the columns at least separate the numbers.
         let in_columns = (0..3).all(|field| self.integer(10 * field, 10).is_some());
-        match in_columns {
-            true => self.text(at, width),
-            false => self.word(number),
-        }
-    }
-
-    fn form_integer(&self, number: usize) -> Option<i64> {
-        self.form_field(number, 10 * number, 10)?.parse().ok()
-    }
-
-    /// Ordinate and precision by record 7.
-    fn data_type(&self) -> Result<(Ordinate, Precision), BadField> {
-        match self.form_integer(0) {
-            Some(2) => Ok((Ordinate::Real, Precision::Single)),
-            Some(4) => Ok((Ordinate::Real, Precision::Double)),
-            Some(5) => Ok((Ordinate::Complex, Precision::Single)),
-            Some(6) => Ok((Ordinate::Complex, Precision::Double)),
-            _ => Err(self.bad(7, 0, 10, "the ordinate data type", "2, 4, 5 or 6")),
-        }
-    }
-
-    /// Number of points by record 7.
-    fn points(&self) -> Result<u64, BadField> {
-        self.form_integer(1)
+        let fields = match in_columns {
+            true => [(0, 10), (10, 10), (20, 10), (30, 13), (43, 13)]
+                .map(|(at, width)| self.text(at, width)),
+            false => [0, 1, 2, 3, 4].map(|number| self.word(number)),
+        };
+        let [kind, points, spacing, start, step] = fields.map(Option::unwrap_or_default);
+        let (ordinate, precision) = match kind.parse() {
+            Ok(2) => (Ordinate::Real, Precision::Single),
+            Ok(4) => (Ordinate::Real, Precision::Double),
+            Ok(5) => (Ordinate::Complex, Precision::Single),
+            Ok(6) => (Ordinate::Complex, Precision::Double),
+            _ => return Err(self.bad(0, 10, "the ordinate data type", "2, 4, 5 or 6")),
+        };
+        let points = points.parse::<i64>().ok();
+        let points = points
             .and_then(|points| u64::try_from(points).ok())
-            .ok_or_else(|| self.bad(7, 10, 10, "the number of points", "a whole number from 0"))
+            .ok_or_else(|| self.bad(10, 10, "the number of points", "a whole number from 0"))?;
+        let abscissa = match spacing.parse() {
+            Ok(0) => Abscissa::Uneven,
+            Ok(1) => Abscissa::Even {
+                start: self.finite(&start, 30, "the first abscissa")?,
+                step: self.finite(&step, 43, "the abscissa step")?,
+                step_digit: last_digit(&step),
+            },
+            _ => return Err(self.bad(20, 10, "the abscissa spacing", "0 (uneven) or 1 (even)")),
+        };
+        Ok((ordinate, precision, points, abscissa))
     }
 
-    /// Abscissa by record 7.
-    fn abscissa(&self) -> Result<Abscissa, BadField> {
-        match self.form_integer(2) {
-            Some(0) => Ok(Abscissa::Uneven),
-            Some(1) => {
-                let step = self.form_field(4, 43, 13).unwrap_or_default();
-                let start = self.form_field(3, 30, 13).unwrap_or_default();
-                Ok(Abscissa::Even {
-                    start: self.finite(&start, 30, "the first abscissa")?,
-                    step: self.finite(&step, 43, "the abscissa step")?,
-                    step_digit: last_digit(&step),
-                })
-            }
-            _ => Err(self.bad(7, 20, 10, "the abscissa spacing", "0 (uneven) or 1 (even)")),
-        }
-    }
-
-    fn finite(&self, text: &str, at: usize, field: &'static str) -> Result<f64, BadField> {
-        parse_number(text.as_bytes())
+    fn finite(&self, text: &str, at: usize, field: &str) -> Result<f64, String> {
+        parse_fortran(text.as_bytes())
             .filter(|number| number.is_finite())
-            .ok_or_else(|| self.bad(7, at, 13, field, "a finite number"))
+            .ok_or_else(|| self.bad(at, 13, field, "a finite number"))
     }
 
-    fn bad(
-        &self,
-        record: usize,
-        at: usize,
-        width: usize,
-        field: &'static str,
-        allowed: &'static str,
-    ) -> BadField {
-        BadField {
-            record,
-            field,
-            value: shown(self.slice(at, width).trim().as_bytes()),
-            allowed,
-        }
+    /// Says what is wrong with a field.
+    fn bad(&self, at: usize, width: usize, field: &str, allowed: &str) -> String {
+        let value = shown(self.slice(at, width).trim().as_bytes());
+        format!("{field} \"{value}\"; allowed: {allowed}")
     }
+}
+
+/// One unit of the last digit of a printed number.
+fn last_digit(text: &str) -> f64 {
+    let (mantissa, exponent) = match text.trim().split_once(['e', 'E', 'd', 'D']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse().unwrap_or(0)),
+        None => (text.trim(), 0_i32),
+    };
+    let decimals = mantissa
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len());
+    let decimals = i32::try_from(decimals).unwrap_or(0);
+    10_f64.powi(exponent.saturating_sub(decimals))
 }

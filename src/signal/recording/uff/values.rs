@@ -3,16 +3,14 @@
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use memchr::memchr;
 
-use super::list::{DataPlace, Dataset, MAX_LINE_BYTES, UniversalFile, line_number};
-use super::numbers;
-use super::{Function, Ordinate, UffCoding};
-use crate::recording::error::{RecordingError, UffError};
-use crate::recording::text::shown;
-use crate::recording::{read_fully, unreadable};
+use super::list::{DataPlace, Entry, MAX_LINE_BYTES, UniversalFile, line_number};
+use super::{Abscissa, Function, Ordinate, Precision, UffCoding};
+use crate::recording::error::{RecordingError, unreadable};
+use crate::recording::read_fully;
+use crate::recording::text::{parse_line, shown, without_last_number};
 
 /// Bytes read at a time: large enough for speed, small against any memory.
 const BLOCK_BYTES: usize = 1 << 16;
@@ -26,8 +24,6 @@ pub struct FunctionValues {
     pub real: Vec<f64>,
     /// Its imaginary part; `None` where it is real.
     pub imaginary: Option<Vec<f64>>,
-    /// Points that the header promises; there may be fewer in a truncated file.
-    pub promised: u64,
 }
 
 /// Reads the values of the dataset at place `number` (1-based): as many points as the header
@@ -40,49 +36,39 @@ pub fn read_function(
     file: &UniversalFile,
     number: usize,
 ) -> Result<FunctionValues, RecordingError> {
-    let found = file
-        .functions()
-        .find(|(dataset, _)| dataset.number == number);
-    let (dataset, function) = found.ok_or_else(|| UffError::NotAFunction {
-        file: file.name.clone(),
-        dataset: number,
+    let entry = number.checked_sub(1).and_then(|at| {
+        let dataset = file.datasets.get(at)?;
+        Some((dataset, dataset.function.as_ref()?))
+    });
+    let entry = entry.ok_or_else(|| {
+        let problem =
+            format!("there is no function (dataset 58) at place {number}; list the datasets");
+        RecordingError::new(&file.name, problem)
     })?;
-    read_values(file, dataset, function)
-}
-
-/// Reads all values of a function.
-pub(in crate::recording) fn read_values(
-    file: &UniversalFile,
-    dataset: &Dataset,
-    function: &Function,
-) -> Result<FunctionValues, RecordingError> {
-    let values = Values::new(file, dataset, function)?;
+    let values = Values::new(file, entry)?;
     let mut opened = values.open()?;
     let mut reader = values.reader(0, &mut opened)?;
-    let (mut abscissa, mut real, mut imaginary) = (Vec::new(), Vec::new(), Vec::new());
-    let uneven = values.ordinate > 0;
-    let complex = function.ordinate == Ordinate::Complex;
+    let ordinate = values.function.abscissa_numbers();
+    let mut read = FunctionValues {
+        abscissa: (ordinate > 0).then(Vec::new),
+        real: Vec::new(),
+        imaginary: (values.function.ordinate == Ordinate::Complex).then(Vec::new),
+    };
     loop {
         let points = reader.next(&mut opened, u64::MAX)?;
         if points.is_empty() {
-            break;
+            return Ok(read);
         }
-        for point in points.chunks_exact(values.numbers) {
-            if uneven {
-                abscissa.extend(point.first());
+        for point in points.chunks_exact(values.function.numbers_per_point()) {
+            if let Some(abscissa) = &mut read.abscissa {
+                abscissa.push(point[0]);
             }
-            real.extend(point.get(values.ordinate));
-            if complex {
-                imaginary.extend(point.get(values.ordinate + 1));
+            read.real.push(point[ordinate]);
+            if let Some(imaginary) = &mut read.imaginary {
+                imaginary.push(point[ordinate + 1]);
             }
         }
     }
-    Ok(FunctionValues {
-        abscissa: uneven.then_some(abscissa),
-        real,
-        imaginary: complex.then_some(imaginary),
-        promised: function.points,
-    })
 }
 
 /// A place in text values that reading can start from.
@@ -94,96 +80,56 @@ pub(super) struct Checkpoint {
     pub numbers: u64,
 }
 
-/// Storage of the numbers of a function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
-    Ascii {
-        widths: &'static [usize],
-    },
-    Binary {
-        big_endian: bool,
-        abscissa_bytes: usize,
-        ordinate_bytes: usize,
-    },
-}
-
 /// A function in a file, ready to be read.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Values {
     path: PathBuf,
+    /// The file's name in errors.
     pub file: String,
     dataset: usize,
+    pub function: Function,
     place: DataPlace,
-    layout: Layout,
-    /// Numbers of one point.
-    pub numbers: usize,
-    /// Place of the (real part of the) ordinate among them.
-    pub ordinate: usize,
-    /// Points that the header promises.
-    promised: u64,
-    /// Bytes of a point in binary data.
-    point_bytes: u64,
     /// Places in text from which reading can start; one at least.
-    pub checkpoints: Arc<Vec<Checkpoint>>,
+    pub checkpoints: Vec<Checkpoint>,
     /// Samples of a text channel that is kept in memory, all of them.
-    pub kept: Option<Arc<Vec<f64>>>,
+    pub kept: Option<Vec<f64>>,
 }
 
 impl Values {
-    /// The values of a dataset that has a function.
-    pub(super) fn new(
-        file: &UniversalFile,
-        dataset: &Dataset,
-        function: &Function,
-    ) -> Result<Self, UffError> {
-        let place = dataset.place;
-        let layout = match function.coding {
-            UffCoding::Ascii => Layout::Ascii {
-                widths: function.column_widths(),
-            },
-            UffCoding::Binary {
-                order: order @ (1 | 2),
-                format: 2,
-            } => Layout::Binary {
-                big_endian: order == 2,
-                abscissa_bytes: place.abscissa_bytes as usize,
-                ordinate_bytes: function.ordinate_bytes(),
-            },
-            UffCoding::Binary { order, format } => {
-                return Err(UffError::FloatFormat {
-                    file: file.name.clone(),
-                    dataset: dataset.number,
-                    order,
-                    format,
-                });
-            }
-        };
+    /// The values of a function.
+    pub(super) fn new(file: &UniversalFile, entry: Entry<'_>) -> Result<Self, RecordingError> {
+        let (dataset, function) = entry;
+        if let UffCoding::Binary { order, format } = function.coding
+            && !matches!((order, format), (1 | 2, 2))
+        {
+            let problem = format!(
+                "dataset {} (58b) has byte order {order} and floating-point format {format}; allowed: byte order 1 (little endian) or 2 (big endian) and format 2 (IEEE 754); export as ASCII or IEEE",
+                dataset.number
+            );
+            return Err(RecordingError::new(&file.name, problem));
+        }
         Ok(Self {
             path: file.path.clone(),
             file: file.name.clone(),
             dataset: dataset.number,
-            place,
-            layout,
-            numbers: function.numbers(),
-            ordinate: function.abscissa_numbers(),
-            promised: function.points,
-            point_bytes: function.point_bytes(place.abscissa_bytes).max(1),
-            checkpoints: Arc::new(vec![Checkpoint {
-                offset: place.start,
+            function: function.clone(),
+            place: dataset.place,
+            checkpoints: vec![Checkpoint {
+                offset: dataset.place.start,
                 numbers: 0,
-            }]),
+            }],
             kept: None,
         })
-    }
-
-    /// Returns `true` for text, which is slow to read twice.
-    pub(super) fn is_text(&self) -> bool {
-        matches!(self.layout, Layout::Ascii { .. })
     }
 
     /// Opens the file; readers of several functions share it.
     pub(super) fn open(&self) -> Result<File, RecordingError> {
         File::open(&self.path).map_err(|source| unreadable(&self.file, source))
+    }
+
+    /// Bytes of a point in binary data.
+    fn point_bytes(&self) -> u64 {
+        self.function.point_bytes(self.place.abscissa_bytes).max(1)
     }
 
     /// A reader at a point.
@@ -192,25 +138,21 @@ impl Values {
         point: u64,
         file: &mut File,
     ) -> Result<ValueReader<'_>, RecordingError> {
-        let wanted = point.min(self.promised).saturating_mul(self.numbers as u64);
-        let block = match self.layout {
-            Layout::Binary { .. } => {
-                let before = point.saturating_mul(self.point_bytes);
+        let width = self.function.numbers_per_point() as u64;
+        let wanted = point.min(self.function.points).saturating_mul(width);
+        let block = match self.function.coding {
+            UffCoding::Binary { .. } => {
+                let before = point.saturating_mul(self.point_bytes());
                 let offset = self.place.start.saturating_add(before);
                 Checkpoint {
                     offset: offset.min(self.place.end),
                     numbers: wanted,
                 }
             }
-            Layout::Ascii { .. } => {
-                let later = self
-                    .checkpoints
-                    .partition_point(|place| place.numbers <= wanted);
-                let place = self.checkpoints.get(later.saturating_sub(1)).copied();
-                place.unwrap_or(Checkpoint {
-                    offset: self.place.start,
-                    numbers: 0,
-                })
+            // The first place has no numbers before it.
+            UffCoding::Ascii => {
+                let places = &self.checkpoints;
+                places[places.partition_point(|place| place.numbers <= wanted) - 1]
             }
         };
         let mut reader = ValueReader {
@@ -224,8 +166,7 @@ impl Values {
             block,
         };
         // Numbers between the place to start from and the point.
-        let mut skipped =
-            usize::try_from(wanted.saturating_sub(block.numbers)).unwrap_or(usize::MAX);
+        let mut skipped = usize::try_from(wanted - block.numbers).unwrap_or(usize::MAX);
         while skipped > 0 && reader.decode_block(file)? {
             reader.given = skipped.min(reader.parsed.len());
             skipped -= reader.given;
@@ -256,7 +197,7 @@ pub(super) struct ValueReader<'a> {
 impl ValueReader<'_> {
     /// Reads the numbers of up to `limit` points, whole points only; none at the end.
     pub(super) fn next(&mut self, file: &mut File, limit: u64) -> Result<&[f64], RecordingError> {
-        let width = self.values.numbers;
+        let width = self.values.function.numbers_per_point();
         while self.parsed.len() - self.given < width {
             if !self.decode_block(file)? {
                 return Ok(&[]);
@@ -267,7 +208,7 @@ impl ValueReader<'_> {
         let from = self.given;
         self.given += points * width;
         self.at += points as u64;
-        Ok(self.parsed.get(from..self.given).unwrap_or_default())
+        Ok(&self.parsed[from..self.given])
     }
 
     /// Appends the ordinates of up to `limit` points, real parts of complex ones. Returns their number, 0 at the end.
@@ -277,7 +218,8 @@ impl ValueReader<'_> {
         limit: u64,
         into: &mut Vec<f64>,
     ) -> Result<u64, RecordingError> {
-        let (width, ordinate) = (self.values.numbers, self.values.ordinate);
+        let function = &self.values.function;
+        let (width, ordinate) = (function.numbers_per_point(), function.abscissa_numbers());
         let points = self.next(file, limit)?;
         match width {
             1 => into.extend_from_slice(points),
@@ -288,8 +230,10 @@ impl ValueReader<'_> {
 
     /// Numbers that the header promises and that are not decoded.
     fn missing(&self) -> u64 {
-        let width = self.values.numbers as u64;
-        let promised = self.values.promised.saturating_mul(width);
+        let function = &self.values.function;
+        let promised = function
+            .points
+            .saturating_mul(function.numbers_per_point() as u64);
         promised.saturating_sub(self.decoded)
     }
 
@@ -297,20 +241,26 @@ impl ValueReader<'_> {
     fn decode_block(&mut self, file: &mut File) -> Result<bool, RecordingError> {
         self.parsed.drain(..self.given);
         self.given = 0;
+        let values = self.values;
         let before = self.parsed.len();
         while self.parsed.len() == before && self.missing() > 0 {
+            let kept = self.bytes.len();
             self.block = Checkpoint {
-                offset: self.offset - self.bytes.len() as u64,
+                offset: self.offset - kept as u64,
                 numbers: self.decoded,
             };
-            let got = self.load(file)?;
-            let done = match self.values.layout {
-                Layout::Ascii { widths } => self.decode_lines(widths, got == 0)?,
-                Layout::Binary {
-                    big_endian,
-                    abscissa_bytes,
-                    ordinate_bytes,
-                } => self.decode_points(big_endian, abscissa_bytes, ordinate_bytes),
+            let left = values.place.end.saturating_sub(self.offset);
+            let wanted = BLOCK_BYTES.min(usize::try_from(left).unwrap_or(usize::MAX));
+            self.bytes.resize(kept + wanted, 0);
+            let got = file
+                .seek(SeekFrom::Start(self.offset))
+                .and_then(|_| read_fully(file, &mut self.bytes[kept..]))
+                .map_err(|source| unreadable(&values.file, source))?;
+            self.bytes.truncate(kept + got);
+            self.offset += got as u64;
+            let done = match values.function.coding {
+                UffCoding::Ascii => self.decode_lines(got == 0)?,
+                UffCoding::Binary { order, .. } => self.decode_points(order == 2),
             };
             self.bytes.drain(..done);
             self.decoded += (self.parsed.len() - before) as u64;
@@ -321,75 +271,66 @@ impl ValueReader<'_> {
         Ok(self.parsed.len() > before)
     }
 
-    fn load(&mut self, file: &mut File) -> Result<usize, RecordingError> {
-        let left = self.values.place.end.saturating_sub(self.offset);
-        let wanted = BLOCK_BYTES.min(usize::try_from(left).unwrap_or(usize::MAX));
-        let before = self.bytes.len();
-        self.bytes.resize(before + wanted, 0);
-        let rest = self.bytes.get_mut(before..).unwrap_or_default();
-        let got = file
-            .seek(SeekFrom::Start(self.offset))
-            .and_then(|_| read_fully(file, rest))
-            .map_err(|source| unreadable(&self.values.file, source))?;
-        self.bytes.truncate(before + got);
-        self.offset += got as u64;
-        Ok(got)
-    }
-
     /// Decodes whole lines, and the last one at the end. Returns how many bytes were used.
-    fn decode_lines(&mut self, widths: &[usize], at_end: bool) -> Result<usize, RecordingError> {
+    fn decode_lines(&mut self, at_end: bool) -> Result<usize, RecordingError> {
+        let values = self.values;
+        let function = &values.function;
+        // Columns of a line: 6E13.5, 4E20.12, 2(E13.5,E20.12) or E13.5,2E20.12.
+        let widths: &[usize] = match (function.precision, function.abscissa, function.ordinate) {
+            (Precision::Single, _, _) => &[13; 6],
+            (Precision::Double, Abscissa::Even { .. }, _) => &[20; 4],
+            (Precision::Double, Abscissa::Uneven, Ordinate::Real) => &[13, 20, 13, 20],
+            (Precision::Double, Abscissa::Uneven, Ordinate::Complex) => &[13, 20, 20],
+        };
         let mut room = usize::try_from(self.missing()).unwrap_or(usize::MAX);
         let mut done = 0;
         while room > 0 && done < self.bytes.len() {
-            let rest = self.bytes.get(done..).unwrap_or_default();
+            let rest = &self.bytes[done..];
             let (line, used) = match memchr(b'\n', rest) {
-                Some(end) => (rest.get(..end).unwrap_or_default(), end + 1),
+                Some(end) => (&rest[..end], end + 1),
                 // The last number of a file that was cut may have lost digits.
-                None if at_end && self.values.place.cut => {
-                    (numbers::without_last_number(rest, widths), rest.len())
+                None if at_end && values.place.cut => {
+                    (without_last_number(rest, widths), rest.len())
                 }
                 None if at_end => (rest, rest.len()),
                 None => break,
             };
             let before = self.parsed.len();
-            if let Err(text) = numbers::parse_line(line, widths, room, &mut self.parsed) {
-                let place = self.block.offset + done as u64;
-                return Err(UffError::NotANumber {
-                    file: self.values.file.clone(),
-                    line: line_number(&self.values.path, place),
-                    dataset: self.values.dataset,
-                    value: shown(text),
-                }
-                .into());
+            if let Err(text) = parse_line(line, widths, room, &mut self.parsed) {
+                let problem = format!(
+                    "dataset {} holds \"{}\", which is not a number; allowed: numbers in the columns of dataset 58 or between blanks; export the file again",
+                    values.dataset,
+                    shown(text)
+                );
+                let line = line_number(&values.path, self.block.offset + done as u64);
+                return Err(RecordingError::at_line(&values.file, line, problem));
             }
             room -= self.parsed.len() - before;
             done += used;
         }
         if self.bytes.len() - done > MAX_LINE_BYTES {
-            return Err(UffError::LineTooLong {
-                file: self.values.file.clone(),
-                line: line_number(&self.values.path, self.block.offset),
-                dataset: self.values.dataset,
-                limit: MAX_LINE_BYTES,
-            }
-            .into());
+            let problem = format!(
+                "this line of dataset {} has more than {MAX_LINE_BYTES} bytes; allowed: one row of numbers per line; is it a binary dataset with a damaged header?",
+                values.dataset
+            );
+            let line = line_number(&values.path, self.block.offset);
+            return Err(RecordingError::at_line(&values.file, line, problem));
         }
         Ok(done)
     }
 
     /// Decodes whole points of binary data. Returns how many bytes were used.
-    fn decode_points(
-        &mut self,
-        big_endian: bool,
-        abscissa_bytes: usize,
-        ordinate_bytes: usize,
-    ) -> usize {
-        let point_bytes = self.values.point_bytes as usize;
+    fn decode_points(&mut self, big_endian: bool) -> usize {
+        let values = self.values;
+        let point_bytes = values.point_bytes() as usize;
+        let abscissa_bytes = values.place.abscissa_bytes as usize;
+        let ordinate_bytes = values.function.ordinate_bytes();
         let room = usize::try_from(self.missing()).unwrap_or(usize::MAX);
-        let points = (self.bytes.len() / point_bytes).min(room / self.values.numbers);
+        let points =
+            (self.bytes.len() / point_bytes).min(room / values.function.numbers_per_point());
         let used = points * point_bytes;
-        let bytes = self.bytes.get(..used).unwrap_or_default();
-        if self.values.ordinate == 0 || abscissa_bytes == ordinate_bytes {
+        let bytes = &self.bytes[..used];
+        if values.function.abscissa_numbers() == 0 || abscissa_bytes == ordinate_bytes {
             decode_equal(bytes, ordinate_bytes, big_endian, &mut self.parsed);
         } else {
             // Single precision abscissa before double precision ordinates (cases 6 and 8).

@@ -10,7 +10,6 @@
 
 mod modal;
 mod modal_fit;
-mod modal_matrix_pencil;
 mod modal_polyreference;
 mod quality;
 mod recording;

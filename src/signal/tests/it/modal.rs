@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::shared::baseband;
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +38,7 @@ fn level_of(lines: Lines, spectrum: &[Complex64]) -> CompositeLevel {
 #[test]
 fn prop_one_pole_is_read_far_below_the_line_spacing_truncated_or_not() {
     let (rate, block) = (2048.0, 2048);
-    let lines = Lines::baseband(rate, block, 1.0).unwrap();
+    let lines = baseband(rate, block, 1.0).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(11);
     for case in 0..200 {
         let frequency = random.random_range(60.0..600.0);
@@ -71,7 +72,7 @@ fn prop_one_pole_is_read_far_below_the_line_spacing_truncated_or_not() {
 #[test]
 fn prop_the_windows_decay_is_taken_out_of_the_damping() {
     let (rate, block) = (2048.0, 4096);
-    let lines = Lines::baseband(rate, block, 2.0).unwrap();
+    let lines = baseband(rate, block, 2.0).unwrap();
     let mut samples = ring_down(rate, block, 211.3, 0.002, 0.3);
     let window = Window::Exponential { decay: 2.3 };
     window.apply(&mut samples, rate);
@@ -93,7 +94,7 @@ fn prop_the_windows_decay_is_taken_out_of_the_damping() {
 #[test]
 fn limit_hum_and_noise_speckle_are_no_resonance() {
     let (rate, block) = (2048.0, 2048);
-    let lines = Lines::baseband(rate, block, 1.0).unwrap();
+    let lines = baseband(rate, block, 1.0).unwrap();
     let growing: Vec<f64> = ring_down(rate, block, 211.3, 0.002, 0.3)
         .into_iter()
         .rev()

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use tapjoint_signal::modal::polyreference::{
     PoleStability, PolyreferenceError, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
-    SubBandSettings, all_modes, find_modes, select_modes, stabilise_poles, sub_bands,
+    all_modes, find_modes, select_modes, stabilise_poles, sub_bands,
 };
 
 /// Frequency (Hz), damping ratio, factors of the outputs, factors of the inputs.
@@ -145,11 +145,7 @@ fn whole_band(matrix: &ResponseMatrix) -> Vec<PolyreferenceMode> {
 }
 
 fn with_sub_bands(matrix: &ResponseMatrix) -> Vec<PolyreferenceMode> {
-    let searches = find_modes(
-        matrix,
-        &PolyreferenceSettings::default(),
-        &SubBandSettings::default(),
-    );
+    let searches = find_modes(matrix, &PolyreferenceSettings::default());
     all_modes(&searches.unwrap())
 }
 
@@ -371,7 +367,7 @@ fn prop_sub_bands_ascend_and_their_cores_do_not_overlap() {
             })
             .collect();
         let responses = decay_transforms(&modes, 2.0, 50.0, seed);
-        let bands = sub_bands(&responses.matrix(), &SubBandSettings::default());
+        let bands = sub_bands(&responses.matrix());
         assert!(!bands.is_empty());
         for band in &bands {
             assert!(
@@ -410,11 +406,4 @@ fn limit_what_cannot_be_fitted_is_refused_with_place_and_remedy() {
 
     let error = ResponseMatrix::new(0.0, 1.0, &[vec![&zero[..]], vec![&line[..]]]).unwrap_err();
     assert!(matches!(error, PolyreferenceError::Shape { output: 2, .. }));
-
-    let weights = PolyreferenceSettings {
-        weights: Some(vec![1.0, -1.0]),
-        ..settings
-    };
-    let error = stabilise_poles(&matrix, &weights).unwrap_err();
-    assert!(matches!(error, PolyreferenceError::Weights { .. }));
 }

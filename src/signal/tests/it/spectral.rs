@@ -2,14 +2,15 @@
 
 use std::f64::consts::TAU;
 
+use crate::shared::baseband;
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_signal::spectral::{
     DecayCheck, Lines, SpectralAverager, SpectralError, Window, apply_force_window, band_limited,
-    chirp_z, choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_beside,
-    noise_power, smallest_smooth_block, transform_block,
+    choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_beside, noise_power,
+    smallest_smooth_block, transform_block,
 };
 
 fn noise(length: usize, seed: u64) -> Vec<f64> {
@@ -70,7 +71,7 @@ fn limit_bands_and_blocks_that_do_not_fit_are_refused() {
         );
     }
     assert!(matches!(
-        Lines::baseband(5120.0, 8, 1.0),
+        baseband(5120.0, 8, 1.0),
         Err(SpectralError::Block { .. })
     ));
 }
@@ -87,7 +88,7 @@ fn prop_transforms_equal_the_defining_sum() {
         let low = random.random_range(0.0..0.05) * rate;
         let band = (low, low + random.random_range(0.41..0.45) * rate);
         for lines in [
-            Lines::baseband(rate, length.max(16), available).unwrap(),
+            baseband(rate, length.max(16), available).unwrap(),
             Lines::zoom(band, rate, 500, available).unwrap(),
         ] {
             let values = transform_block(&samples, rate, &lines);
@@ -126,23 +127,6 @@ fn prop_zoom_equals_the_defining_sum_within_the_filters_ripple() {
 }
 
 #[test]
-fn prop_chirp_z_is_exact_for_long_records() {
-    let samples: Vec<Complex64> = noise(40_000, 9).into_iter().map(Complex64::from).collect();
-    let (start, step) = (0.0123, 1.7e-6);
-    let values = chirp_z(&samples, start, step, 300);
-    for k in (0..300).step_by(50) {
-        let cycles = start + k as f64 * step;
-        let expected: Complex64 = samples
-            .iter()
-            .enumerate()
-            .map(|(n, x)| x * Complex64::from_polar(1.0, -TAU * (cycles * n as f64).fract()))
-            .sum();
-        // 200 is the size of the sum of 40,000 unit normals; rounding leaves about 1e-11 of it.
-        assert!((values[k] - expected).norm() < 1e-9 * 200.0, "line {k}");
-    }
-}
-
-#[test]
 fn prop_a_delayed_copy_has_the_phase_minus_omega_d() {
     let (rate, delay) = (4096.0, 24);
     let mut force = vec![0.0; 4096];
@@ -151,7 +135,7 @@ fn prop_a_delayed_copy_has_the_phase_minus_omega_d() {
     let mut response = vec![0.0; 4096];
     response[100 + delay] = 1.0;
     response[101 + delay] = 0.5;
-    let lines = Lines::baseband(rate, 4096, 1.0).unwrap();
+    let lines = baseband(rate, 4096, 1.0).unwrap();
     let mut averager = SpectralAverager::new(lines, 1);
     averager.add(
         Some(&transform_block(&force, rate, &lines)),
@@ -172,7 +156,7 @@ fn prop_a_delayed_copy_has_the_phase_minus_omega_d() {
 
 #[test]
 fn limit_h1_of_nothing_is_nothing() {
-    let lines = Lines::baseband(1000.0, 100, 0.1).unwrap();
+    let lines = baseband(1000.0, 100, 0.1).unwrap();
     assert!(SpectralAverager::new(lines, 1).finish().is_none());
     let mut averager = SpectralAverager::new(lines, 1);
     averager.add(None, &[vec![Complex64::ONE; lines.points()]]);
@@ -214,7 +198,7 @@ fn prop_hann_keeps_the_amplitude_of_a_steady_line() {
         .map(|n| 3.0 * (TAU * 50.0 * n as f64 / rate).cos())
         .collect();
     Window::Hann.apply(&mut samples, rate);
-    let lines = Lines::baseband(rate, 1024, 1.0).unwrap();
+    let lines = baseband(rate, 1024, 1.0).unwrap();
     let amplitude = 2.0 * transform_block(&samples, rate, &lines)[50].norm();
     assert!((amplitude - 3.0).abs() < 1e-9, "{amplitude}");
 }
@@ -222,7 +206,7 @@ fn prop_hann_keeps_the_amplitude_of_a_steady_line() {
 #[test]
 fn recover_white_noise_keeps_its_level_whatever_the_quiet_stretch() {
     let rate = 2000.0;
-    let lines = Lines::baseband(rate, 4000, 2.0).unwrap();
+    let lines = baseband(rate, 4000, 2.0).unwrap();
     for quiet in [400, 2000, 4000] {
         let power = noise_power(noise(quiet, 3), rate, &lines).unwrap();
         let mean = power.iter().sum::<f64>() / power.len() as f64 * rate * rate;

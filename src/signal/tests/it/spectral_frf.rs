@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::shared::baseband;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
@@ -17,7 +18,7 @@ use tapjoint_signal::spectral::{
 const RATE: f64 = 2048.0;
 
 fn lines_of(block: usize) -> Lines {
-    Lines::baseband(RATE, block, block as f64 / RATE).unwrap()
+    baseband(RATE, block, block as f64 / RATE).unwrap()
 }
 
 fn normals(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {

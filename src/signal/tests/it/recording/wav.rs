@@ -213,6 +213,12 @@ fn every_coding_is_read_exactly() {
     }
 }
 
+/// Returns `true` where a doubt of this kind says `words`.
+fn has(warnings: &[RecordingWarning], code: &str, words: &str) -> bool {
+    let mut all = warnings.iter();
+    all.any(|warning| warning.code() == code && warning.to_string().contains(words))
+}
+
 #[test]
 fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
     let mut parts = Parts::new(1, 32, integers(4, 0));
@@ -223,11 +229,8 @@ fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
     );
     let (_file, recording) = open(parts.bytes());
     let warnings = recording.unwrap().warnings();
-    let expected = RecordingWarning::RightAligned {
-        bits: 24,
-        container: 32,
-    };
-    assert!(warnings.contains(&expected), "{warnings:?}");
+    let expected = "24-bit samples sit at the low end of their 32-bit containers";
+    assert!(has(&warnings, "right-aligned", expected), "{warnings:?}");
 }
 
 #[test]
@@ -288,11 +291,10 @@ fn a_size_left_open_by_a_crash_is_read_to_the_end_with_a_warning() {
         assert_eq!(read_all(parts.bytes(), "crashed"), expected(32768.0));
         let (_file, recording) = open(parts.bytes());
         let warnings = recording.unwrap().warnings();
-        let expected = RecordingWarning::UnknownLength {
-            size: u64::from(size),
-            present: 4,
-        };
-        assert!(warnings.contains(&expected), "{size}: {warnings:?}");
+        let expected = format!("(data size {size}); the recorder probably stopped");
+        assert!(has(&warnings, "unknown-length", &expected), "{warnings:?}");
+        let expected = "read to the end of the file, 4 samples per channel";
+        assert!(has(&warnings, "unknown-length", expected), "{warnings:?}");
     }
 }
 
@@ -306,16 +308,8 @@ fn a_truncated_file_is_read_as_far_as_it_goes_with_a_warning() {
     assert_eq!(read_all(cut, "truncated"), first_two);
     let (_file, recording) = open(cut);
     let warnings = recording.unwrap().warnings();
-    let expected = RecordingWarning::Truncated {
-        present: 2,
-        promised: 4,
-    };
-    assert!(warnings.contains(&expected), "{warnings:?}");
-    let text = expected.to_string();
-    assert!(
-        text.contains("2 of the promised 4") && text.contains("truncated"),
-        "{text}"
-    );
+    let expected = "the file is truncated: 2 of the promised 4 samples per channel";
+    assert!(has(&warnings, "truncated", expected), "{warnings:?}");
 }
 
 #[test]
@@ -624,11 +618,9 @@ fn a_given_rate_that_differs_is_ignored_with_a_warning() {
     };
     let recording = Recording::open(&file.path, &settings(5120.0)).unwrap();
     assert_eq!(recording.sample_rate(), 12_800.0);
-    let expected = RecordingWarning::SampleRateIgnored {
-        given: 5120.0,
-        used: 12_800.0,
-    };
-    assert!(recording.warnings().contains(&expected));
+    let expected = "given (5120 Hz) differs from the file's own (12800 Hz)";
+    let warnings = recording.warnings();
+    assert!(has(&warnings, "sample-rate-ignored", expected));
     let same = Recording::open(&file.path, &settings(12_800.0)).unwrap();
     let codes: Vec<_> = same.warnings().iter().map(RecordingWarning::code).collect();
     assert!(!codes.contains(&"sample-rate-ignored"), "{codes:?}");
@@ -641,7 +633,8 @@ fn a_scale_multiplies_samples_and_health() {
     let (_file, recording) = open(pcm16().bytes());
     let recording = recording.unwrap();
     let before = recording.channels()[1].health.clone();
-    let scaled = recording.with_scale(1, -65_536.0).unwrap();
+    let mut scaled = recording;
+    scaled.set_scale(1, -65_536.0).unwrap();
     // Channel 2: -3, 11, -19, 31 over 32768, times -65536.
     assert_eq!(scaled.read(1, 0..9).unwrap(), [6.0, -22.0, 38.0, -62.0]);
     let block = scaled.blocks(&[1], 100).next().unwrap().unwrap();
@@ -651,12 +644,13 @@ fn a_scale_multiplies_samples_and_health() {
     assert_eq!((health.minimum, health.maximum), (-62.0, 38.0));
     assert_eq!(health.mean, before.mean * -65_536.0);
     for bad in [0.0, f64::NAN, f64::INFINITY] {
-        let error = scaled.clone().with_scale(1, bad).expect_err("no scale");
+        let error = scaled.set_scale(1, bad).expect_err("no scale");
         assert!(error.to_string().contains("channel 2: scale"), "{error}");
     }
-    assert!(scaled.clone().with_scale(3, 1.0).is_err());
+    assert!(scaled.set_scale(3, 1.0).is_err());
     // Set again it replaces, and does not multiply.
-    let again = scaled.with_scale(1, 32_768.0).unwrap();
+    let mut again = scaled;
+    again.set_scale(1, 32_768.0).unwrap();
     assert_eq!(again.read(1, 0..1).unwrap(), [-3.0]);
     assert_eq!(again.channels()[1].health.peak, 31.0);
 }

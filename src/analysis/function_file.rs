@@ -1,0 +1,175 @@
+//! Files of frequency response functions: their resonances, as a recording's.
+
+use super::fits::{Candidates, stabilisation};
+use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
+use super::recording_result::{Conditions, RecordingResult, Response};
+use super::warnings::Warning;
+use num_complex::Complex64;
+use tapjoint_description::{ReadBy, SensorKind};
+use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
+use tapjoint_signal::modal::{CompositeLevel, PeakSettings, find_peaks, read_peaks};
+use tapjoint_signal::recording::{Format, FrequencyResponses, ResponseForm};
+use tapjoint_signal::spectral::{
+    AveragedSpectra, DISPLAY_RATIO, LEAST_BLOCK, Lines, SpectralError, Window,
+};
+use tapjoint_signal::taps::Taps;
+
+/// Settings for a file of frequency response functions.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FunctionSettings {
+    /// Form of all functions; `None` = what the file says.
+    pub form: Option<ResponseForm>,
+    /// Name of the sensor; `None` = the functions' own names.
+    pub sensor: Option<String>,
+    /// Band to be analysed (Hz); `None` = all lines.
+    pub band: Option<(f64, f64)>,
+    /// Way in which natural frequencies are read.
+    pub reading: ReadBy,
+}
+
+/// Reads the resonances of frequency response functions.
+pub(super) fn measure_functions(
+    functions: &FrequencyResponses,
+    settings: &FunctionSettings,
+) -> Result<RecordingResult, MeasureError> {
+    let axis = axis(functions, settings.band);
+    let (first, lines) = axis.map_err(|problem| MeasureError::Spectral {
+        file: functions.file.clone(),
+        problem,
+    })?;
+    let (mut responses, mut forms, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    for response in &functions.responses {
+        let form = settings.form.or(response.form);
+        let sensor = settings.sensor.as_ref();
+        responses.push(Response {
+            name: sensor.unwrap_or(&response.name).clone(),
+            kind: form.map(|form| match form {
+                ResponseForm::Accelerance => SensorKind::Acceleration,
+                ResponseForm::Mobility => SensorKind::Velocity,
+                ResponseForm::Receptance => SensorKind::Displacement,
+            }),
+            unit: form.map(|form| form.response_unit().to_string()),
+        });
+        forms.push(form);
+        values.push(response.values[first..first + lines.points()].to_vec());
+    }
+    let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
+    let warnings = functions.warnings.iter();
+    let warnings = warnings.map(|warning| Warning::about(&functions.file, warning.code(), warning));
+    Ok(RecordingResult {
+        file: functions.file.clone(),
+        format: Format::FrequencyResponses,
+        sample_rate: None,
+        seconds: None,
+        channels: Vec::new(),
+        has_hammer: true,
+        conditions: Conditions::default(),
+        tap_unit: Some("N".to_string()),
+        responses,
+        band: settings.band,
+        overview: None,
+        mode_numbers: vec![None; spectra.readings.len()],
+        measurement: Measurement {
+            taps: Taps {
+                taps: Vec::new(),
+                noise: 0.0,
+                remarks: Vec::new(),
+            },
+            spectra: Some(spectra),
+            warnings: warnings.collect(),
+        },
+    })
+}
+
+/// Index of the first line analysed, and the axis from there.
+fn axis(
+    functions: &FrequencyResponses,
+    band: Option<(f64, f64)>,
+) -> Result<(usize, Lines), SpectralError> {
+    let spacing = functions.spacing;
+    let last_line = functions.lines.saturating_sub(1);
+    let ends = (functions.frequency(0), functions.frequency(last_line));
+    let (low, high) = band.unwrap_or(ends);
+    // A hair inside, so that a line on the band's end belongs to it.
+    let hair = 1e-6 * spacing;
+    let first = ((low - hair - ends.0) / spacing).ceil().max(0.0) as usize;
+    let last = (((high + hair - ends.0) / spacing).floor().max(0.0) as usize).min(last_line);
+    let count = (last + 1).saturating_sub(first);
+    if (count as f64) < LEAST_BLOCK as f64 / DISPLAY_RATIO {
+        return Err(SpectralError::TooNarrow {
+            low,
+            high,
+            seconds: 1.0 / spacing,
+            resolution: spacing,
+            least_width: LEAST_BLOCK as f64 / DISPLAY_RATIO * spacing,
+        });
+    }
+    let width = (count - 1) as f64 * spacing;
+    let lines = Lines {
+        low: functions.frequency(first),
+        high: functions.frequency(first) + width,
+        spacing,
+        // The block of which an analyser would show so many lines.
+        block: (DISPLAY_RATIO * (count - 1) as f64).ceil() as usize,
+        duration: 1.0 / spacing,
+    };
+    Ok((first, lines))
+}
+
+/// Reads the resonances of functions, each with its form where it is known.
+fn spectra_of_functions(
+    lines: Lines,
+    values: Vec<Vec<Complex64>>,
+    forms: &[Option<ResponseForm>],
+    wanted: ReadBy,
+) -> MeasuredSpectra {
+    let powers: Vec<Vec<f64>> = values
+        .iter()
+        .map(|h| h.iter().map(Complex64::norm_sqr).collect())
+        .collect();
+    let columns: Vec<&[Complex64]> = values.iter().map(Vec::as_slice).collect();
+    let level = CompositeLevel::new(lines, &powers, None);
+    let peaks = find_peaks(&level, &PeakSettings::default());
+    let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
+    let stabilisation = stabilisation(lines.low, lines.spacing, &columns);
+    // The fit takes the functions without the line at 0 Hz.
+    let first_fitted = usize::from(lines.low <= 0.0);
+    let basis = Basis::FrequencyResponse {
+        resolution: lines.resolution(),
+    };
+    let fitted = values.iter().enumerate().map(|(sensor, values)| Column {
+        tap: 0,
+        sensor,
+        values: values[first_fitted..].to_vec(),
+    });
+    let frequencies = lines.frequencies().split_off(first_fitted);
+    if let Ok(data) = ModalData::new(basis, frequencies, fitted.collect()) {
+        let candidates = Candidates {
+            lines: &lines,
+            data: &data,
+            stabilisation: &stabilisation,
+        };
+        candidates.fit(&mut readings);
+        // There are modal constants where the form of every function is known.
+        if let Some(forms) = forms.iter().copied().collect::<Option<Vec<ResponseForm>>>() {
+            for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
+                fit.constants = modal_constants_of_frf(&fit.mode, &forms);
+            }
+        }
+    }
+    for reading in &mut readings {
+        reading.select_estimate(wanted);
+    }
+    readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    MeasuredSpectra {
+        averages: AveragedSpectra {
+            h1: Some(values),
+            ..AveragedSpectra::empty(lines)
+        },
+        window: Window::Rectangular,
+        decay: None,
+        readings,
+        force_noise: None,
+        stabilisation,
+    }
+}

@@ -1,0 +1,658 @@
+//! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
+
+use super::fits::{FreeDecays, Stabilisation};
+use super::warnings::Warning;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use tapjoint_description::WindowKind;
+use tapjoint_numerics::stats::{median, root_mean_square};
+use tapjoint_signal::modal::amplitude::Decay;
+use tapjoint_signal::modal::fit::TapForce;
+use tapjoint_signal::modal::{
+    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
+    find_peaks, mains_harmonic, near_mains, read_peaks,
+};
+use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
+use tapjoint_signal::spectral::{
+    AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, RUNG_DOWN,
+    SpectralAverager, SpectralError, Transformer, Window, apply_force_window, band_limited,
+    choose_window, exponential_to, largest_smooth_block, line_amplitude, measure_decay,
+    noise_beside, noise_power,
+};
+use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
+
+/// Settings of the measurement of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasureSettings {
+    /// Channels in which taps are searched; the responses among them are analysed.
+    pub source: TapSource,
+    /// Zoom band (Hz); `None` = 0 to rate/2.56.
+    pub band: Option<(f64, f64)>,
+    /// Block size (samples); `None` = the longest that transforms fast and fits the shortest tap.
+    pub block: Option<usize>,
+    /// Window; `None` = by the decay in the record.
+    pub window: Option<WindowKind>,
+    /// Way in which natural frequencies are read.
+    pub reading: ReadBy,
+    /// Form of each response, for modal constants; `None` where it is not known, or no motion in
+    /// SI units over a force in N.
+    pub kinds: Vec<Option<ResponseForm>>,
+    /// Limits for taps.
+    pub taps: TapSettings,
+    /// Limits for resonances.
+    pub peaks: PeakSettings,
+    /// Limits for mains lines.
+    pub mains: MainsSettings,
+}
+
+impl MeasureSettings {
+    /// Everything at its default.
+    pub fn new(source: TapSource) -> Self {
+        MeasureSettings {
+            source,
+            band: None,
+            block: None,
+            window: None,
+            reading: ReadBy::default(),
+            kinds: Vec::new(),
+            taps: TapSettings::default(),
+            peaks: PeakSettings::default(),
+            mains: MainsSettings::default(),
+        }
+    }
+}
+
+/// Taps and spectra of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// The taps, accepted and rejected.
+    pub taps: Taps,
+    /// Averages over the accepted taps and what was read from them; `None` without an accepted tap.
+    pub spectra: Option<MeasuredSpectra>,
+    /// Everything that a reader of the results has to know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Spectra and readings of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredSpectra {
+    /// Averages over the accepted taps.
+    pub averages: AveragedSpectra,
+    /// The window.
+    pub window: Window,
+    /// The records' decay: the response that keeps most; `None` of functions from a file.
+    pub decay: Option<DecayCheck>,
+    /// Resonances and mains lines, ascending.
+    pub readings: Vec<ModeReading>,
+    /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
+    /// without a hammer or a quiet stretch before the first tap.
+    pub force_noise: Option<Vec<f64>>,
+    /// Result of the polyreference fit.
+    pub stabilisation: Stabilisation,
+}
+
+/// Reasons for which a measurement stops.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// The recording could not be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Band or block do not fit.
+    #[error("{file}: {problem}")]
+    Spectral {
+        /// The recording.
+        file: String,
+        /// The problem.
+        problem: SpectralError,
+    },
+}
+
+/// Finds taps, averages spectra and reads resonances.
+///
+/// # Errors
+/// Unreadable recordings; a band or block that does not fit. No taps are not an error: the answer
+/// then has no spectra.
+pub fn measure(
+    recording: &Recording,
+    settings: &MeasureSettings,
+) -> Result<Measurement, MeasureError> {
+    // The band is judged before anything is read: it is the user's typing, not the data.
+    let trial = lines_for(settings, recording.sample_rate(), recording.duration());
+    let trial = trial.map_err(|problem| MeasureError::Spectral {
+        file: recording.name().to_string(),
+        problem,
+    })?;
+    let mut tap_settings = settings.taps;
+    tap_settings.wanted = settings
+        .block
+        .map(|_| trial.block as f64 / (DISPLAY_RATIO * (trial.high - trial.low)));
+    let taps = find_taps(recording, &settings.source, &tap_settings)?;
+    let mut warnings = of_recording(recording, &settings.source, &taps);
+    let mut spectra = None;
+    if let Some(shortest) = taps.shortest() {
+        let available = shortest as f64 / recording.sample_rate();
+        match lines_for(settings, recording.sample_rate(), available) {
+            Ok(lines) => {
+                let found = Stage::new(recording, settings, &taps, lines).spectra()?;
+                let (file, window) = (recording.name(), found.window);
+                if let Some(decay) = found.decay
+                    && decay.remaining > RUNG_DOWN
+                    && decay.remaining > decay.noise
+                {
+                    warnings.push(Warning::not_rung_down(file, decay.remaining, window));
+                }
+                if window == Window::Hann {
+                    let text = "a Hann window suppresses the start of every record, where a tap has its \
+                                signal; it is meant for steady signals";
+                    warnings.push(Warning::about(file, "hann-on-taps", text));
+                }
+                for reading in &found.readings {
+                    if let Some(label @ PeakLabel::Mains(_)) = reading.label {
+                        warnings.push(Warning::mains(file, reading.line_frequency, label));
+                    }
+                }
+                spectra = Some(found);
+            }
+            // The file would do, but its taps come too soon: data, not typing.
+            Err(problem) => warnings.push(Warning::about(
+                recording.name(),
+                "taps-too-short",
+                format!("the taps leave no spectrum: {problem}"),
+            )),
+        }
+    }
+    Ok(Measurement {
+        taps,
+        spectra,
+        warnings,
+    })
+}
+
+/// The axis: block and band as wanted, or the longest block that fits `available` seconds.
+fn lines_for(
+    settings: &MeasureSettings,
+    rate: f64,
+    available: f64,
+) -> Result<Lines, SpectralError> {
+    let band = settings.band.unwrap_or((0.0, rate / DISPLAY_RATIO));
+    let zoomed_rate = DISPLAY_RATIO * (band.1 - band.0);
+    // A hair more than exact, so that 2048 samples of 0.4 s are not 2047 by rounding.
+    let fitting = (available * zoomed_rate * (1.0 + 1e-12)) as usize;
+    let block = settings
+        .block
+        .or_else(|| largest_smooth_block(fitting.min(MOST_BLOCK)))
+        .unwrap_or(fitting)
+        .max(LEAST_BLOCK);
+    Lines::zoom(band, rate, block, available)
+}
+
+/// Doubts about a recording and its taps.
+pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
+    let file = recording.name();
+    let mut warnings = Vec::new();
+    for warning in recording.warnings() {
+        warnings.push(Warning::about(file, warning.code(), warning));
+    }
+    for remark in &taps.remarks {
+        warnings.push(Warning::about(file, "taps", remark));
+    }
+    let accepted = taps.accepted().count();
+    let rejected = taps.taps.len() - accepted;
+    if rejected > 0 {
+        warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
+    }
+    if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
+        let text = "only one tap was averaged, so nothing shows how well it repeats and a \
+                    coherence would mean nothing; record three to five taps";
+        warnings.push(Warning::about(file, "single-tap", text));
+    }
+    warnings
+}
+
+/// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
+/// each). Taps beyond it are left out of them.
+const MOST_KEPT: usize = 1 << 24;
+
+/// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
+const AFTER_TRIGGER: f64 = 5e-3;
+/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
+const LEAST_SAMPLES: u64 = 64;
+
+/// Data that every step of one recording's measurement needs.
+struct Stage<'a> {
+    recording: &'a Recording,
+    settings: &'a MeasureSettings,
+    taps: &'a Taps,
+    lines: Lines,
+    /// Force first, where there is one, then the responses.
+    channels: Vec<usize>,
+    has_force: bool,
+    /// Frames of a block.
+    gate: u64,
+}
+
+impl<'a> Stage<'a> {
+    fn new(
+        recording: &'a Recording,
+        settings: &'a MeasureSettings,
+        taps: &'a Taps,
+        lines: Lines,
+    ) -> Self {
+        Stage {
+            recording,
+            settings,
+            taps,
+            lines,
+            channels: settings.source.channels(),
+            has_force: matches!(settings.source, TapSource::Hammer { .. }),
+            gate: (lines.duration * recording.sample_rate()).round() as u64,
+        }
+    }
+
+    /// Samples of all channels in a range of frames, each channel's mean taken out.
+    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let mut channels = self.recording.read_channels(&self.channels, range)?;
+        for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
+            let mean = self.recording.mean(channel);
+            samples.iter_mut().for_each(|x| *x -= mean);
+        }
+        Ok(channels)
+    }
+
+    fn record(&self, tap: &Tap) -> Result<Vec<Vec<f64>>, RecordingError> {
+        self.read(tap.record.start..tap.record.start + self.gate)
+    }
+
+    /// The quiet stretch before the first tap, at most a block.
+    fn quiet(&self) -> Result<PreTriggerNoise, RecordingError> {
+        let quiet = self.taps.quiet();
+        let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
+        let mut force = self.read(start..quiet.end)?;
+        let responses = force.split_off(usize::from(self.has_force));
+        let rate = self.recording.sample_rate();
+        let windows = self
+            .taps
+            .accepted()
+            .filter_map(|tap| pulse_window(tap, rate));
+        let energy: f64 = windows.map(PulseWindow::energy).sum();
+        let count = self.taps.accepted().count().max(1) as f64;
+        Ok(PreTriggerNoise {
+            force: force.pop(),
+            responses,
+            sample_rate: self.recording.sample_rate(),
+            block: self.gate as usize,
+            force_window: energy / count,
+        })
+    }
+
+    fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
+        let quiet = self.quiet()?;
+        let rate = self.recording.sample_rate();
+        let band = (self.lines.low, self.lines.high);
+        let noise: Vec<f64> = quiet
+            .responses
+            .iter()
+            .map(|x| root_mean_square(&band_limited(x, rate, band)))
+            .collect();
+        // The decay of each response inside the band, the largest over the accepted taps.
+        let mut checks = vec![DecayCheck::NOTHING; noise.len()];
+        for tap in self.taps.accepted() {
+            let responses = self.record(tap)?.split_off(usize::from(self.has_force));
+            for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
+                let found = measure_decay(&band_limited(samples, rate, band), noise);
+                if found.remaining >= check.remaining {
+                    *check = found;
+                }
+            }
+        }
+        // The slowest of the decays that stand above their noise; of none, the slowest of all.
+        let slowest = checks.iter().copied().max_by(|a, b| {
+            let above = (a.remaining > a.noise).cmp(&(b.remaining > b.noise));
+            above.then(a.remaining.total_cmp(&b.remaining))
+        });
+        let decay = slowest.unwrap_or(DecayCheck::NOTHING);
+        let window = match self.settings.window {
+            None => choose_window(&checks, self.lines.duration),
+            Some(WindowKind::Rectangular) => Window::Rectangular,
+            Some(WindowKind::Hann) => Window::Hann,
+            Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
+        };
+        let (averages, transforms) = self.averages(window)?;
+        let mut readings = self.readings(&averages, &transforms, &quiet, window);
+        let stabilisation = match self.free_decays()? {
+            Some(decays) => decays.fit(&mut readings, &self.lines, &self.settings.kinds),
+            None => Stabilisation::default(),
+        };
+        for reading in &mut readings {
+            reading.select_estimate(self.settings.reading);
+        }
+        readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        Ok(MeasuredSpectra {
+            averages,
+            window,
+            decay: Some(decay),
+            readings,
+            force_noise: quiet.force_noise(&self.lines),
+            stabilisation,
+        })
+    }
+
+    /// Averages, and without a hammer also every tap's own transforms (their phases differ, so they
+    /// cannot be averaged), up to a bound on memory.
+    fn averages(
+        &self,
+        window: Window,
+    ) -> Result<(AveragedSpectra, Vec<Vec<Complex64>>), RecordingError> {
+        let rate = self.recording.sample_rate();
+        let mut averager = SpectralAverager::new(self.lines, self.responses());
+        let transformer = Transformer::new(rate, self.lines, self.gate as usize);
+        let mut kept: Vec<Vec<Complex64>> = Vec::new();
+        for tap in self.taps.accepted() {
+            let mut samples = self.record(tap)?;
+            if let (Some(window), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
+                remove_offset(force, rate);
+                window.apply(force);
+            }
+            let mut transforms: Vec<Vec<Complex64>> = samples
+                .iter_mut()
+                .map(|samples| {
+                    window.apply(samples, rate);
+                    transformer.transform(samples)
+                })
+                .collect();
+            let responses = transforms.split_off(usize::from(self.has_force));
+            averager.add(transforms.first().map(Vec::as_slice), &responses);
+            if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
+                // Time zero is moved to the trigger: the slope that the quiet before it puts on the phase is no
+                // background that a fit of few lines could follow.
+                let delay = tap.time - tap.record.start as f64 / rate;
+                for mut transform in responses {
+                    for (line, value) in transform.iter_mut().enumerate() {
+                        let turn = TAU * self.lines.frequency(line) * delay;
+                        *value *= Complex64::from_polar(1.0, turn);
+                    }
+                    kept.push(transform);
+                }
+            }
+        }
+        // At least one tap was accepted, or there would be no axis.
+        let averages = averager
+            .finish()
+            .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
+        Ok((averages, kept))
+    }
+
+    /// Peaks of the composite level over all sensors, read and labelled.
+    fn readings(
+        &self,
+        averages: &AveragedSpectra,
+        transforms: &[Vec<Complex64>],
+        quiet: &PreTriggerNoise,
+        window: Window,
+    ) -> Vec<ModeReading> {
+        let powers: Vec<Vec<f64>> = match &averages.h1 {
+            Some(h1) => h1
+                .iter()
+                .map(|h| h.iter().map(Complex64::norm_sqr).collect())
+                .collect(),
+            None => averages
+                .responses
+                .iter()
+                .map(|x| x.iter().map(|x| x * x).collect())
+                .collect(),
+        };
+        let noise = quiet.noise_powers(averages, window);
+        let level = CompositeLevel::new(self.lines, &powers, noise.as_deref());
+        let peaks = find_peaks(&level, &self.settings.peaks);
+        let spectra: Vec<&[Complex64]> = averages
+            .h1
+            .as_deref()
+            .unwrap_or(transforms)
+            .iter()
+            .map(Vec::as_slice)
+            .collect();
+        let mut readings = read_peaks(&level, &spectra, &peaks, window);
+        for (reading, peak) in readings.iter_mut().zip(&peaks) {
+            // A peak over a gap of the force's spectrum: a hammer has none just where the structure resonates, so the
+            // quotient's peak is the force's doing. The force on the peak is compared with that on its flanks, where
+            // the level has fallen by 6 dB. A gap is lower than either flank; a force that merely falls off is lower
+            // than one.
+            let (level, force) = (&level.level_db, averages.force.as_deref());
+            let foot = level[peak.index] - 6.0;
+            let mut before = level[..peak.index].iter();
+            let left = before.rposition(|&level| level < foot);
+            let mut after = level[peak.index..].iter();
+            let right = after.position(|&level| level < foot);
+            if let (Some(force), Some(left), Some(right)) = (force, left, right)
+                && let (Some(&left), Some(&right)) =
+                    (force.get(left), force.get(peak.index + right))
+                && force[peak.index] < 0.6 * left.min(right)
+            {
+                reading.label = Some(PeakLabel::ForceGap);
+            }
+            let mains = &self.settings.mains;
+            if let Some(label) = quiet.mains_label(peak.index, averages, window, mains) {
+                // A mains line keeps its line reading and loses what only a resonance has.
+                reading.line_frequency = self.lines.frequency(peak.index);
+                reading.between = None;
+                reading.damping_ratio = None;
+                reading.damping_std = None;
+                reading.label = Some(label);
+                reading.select_estimate(ReadBy::Line);
+            }
+        }
+        readings
+    }
+
+    /// First frame of the decay after a tap.
+    fn begin(&self, tap: &Tap) -> u64 {
+        let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
+        let trigger = (tap.time * self.recording.sample_rate()).round();
+        tap.pulse_end.unwrap_or((trigger + after) as u64)
+    }
+
+    /// Reads the decays; `None` where they are too short for a fit.
+    fn free_decays(&self) -> Result<Option<FreeDecays>, RecordingError> {
+        let taps: Vec<&Tap> = self.taps.accepted().collect();
+        let lengths = taps
+            .iter()
+            .map(|tap| (tap.record.start + self.gate).saturating_sub(self.begin(tap)));
+        let shortest = lengths.min().unwrap_or(0);
+        let samples = match largest_smooth_block(shortest as usize) {
+            Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
+            _ => return Ok(None),
+        };
+        let most = MOST_KEPT / (samples * self.responses()).max(1);
+        let (mut decays, mut forces) = (Vec::new(), Vec::new());
+        for (number, tap) in taps.into_iter().take(most.max(1)).enumerate() {
+            let (decay, force) = self.decay(tap, samples)?;
+            forces.extend(force.map(|samples| TapForce {
+                tap: number,
+                start: -(samples.len() as f64) / decay.sample_rate,
+                samples,
+                sample_rate: decay.sample_rate,
+            }));
+            decays.push(decay);
+        }
+        Ok(FreeDecays::new(samples, &self.lines, decays, forces).ok())
+    }
+
+    fn responses(&self) -> usize {
+        self.channels.len() - usize::from(self.has_force)
+    }
+
+    /// The decay after a tap, and the force before it.
+    fn decay(
+        &self,
+        tap: &Tap,
+        samples: usize,
+    ) -> Result<(Decay, Option<Vec<f64>>), RecordingError> {
+        let rate = self.recording.sample_rate();
+        let begin = self.begin(tap);
+        let mut channels = self.read(tap.record.start..begin + samples as u64)?;
+        let before = (begin - tap.record.start) as usize;
+        let responses = channels.split_off(usize::from(self.has_force));
+        let force = channels.pop().map(|mut force| {
+            remove_offset(&mut force, rate);
+            if let Some(window) = pulse_window(tap, rate) {
+                window.apply(&mut force);
+            }
+            force.truncate(before);
+            force
+        });
+        let decay = Decay {
+            start: begin as f64 / rate - tap.time,
+            sample_rate: rate,
+            responses: responses
+                .into_iter()
+                .map(|x| x[before.min(x.len())..].to_vec())
+                .collect(),
+        };
+        Ok((decay, force))
+    }
+}
+
+/// Samples of a quiet stretch, means taken out, and the block they are compared with.
+struct PreTriggerNoise {
+    /// Force, where there is a hammer.
+    force: Option<Vec<f64>>,
+    /// Responses.
+    responses: Vec<Vec<f64>>,
+    /// Sample rate (Hz).
+    sample_rate: f64,
+    /// Length of a block (samples).
+    block: usize,
+    /// Length of the force window (samples), its mean over the taps.
+    force_window: f64,
+}
+
+impl PreTriggerNoise {
+    /// Power that noise alone would leave in the averages, per response: of H1 where there is a
+    /// hammer, else of the response's transform. `None` where the stretch is too short to tell.
+    ///
+    /// The response's noise is averaged down by the taps, N_x/(n F^2); the force's counts in full,
+    /// |H|^2 N_f/F^2, for it biases H1 as well: where the hammer has no energy, H1 means nothing.
+    fn noise_powers(&self, averages: &AveragedSpectra, window: Window) -> Option<Vec<Vec<f64>>> {
+        let (_, energy) = self.window_sums(window);
+        let lines = &averages.lines;
+        let force_noise = match &self.force {
+            Some(force) => Some(noise_power(force.clone(), self.sample_rate, lines)?),
+            None => None,
+        };
+        let taps = averages.taps as f64;
+        self.responses
+            .iter()
+            .enumerate()
+            .map(|(response, samples)| {
+                let noise = noise_power(samples.clone(), self.sample_rate, lines)?;
+                let power = noise.iter().enumerate().map(|(line, noise)| {
+                    let (Some(force), Some(h1)) = (&averages.force, &averages.h1) else {
+                        return noise * energy;
+                    };
+                    let gain = h1[response].get(line).map_or(0.0, Complex64::norm_sqr);
+                    let of_force = force_noise.as_ref().map_or(0.0, |noise| noise[line]);
+                    let force_power = (force[line] * force[line]).max(f64::MIN_POSITIVE);
+                    (noise * energy / taps + gain * of_force * self.force_window) / force_power
+                });
+                Some(power.collect())
+            })
+            .collect()
+    }
+
+    /// Noise of the force channel in the transforms of its windowed pulses (N s), on
+    /// each line; `None` without a hammer, or where the stretch is too short to tell.
+    fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
+        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        for value in &mut noise {
+            *value = (*value * self.force_window).sqrt();
+        }
+        Some(noise)
+    }
+
+    /// The label of a peak on line `index` that is hum, judged on the response in which it is
+    /// strongest.
+    fn mains_label(
+        &self,
+        index: usize,
+        averages: &AveragedSpectra,
+        window: Window,
+        settings: &MainsSettings,
+    ) -> Option<PeakLabel> {
+        let lines = &averages.lines;
+        let frequency = lines.frequency(index);
+        near_mains(frequency, lines.half_line(), settings)?;
+        let shares = averages.responses.iter();
+        let shares = shares.map(|x| x[index] / x.iter().sum::<f64>()).enumerate();
+        let (strongest, _) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (sum, _) = self.window_sums(window);
+        let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
+        let samples = self.responses.get(strongest)?;
+        let amplitudes = LineAmplitudes {
+            before: line_amplitude(samples, self.sample_rate, frequency)?,
+            within,
+            noise: noise_beside(samples, self.sample_rate, frequency)?,
+        };
+        mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
+    }
+
+    /// Sum and sum of squares of the window over a block.
+    fn window_sums(&self, window: Window) -> (f64, f64) {
+        let mut weights = vec![1.0; self.block];
+        window.apply(&mut weights, self.sample_rate);
+        (weights.iter().sum(), weights.iter().map(|w| w * w).sum())
+    }
+}
+
+/// Window about the pulse of a tap in its record (samples): zero before `start`, unity for `length`
+/// from there, a taper of the pulse's own length after it.
+#[derive(Clone, Copy)]
+struct PulseWindow {
+    start: usize,
+    length: usize,
+    taper: usize,
+}
+
+/// The ringing of a filter ahead of a pulse lasts no longer than this (s), or eight samples.
+const AHEAD_OF_PULSE: f64 = 2e-3;
+
+/// The force window of a tap: from just before the trigger to the end of the pulse, and as long again
+/// for what the search for its end may have missed. Noise and offset of the hammer before and after
+/// would ripple through every quotient. `None` without a hammer.
+fn pulse_window(tap: &Tap, sample_rate: f64) -> Option<PulseWindow> {
+    let trigger = (tap.time * sample_rate).round() as u64;
+    let pulse = tap.pulse_end?.saturating_sub(trigger).max(1) as usize;
+    let into = trigger.saturating_sub(tap.record.start) as usize;
+    let ahead = ((AHEAD_OF_PULSE * sample_rate) as usize).max(8).min(into);
+    Some(PulseWindow {
+        start: into - ahead,
+        length: ahead + 2 * pulse,
+        taper: pulse,
+    })
+}
+
+impl PulseWindow {
+    fn apply(self, force: &mut [f64]) {
+        let start = self.start.min(force.len());
+        force[..start].fill(0.0);
+        apply_force_window(&mut force[start..], self.length, self.taper);
+    }
+
+    /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.
+    fn energy(self) -> f64 {
+        self.length as f64 + 0.375 * self.taper as f64
+    }
+}
+
+/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
+/// median is the level at rest, and short beside the drift of its amplifier.
+const OFFSET_STRETCH: f64 = 0.2;
+
+/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
+/// that level: the pulses are in it, and over the force window the difference amounts to a percent
+/// of a pulse's momentum.
+fn remove_offset(force: &mut [f64], sample_rate: f64) {
+    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
+    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
+    let rest = median(&mut about);
+    force.iter_mut().for_each(|x| *x -= rest);
+}

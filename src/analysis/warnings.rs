@@ -1,0 +1,653 @@
+//! Warnings: doubts about a measurement, an estimate and what it leaves out of the described test. Each is a sentence
+//! with event, likely cause and remedy.
+
+use super::results::{
+    BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult, exceeds_noise,
+};
+use super::structure::TestedStructure;
+use std::fmt;
+use std::mem::{swap, take};
+use tapjoint_beam::BeamTheory;
+use tapjoint_description::{FitParameter, SensorDescription, SensorKind, TestDescription, Weights};
+use tapjoint_identify::consistent::{
+    ConsistentEstimate, EstimatedQuantity, Limit, NOTABLE_MISFIT, Quantity, Verdict,
+};
+use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
+use tapjoint_numerics::stats::times;
+use tapjoint_signal::modal::PeakLabel;
+use tapjoint_signal::spectral::Window;
+
+/// A warning that travels with the result. Displays as event, likely cause and remedy.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Warning {
+    /// Short code that scripts may look for.
+    pub code: &'static str,
+    /// True if it concerns the pair regression alone.
+    pub of_pairs: bool,
+    sentence: String,
+    /// Kind of a doubt that recordings may share: of one kind the worst stands for all. `None` of all else.
+    shared: Option<&'static str>,
+    /// Size by which the worst is chosen.
+    severity: f64,
+    /// The recording and its number, "a.wav: 4.5 %", of a doubt that may be shared.
+    about: String,
+    /// The other recordings and their numbers.
+    others: Vec<String>,
+}
+
+impl Warning {
+    /// A doubt with a short code for scripts.
+    pub fn new(code: &'static str, sentence: impl Into<String>) -> Self {
+        Warning {
+            code,
+            sentence: sentence.into(),
+            ..Warning::default()
+        }
+    }
+
+    /// A doubt about a recording or its search for taps.
+    pub(super) fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
+        Warning::new(code, format!("{file}: {sentence}"))
+    }
+
+    /// A doubt about the pair regression alone.
+    fn about_pairs(code: &'static str, sentence: impl Into<String>) -> Self {
+        Warning {
+            of_pairs: true,
+            ..Warning::new(code, sentence)
+        }
+    }
+
+    /// An effect that the method leaves out; `of_pairs` if only the pair regression does.
+    fn neglected(sentence: impl Into<String>, of_pairs: bool) -> Self {
+        Warning {
+            of_pairs,
+            ..Warning::new("neglected", sentence)
+        }
+    }
+
+    /// Taps of a recording were rejected.
+    pub(super) fn rejected_taps(file: &str, rejected: usize, total: usize) -> Self {
+        let were = if rejected == 1 { "was" } else { "were" };
+        let text = format!("{rejected} of {total} taps {were} rejected; the list of taps says why");
+        Warning::about(file, "rejected-taps", text)
+    }
+
+    /// The response does not ring down in the record: a level relative to the start remains at its end.
+    pub(super) fn not_rung_down(file: &str, remaining: f64, window: Window) -> Self {
+        let percent = 100.0 * remaining;
+        let advice = match window {
+            Window::Exponential { decay } => format!(
+                "an exponential window with a decay of {decay:.3} 1/s was applied to force and response, \
+                 and taken out of every damping read from the spectra (fits take the decays without it); a longer \
+                 block, or taps farther apart where the block reaches to the next tap, need no window"
+            ),
+            _ => "readings on lines suffer from it; leave the window to the program, or give a longer block"
+                .to_owned(),
+        };
+        let text = format!(
+            "at the end of the block the response still has {percent:.1} % of its level (1.0 % is wanted); {advice}"
+        );
+        Warning {
+            shared: Some(window.name()),
+            severity: remaining,
+            about: format!("{file}: {percent:.1} %"),
+            ..Warning::about(file, "not-rung-down", text)
+        }
+    }
+
+    /// A peak was taken for mains hum.
+    pub(super) fn mains(file: &str, frequency: f64, label: PeakLabel) -> Self {
+        let text = format!(
+            "the peak at {frequency:.2} Hz was there before the tap and is taken for {label}, not for a mode; check \
+             the grounding of the sensor cables"
+        );
+        Warning {
+            shared: Some("hum"),
+            about: format!("{file}: {frequency:.2} Hz"),
+            ..Warning::about(file, "mains", text)
+        }
+    }
+
+    /// Peaks were left without a mode; `text` says why.
+    pub(super) fn unpaired(count: usize, text: &str) -> Self {
+        let belong = match count {
+            1 => "peak belongs",
+            _ => "peaks belong",
+        };
+        Warning::new("unpaired", format!("{count} {belong} to no mode: {text}"))
+    }
+}
+
+impl fmt::Display for Warning {
+    /// Writes "... (the same of b.wav: 4.5 %, c.wav: 8.8 %)".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.sentence)?;
+        match self.others.is_empty() {
+            true => Ok(()),
+            false => write!(f, " (the same of {})", self.others.join(", ")),
+        }
+    }
+}
+
+/// Warnings that differ in their recording and a number alone become one, in the place of the first.
+pub fn together(warnings: Vec<Warning>) -> Vec<Warning> {
+    let mut kept: Vec<Warning> = Vec::new();
+    for mut warning in warnings {
+        let shared = warning.shared;
+        let mut earlier = kept.iter_mut().filter(|_| shared.is_some());
+        let same = earlier.find(|one| (one.code, one.shared) == (warning.code, shared));
+        let Some(earlier) = same else {
+            kept.push(warning);
+            continue;
+        };
+        // The worst stands in front.
+        if warning.severity > earlier.severity {
+            swap(earlier, &mut warning);
+            earlier.others = take(&mut warning.others);
+        }
+        earlier.others.push(warning.about);
+    }
+    kept
+}
+
+/// Another possible cause of a misfit where modes come from several recordings.
+const BETWEEN: &str = "; recordings taken one after the other differ by more than \
+                       single readings";
+/// Remedy for it where there is a joint.
+const ALLOWED: &str =
+    ": the diagnosis of what is missing allows for a joint that drifts between them";
+
+/// Doubts about the estimates of all methods.
+pub(super) fn of_estimate(
+    structure: &TestedStructure,
+    found: &Identification,
+    modes: &[ModeResult],
+) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    match (&found.consistent, &found.estimate, &found.reason) {
+        (Some(consistent), ..) => warnings.extend(of_consistent(consistent, modes)),
+        // The closed form stands in the place of the consistent estimate.
+        (None, Some(_), Some(reason)) => {
+            let closed = match structure.regression {
+                Some(_) => "the pair regression",
+                None => "the closed form",
+            };
+            let text = match structure.known.over(None) {
+                Some(_) => format!(
+                    "all stiffnesses are stated in [joint], so there is none to fit: the prediction uses the \
+                     stated ones, and {closed} shows what the frequencies alone would say"
+                ),
+                None => format!("no consistent estimate: {reason}; {closed} stands in its place"),
+            };
+            warnings.push(Warning::new("fallback", text));
+        }
+        _ => {}
+    }
+    let Some(Estimate::Joint(joint)) = &found.estimate else {
+        return warnings;
+    };
+    for doubt in &joint.doubts {
+        warnings.push(match doubt {
+            Doubt::Closure { closure } => {
+                let percent = 100.0 * closure;
+                let text = format!(
+                    "the pair regression fails its own check: the product of the compliances that it finds differs \
+                     by {percent:+.0} % from the product of its two estimates; do not use its stiffnesses"
+                );
+                Warning::about_pairs("closure", text)
+            }
+            Doubt::CouplingNotEstablished if found.consistent.is_some() => continue,
+            Doubt::CouplingNotEstablished => coupling_not_established(),
+            other => Warning::about_pairs(
+                "unphysical",
+                format!(
+                    "the regression's answer is not a joint that can exist: {other}; a missing or an extra \
+                     mode, a wrong model or readings too coarse for it are the usual causes"
+                ),
+            ),
+        });
+    }
+    warnings
+}
+
+/// The frequencies do not show a cross coupling.
+fn coupling_not_established() -> Warning {
+    Warning::new(
+        "coupling-not-established",
+        "the interval of the cross coupling contains zero: these frequencies do not show one, \
+         and Kz has no interval; the two-parameter model may do",
+    )
+}
+
+/// Returns every doubt that the numbers of a consistent estimate raise.
+fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if let Some(mut text) = misfit(found) {
+        let between: Vec<BetweenRecordings> =
+            modes.iter().filter_map(|mode| mode.between).collect();
+        if exceeds_noise(&between) {
+            text += BETWEEN;
+            text += if has_joint(found) { ALLOWED } else { "" };
+        }
+        warnings.push(Warning::new("misfit", text));
+    }
+    if found.goodness.verdict == Verdict::Untestable {
+        warnings.push(Warning::new("untestable", found.goodness.words()));
+    }
+    for text in found.quantities.iter().filter_map(open_end) {
+        warnings.push(Warning::new("at-limit", text));
+    }
+    // Of one parameter alone the open end says the same.
+    let several = found.fit.len() > 1;
+    for flat in found.identifiability.flat.iter().filter(|_| several) {
+        warnings.push(Warning::new("flat-direction", flat.words.as_str()));
+    }
+    // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
+    let most = 100.0 * NOTABLE_MISFIT;
+    let minima = found.other_minima.iter();
+    for other in minima.filter(|other| other.rms_percent < most) {
+        let values = other.values.iter();
+        let values = values.map(|(q, v)| format!("{} {v:.4e}", q.name()));
+        let text = format!(
+            "another joint comes near the same frequencies, to {:.2} % rms: {}",
+            other.rms_percent,
+            values.collect::<Vec<_>>().join(", ")
+        );
+        warnings.push(Warning::new("other-minimum", text));
+    }
+    if !found.stop.converged() {
+        let text = "the search for the best joint ended before it stood still; its values are not the best ones";
+        warnings.push(Warning::new("not-converged", text));
+    }
+    // The interval of a fitted coupling that contains zero.
+    let coupling = found.quantity(Quantity::Coupling);
+    if coupling.is_some_and(|coupling| {
+        let interval = coupling.low.zip(coupling.high);
+        coupling.std.is_some() && interval.is_none_or(|(low, high)| low * high <= 0.0)
+    }) {
+        warnings.push(coupling_not_established());
+    }
+    warnings
+}
+
+/// The largest misfit of a prediction that is beyond what a beam's stated dimensions usually leave open in its
+/// frequencies, and beyond three standard deviations of its reading. A coarse reading may miss by more than a sharp one
+/// and mean less.
+pub(super) fn of_prediction(
+    prediction: &[PredictedMode],
+    measured: &[MeasuredMode],
+) -> Option<Warning> {
+    let notable = prediction.iter().filter_map(|mode| {
+        let error = mode.error_percent?;
+        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
+        let deviations = reading
+            .std
+            .map(|std| (mode.predicted - reading.frequency) / std);
+        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
+        (beyond && error.abs() > 100.0 * NOTABLE_MISFIT).then_some((mode.mode, error, deviations))
+    });
+    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let (mode, error_percent, deviations) = worst?;
+    let deviations = deviations.map(|deviations| {
+        let times = times(deviations);
+        format!(" ({times} standard deviations of its frequency)")
+    });
+    let deviations = deviations.unwrap_or_default();
+    let text = format!(
+        "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %{deviations}; the \
+         estimator, a mode numbered wrongly, or something the model lacks may be the cause"
+    );
+    Some(Warning::new("prediction-error", text))
+}
+
+/// Returns true if a joint's stiffness was estimated, as of every structure but a free beam.
+fn has_joint(found: &ConsistentEstimate) -> bool {
+    [Quantity::Kx, Quantity::Ky]
+        .into_iter()
+        .any(|stiffness| found.quantity(stiffness).is_some())
+}
+
+/// The model against the readings: its misfit, the uncertainties that would allow it, and what either leaves of the
+/// intervals.
+fn misfit(found: &ConsistentEstimate) -> Option<String> {
+    let goodness = &found.goodness;
+    let percent = 100.0 * goodness.relative_misfit;
+    if goodness.chi_squared.is_none() {
+        let doubtful = matches!(goodness.verdict, Verdict::Doubtful | Verdict::CannotExplain);
+        return doubtful.then(|| goodness.words());
+    }
+    let factor = goodness.uncertainty_factor()?;
+    let sought = match has_joint(found) {
+        true => "the joint",
+        false => "the beam's modulus",
+    };
+    let intervals = found.quantities.iter().filter_map(two_intervals);
+    let intervals: Vec<String> = intervals.map(|words| format!("; {words}")).collect();
+    Some(format!(
+        "the model misses the frequencies by {} % rms, {} times as much as their uncertainty allows (goodness of fit \
+         {}); std and limits from the frequencies' uncertainty alone are too small for {sought}{}",
+        two_digits(percent),
+        times(factor),
+        chance(goodness.probability.unwrap_or(0.0)),
+        intervals.concat()
+    ))
+}
+
+/// A probability in two digits: none is nothing, however small.
+fn chance(probability: f64) -> String {
+    match probability < 0.001 {
+        true => "<0.001".to_owned(),
+        false => two_digits(probability),
+    }
+}
+
+/// A number in two digits, with an exponent only where it is very small.
+fn two_digits(size: f64) -> String {
+    match size {
+        size if size >= 10.0 => format!("{size:.0}"),
+        size if size >= 1.0 => format!("{size:.1}"),
+        size if size >= 0.1 => format!("{size:.2}"),
+        size if size >= 0.01 => format!("{size:.3}"),
+        size if size > 0.0 => format!("{size:.1e}"),
+        _ => "0".to_owned(),
+    }
+}
+
+/// "95 % interval of Kx: ±0.01 % from the frequencies' uncertainty alone, ±1.3 % with the misfit", for non-dimensional
+/// stiffnesses and the material.
+fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
+    // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
+    const PERCENT_95: f64 = 196.0;
+    // The name as tables write it.
+    let name = match quantity.quantity {
+        Quantity::Kx => "Kx",
+        Quantity::Ky => "Ky",
+        other @ (Quantity::Modulus | Quantity::Density) => other.name(),
+        _ => return None,
+    };
+    let value = quantity.value.filter(|value| *value != 0.0)?;
+    let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
+    let own = two_digits(PERCENT_95 * std / value.abs());
+    let scaled = within(50.0 * (high - low) / value.abs());
+    Some(format!(
+        "95 % interval of {name}: \u{b1}{own} % from the frequencies' uncertainty alone, {scaled} with the misfit"
+    ))
+}
+
+/// Words for the half width (%) of an interval; one beyond the value itself determines nothing.
+fn within(percent: f64) -> String {
+    match percent > 100.0 {
+        true => "wider than \u{b1}100 %".to_owned(),
+        false => format!("\u{b1}{} %", two_digits(percent)),
+    }
+}
+
+/// A value at the end of its range, or an interval without an end.
+fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
+    let name = match quantity.quantity {
+        joint @ (Quantity::Kt | Quantity::Kr | Quantity::Coupling) => joint.name(),
+        _ => return None,
+    };
+    let limit = quantity.limit.map(|limit| match limit {
+        Limit::Rigid => format!("the best fit of {name} is rigid"),
+        Limit::Absent => format!("the best fit has no stiffness {name} at all"),
+        Limit::FullCoupling => "the coupling is as large as any joint can have it".to_owned(),
+    });
+    let only = [("least", quantity.at_least), ("most", quantity.at_most)];
+    let only = only.map(|(word, end)| {
+        end.map(|end| format!("the frequencies say only that {name} is at {word} {end:.4e} (95 %)"))
+    });
+    let parts: Vec<String> = limit
+        .into_iter()
+        .chain(only.into_iter().flatten())
+        .collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// Effects that estimate and prediction leave out. The pair regression stands beside the consistent
+/// estimate in every report, so that its limits are always listed.
+pub(super) fn neglected_effects(
+    test: &TestDescription,
+    structure: &TestedStructure,
+    method: EstimateMethod,
+) -> Vec<Warning> {
+    let consistent = method == EstimateMethod::Consistent;
+    let mut warnings = Vec::new();
+    warnings.extend(of_masses(test, structure, consistent));
+    warnings.extend(of_fastened(test, structure, consistent));
+    let joint = &test.joint;
+    // A lap joint off the middle by more than a thousandth of the length.
+    let off = joint
+        .position
+        .map(|position| (position - 0.5 * test.beam.length).abs());
+    let off_centre = off.is_some_and(|off| off > 1e-3 * test.beam.length);
+    // Effects that the pair regression cannot take into account: beside the consistent estimate, and without it.
+    let of_regression = [
+        (
+            structure.theory == BeamTheory::Timoshenko,
+            "the pair regression takes an Euler beam (no shear, no rotary inertia); the consistent \
+             estimate and the prediction include both",
+            "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
+             includes both, so that its errors show what that neglects",
+        ),
+        (
+            structure.known.any(),
+            "the pair regression cannot hold a stiffness at its known value and estimates all of \
+             them; the consistent estimate and the prediction use the known ones",
+            "the pair regression cannot hold a stiffness at its known value: it estimates all of \
+             them, and the prediction uses the known ones",
+        ),
+        (
+            joint.overlap.is_some() || joint.right.is_some() || off_centre,
+            "the pair regression takes two equal halves joined in the middle; the consistent estimate \
+             and the prediction take overlap, position and the right half's own properties into account",
+            "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
+             different properties of the right half are left out",
+        ),
+    ];
+    for (is_there, beside, alone) in of_regression {
+        if is_there && structure.regression.is_some() {
+            let text = if consistent { beside } else { alone };
+            warnings.push(Warning::neglected(text, true));
+        }
+    }
+    if consistent {
+        let texts = of_fit(test, structure).into_iter();
+        warnings.extend(texts.map(|text| Warning::neglected(text, false)));
+    } else if test.analysis.fit.is_some() || test.analysis.weights.is_some() {
+        let text = "`fit` and `weights` belong to the consistent estimate: the pair regression estimates all \
+                    stiffnesses of its model and weighs all pairs alike";
+        warnings.push(Warning::neglected(text, true));
+    }
+    warnings
+}
+
+/// Stiffnesses that `fit` leaves rigid, and weights without the uncertainties that they need.
+fn of_fit(test: &TestDescription, structure: &TestedStructure) -> Vec<String> {
+    let mut texts = Vec::new();
+    if let Some(fit) = &test.analysis.fit
+        && structure.regression.is_some()
+    {
+        let known = &structure.known;
+        let springs = [
+            (FitParameter::Kt, known.kx, "kt"),
+            (FitParameter::Kr, known.ky, "kr"),
+        ];
+        for (parameter, known, name) in springs {
+            if known.is_none() && !fit.contains(&parameter) {
+                texts.push(format!(
+                    "{name} is neither in `fit` nor stated in [joint], so the consistent estimate takes \
+                     it as rigid; state its value, or list it in `fit`"
+                ));
+            }
+        }
+    }
+    let unknown = test.measured.as_ref().is_some_and(|measured| {
+        measured.std.is_none() && measured.half_line.is_none() && measured.scatter.is_none()
+    });
+    if test.analysis.weights == Some(Weights::Measured) && unknown {
+        texts.push(
+            "weights = \"measured\" needs uncertainties and there are none: equal relative weights \
+             were taken, without intervals; state half_line, std or scatter in [measured]"
+                .to_owned(),
+        );
+    }
+    texts
+}
+
+/// The sensors' masses. A microphone loads nothing.
+fn of_masses(
+    test: &TestDescription,
+    structure: &TestedStructure,
+    consistent: bool,
+) -> Option<Warning> {
+    let mut loading: Vec<&SensorDescription> = test.sensors.iter().collect();
+    loading.retain(|sensor| sensor.kind != SensorKind::Sound);
+    let mass: f64 = loading.iter().filter_map(|sensor| sensor.mass).sum();
+    let what = "the mass of the sensors,";
+    let included = consistent && test.analysis.sensor_mass;
+    let mut loading = loading.iter();
+    let unplaced = loading.any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
+    let (effect, of_pairs) = match (included, unplaced, structure.regression) {
+        (true, true, _) => (
+            "is in the consistent estimate and the prediction only as far as the sensors' positions are known; \
+             state them",
+            false,
+        ),
+        (true, false, None) => (
+            "is in the prediction and the consistent estimate; the closed form beside it neglects it",
+            false,
+        ),
+        (true, false, Some(_)) => (
+            "is in the prediction and the consistent estimate; the pair regression neglects it",
+            true,
+        ),
+        (false, ..) => (
+            "is in neither the estimate nor the prediction; it lowers the measured frequencies and thereby what is \
+             estimated from them",
+            false,
+        ),
+    };
+    let text = weighed(what, mass, structure)? + effect;
+    Some(Warning::neglected(text, of_pairs))
+}
+
+/// Masses fastened in the reference configuration.
+fn of_fastened(
+    test: &TestDescription,
+    structure: &TestedStructure,
+    consistent: bool,
+) -> Option<Warning> {
+    let first = test.recordings.first()?;
+    let mass: f64 = first.masses.iter().map(|fastened| fastened.mass).sum();
+    let what = format!("what is fastened to the beam in {},", first.file.display());
+    let (effect, of_pairs) = match (consistent, structure.regression) {
+        (true, None) => (
+            "is in the prediction and the consistent estimate; the closed form beside it neglects it",
+            false,
+        ),
+        (true, Some(_)) => (
+            "is in the prediction and the consistent estimate; the pair regression beside it neglects it",
+            true,
+        ),
+        (false, _) => (
+            "is in neither the estimate nor the prediction; begin the description with a recording of the beam \
+             without it",
+            false,
+        ),
+    };
+    let text = weighed(&what, mass, structure)? + effect;
+    Some(Warning::neglected(text, of_pairs))
+}
+
+/// Names what loads the beam with its mass (kg), "15 g or 1.8 % of the beam, "; `None` without a mass.
+fn weighed(what: &str, mass: f64, structure: &TestedStructure) -> Option<String> {
+    let percent = 100.0 * mass / structure.beam.mass();
+    (mass > 0.0).then(|| format!("{what} {} g or {percent:.1} % of the beam, ", grams(mass)))
+}
+
+/// Returns a mass (kg) in grams with four significant digits, without trailing zeros.
+fn grams(mass: f64) -> f64 {
+    let grams = 1e3 * mass;
+    format!("{grams:.3e}").parse().unwrap_or(grams)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_one_is_not_many() {
+        let rejected = |rejected: usize| Warning::rejected_taps("a.wav", rejected, 5);
+        assert!(rejected(1).to_string().contains("1 of 5 taps was rejected"));
+        assert!(
+            rejected(2)
+                .to_string()
+                .contains("2 of 5 taps were rejected")
+        );
+        let unpaired = |count: usize| Warning::unpaired(count, "");
+        assert!(unpaired(1).to_string().starts_with("1 peak belongs to"));
+        assert!(unpaired(4).to_string().starts_with("4 peaks belong to"));
+    }
+
+    #[test]
+    fn regress_what_differs_in_recording_and_number_alone_is_one_warning() {
+        let rings = |file: &str, remaining| {
+            Warning::not_rung_down(file, remaining, Window::Exponential { decay: remaining })
+        };
+        let hum =
+            |file: &str, frequency| Warning::mains(file, frequency, PeakLabel::Mains(frequency));
+        let alone = Warning::about("a.wav", "single-tap", "only one tap was averaged");
+        let all = vec![
+            rings("a.wav", 0.04),
+            hum("a.wav", 50.0),
+            rings("b.wav", 0.10),
+            alone.clone(),
+            hum("b.wav", 150.0),
+            rings("c.wav", 0.05),
+        ];
+        let found = together(all);
+        assert_eq!(found.len(), 3, "{found:?}");
+        let text = found[0].to_string();
+        assert!(
+            text.starts_with("b.wav: ") && text.contains("10.0 %"),
+            "{text}"
+        );
+        assert!(text.contains("0.100 1/s"), "{text}");
+        assert!(
+            text.ends_with("(the same of a.wav: 4.0 %, c.wav: 5.0 %)"),
+            "{text}"
+        );
+        let text = found[1].to_string();
+        assert!(text.ends_with("(the same of b.wav: 150.00 Hz)"), "{text}");
+        assert_eq!(found[2], alone);
+    }
+
+    #[test]
+    fn regress_no_probability_is_nothing() {
+        assert_eq!(chance(0.0), "<0.001");
+        assert_eq!(chance(3e-7), "<0.001");
+        assert_eq!(chance(0.0042), "4.2e-3");
+    }
+
+    #[test]
+    fn regress_a_half_width_beyond_the_value_is_none() {
+        assert_eq!(within(8.8), "\u{b1}8.8 %");
+        assert_eq!(within(30659.0), "wider than \u{b1}100 %");
+    }
+
+    #[test]
+    fn val_masses_have_four_digits_and_none_that_nobody_stated() {
+        let cases = [
+            (0.015, "15"),
+            (0.0042, "4.2"),
+            (0.012_345_6, "12.35"),
+            (1.25, "1250"),
+            (1e-6, "0.001"),
+        ];
+        for (mass, words) in cases {
+            assert_eq!(grams(mass).to_string(), words);
+        }
+    }
+}

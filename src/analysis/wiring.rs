@@ -1,0 +1,358 @@
+//! From files and channels to measured recordings: described, bare, or with channels named on the command line.
+
+use super::frf::form_of_kind;
+use super::function_file::{FunctionSettings, measure_functions};
+use super::measurement::{MeasureError, MeasureSettings, Measurement, measure, of_recording};
+use super::recording_result::{
+    Conditions, Overview, RecordingResult, Response, close_ups, overview,
+};
+use super::warnings::Warning;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::Path;
+use tapjoint_description::{
+    ChannelPlace, ChannelRef, RecordingDescription, Scale, SensorKind, TestDescription,
+};
+use tapjoint_signal::recording::{
+    ReadSettings, Recording, RecordingError, open_frequency_responses,
+};
+use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
+
+/// Reasons for which an analysis stops.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// A recording could not be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A recording could not be measured.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// A description that does not fit its recordings. The message names file, line and key.
+    #[error("{0}")]
+    Description(String),
+}
+
+/// Opens and measures the recordings of a described test, `test_file`, which lie in `folder`.
+pub(super) fn measure_test(
+    test: &TestDescription,
+    folder: &Path,
+    test_file: &str,
+) -> Result<Vec<RecordingResult>, PipelineError> {
+    // In parallel, but collected in the description's order, so that of several errors the first is reported.
+    let recordings = test.recordings.par_iter();
+    let results: Vec<Result<_, _>> = recordings
+        .map(|recording| measure_described(test, recording, folder, test_file))
+        .collect();
+    results.into_iter().collect()
+}
+
+fn measure_described(
+    test: &TestDescription,
+    description: &RecordingDescription,
+    folder: &Path,
+    test_file: &str,
+) -> Result<RecordingResult, PipelineError> {
+    let path = folder.join(&description.file);
+    let file = description.file.display().to_string();
+    if let Some(form) = description.form {
+        let mut functions = open_frequency_responses(&path)?;
+        functions.file = file;
+        let mut sensor = description.sensor.clone();
+        if let ([one], None) = (test.sensors.as_slice(), &sensor) {
+            sensor = Some(one.name.clone());
+        }
+        let settings = FunctionSettings {
+            form: Some(form),
+            sensor,
+            band: description.band,
+            reading: test.analysis.reading,
+        };
+        let mut result = measure_functions(&functions, &settings)?;
+        result.conditions = conditions(test, description);
+        return Ok(result);
+    }
+    let read = ReadSettings {
+        sample_rate: description.sample_rate,
+    };
+    if test.sensors.is_empty() {
+        return Err(PipelineError::Description(format!(
+            "{test_file}: the recordings need at least one [[sensor]] with its channel, or there is no response to \
+             analyse"
+        )));
+    }
+    let mut recording = Recording::open(&path, &read)?;
+    let wiring = described_wiring(test, &mut recording, test_file)?;
+    let mut settings = MeasureSettings::new(wiring.source());
+    settings.band = description.band;
+    settings.block = description.block;
+    settings.window = test.analysis.window;
+    settings.reading = test.analysis.reading;
+    if wiring.hammer.is_some() {
+        // The hammer's force makes modal constants of the responses.
+        let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
+        settings.kinds = kinds.collect();
+    }
+    let finished = finish(recording.renamed(file), settings, &wiring);
+    let mut result = finished.map_err(|error| match error {
+        PipelineError::Measure(problem @ MeasureError::Spectral { .. }) => {
+            PipelineError::Description(format!("{test_file}:{}: {problem}", description.line))
+        }
+        other => other,
+    })?;
+    result.conditions = conditions(test, description);
+    for (channel, unit) in wiring.units() {
+        let info = result.channels.get_mut(channel);
+        if let Some(info) = info.filter(|info| info.unit.is_none()) {
+            info.unit.clone_from(unit);
+        }
+    }
+    Ok(result)
+}
+
+/// Finds and scales the described channels of a recording.
+fn described_wiring(
+    test: &TestDescription,
+    recording: &mut Recording,
+    test_file: &str,
+) -> Result<Wiring, PipelineError> {
+    let mut wiring = Wiring::default();
+    if let Some(hammer) = &test.hammer {
+        let found = channel(recording, &hammer.channel, hammer.scale);
+        wiring.hammer = Some(found.map_err(|problem| at(problem, test_file, &hammer.place))?);
+        wiring.hammer_unit = Some("N".to_string());
+    }
+    for sensor in &test.sensors {
+        let found = channel(recording, &sensor.channel, sensor.scale);
+        let channel = found.map_err(|problem| at(problem, test_file, &sensor.place))?;
+        let response = Response {
+            name: sensor.name.clone(),
+            kind: Some(sensor.kind),
+            unit: Some(si_unit(sensor.kind).to_string()),
+        };
+        wiring.responses.push((channel, response));
+    }
+    Ok(wiring)
+}
+
+/// The error about a channel, with its place in the description.
+fn at(problem: RecordingError, test_file: &str, place: &ChannelPlace) -> PipelineError {
+    let (line, key) = (place.line, &place.key);
+    PipelineError::Description(format!("{test_file}:{line}: `{key}`: {problem}"))
+}
+
+/// Circumstances of a recording, as described.
+fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
+    let (mut positions, mut masses) = (BTreeMap::new(), BTreeMap::new());
+    for sensor in &test.sensors {
+        if let Some(place) = description.place_of(sensor) {
+            positions.insert(sensor.name.clone(), place);
+        }
+        if let Some(mass) = sensor.mass {
+            masses.insert(sensor.name.clone(), mass);
+        }
+    }
+    Conditions {
+        tap: description.tap,
+        sensor_positions: positions,
+        sensor_masses: masses,
+        masses: description.masses.clone(),
+        torque: description.torque,
+        temperature: description.temperature,
+        date: description.date.clone(),
+    }
+}
+
+/// Measures a recording about which nothing is described: all channels but the hammer's are
+/// responses.
+///
+/// # Errors
+/// An unknown hammer channel; what [`measure`] meets.
+pub fn measure_bare(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+    adjust: impl FnOnce(&mut MeasureSettings),
+) -> Result<RecordingResult, PipelineError> {
+    let wiring = bare_wiring(&recording, hammer)?;
+    let mut settings = MeasureSettings::new(wiring.source());
+    adjust(&mut settings);
+    let mut result = finish(recording, settings, &wiring)?;
+    let mut names = result.responses.iter().map(|response| &response.name);
+    let forgotten = names.find(|name| {
+        let name = name.to_lowercase();
+        hammer.is_none() && (name.contains("hammer") || name.contains("force"))
+    });
+    if let Some(name) = forgotten {
+        let argument = match name.contains(char::is_whitespace) {
+            true => format!("\"{name}\""),
+            false => name.clone(),
+        };
+        let text = format!(
+            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
+             say --hammer {argument}: taps are then judged by their force, and there are frequency \
+             response functions"
+        );
+        let warning = Warning::about(&result.file, "hammer-channel", text);
+        result.measurement.warnings.push(warning);
+    }
+    Ok(result)
+}
+
+/// The channels of a bare recording, with the names and units that the file gives.
+fn bare_wiring(
+    recording: &Recording,
+    hammer: Option<&ChannelRef>,
+) -> Result<Wiring, RecordingError> {
+    let mut wiring = Wiring::default();
+    if let Some(reference) = hammer {
+        wiring.hammer = Some(channel_index(recording, reference)?);
+    }
+    for (channel, info) in recording.channels().iter().enumerate() {
+        if Some(channel) == wiring.hammer {
+            wiring.hammer_unit.clone_from(&info.unit);
+            continue;
+        }
+        let name = info.name.clone();
+        let response = Response {
+            name: name.unwrap_or_else(|| format!("channel {}", channel + 1)),
+            kind: None,
+            unit: info.unit.clone(),
+        };
+        wiring.responses.push((channel, response));
+    }
+    Ok(wiring)
+}
+
+/// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
+///
+/// # Errors
+/// An unknown hammer channel, an unreadable recording.
+pub fn inspect_bare(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+) -> Result<RecordingResult, PipelineError> {
+    let wiring = bare_wiring(&recording, hammer)?;
+    let source = wiring.source();
+    let taps = find_taps(&recording, &source, &TapSettings::default())?;
+    let warnings = of_recording(&recording, &source, &taps);
+    let measurement = Measurement {
+        taps,
+        spectra: None,
+        warnings,
+    };
+    let settings = MeasureSettings::new(source);
+    result(&recording, &settings, &wiring, measurement)
+}
+
+fn channel_index(recording: &Recording, reference: &ChannelRef) -> Result<usize, RecordingError> {
+    match reference {
+        ChannelRef::Number(number) => recording.channel_by_number(*number),
+        ChannelRef::Name(name) => recording.channel_by_name(name),
+    }
+}
+
+fn channel(
+    recording: &mut Recording,
+    reference: &ChannelRef,
+    scale: Option<Scale>,
+) -> Result<usize, RecordingError> {
+    let index = channel_index(recording, reference)?;
+    if let Some(scale) = scale {
+        let info = &recording.channels()[index];
+        let scale = match scale {
+            Scale::PerUnit(scale) => scale,
+            // What the header's unit made of the file is volts already, mV included.
+            Scale::PerVolt(scale) if info.unit.as_deref() == Some("V") => scale * info.scale,
+            Scale::PerVolt(scale) => scale,
+        };
+        recording.set_scale(index, scale)?;
+    }
+    Ok(index)
+}
+
+/// Measures a recording whose channels are known.
+pub(super) fn finish(
+    recording: Recording,
+    settings: MeasureSettings,
+    wiring: &Wiring,
+) -> Result<RecordingResult, PipelineError> {
+    let measurement = measure(&recording, &settings)?;
+    result(&recording, &settings, wiring, measurement)
+}
+
+fn result(
+    recording: &Recording,
+    settings: &MeasureSettings,
+    wiring: &Wiring,
+    measurement: Measurement,
+) -> Result<RecordingResult, PipelineError> {
+    let shown = settings.source.channels().first().copied().unwrap_or(0);
+    let spectra = measurement.spectra.as_ref();
+    let readings = spectra.map_or(0, |spectra| spectra.readings.len());
+    let responses = wiring.responses.iter();
+    let responses: Vec<Response> = responses.map(|(_, response)| response.clone()).collect();
+    // Without a hammer the unit that all responses have.
+    let common_unit = responses.first().and_then(|first| {
+        let same = responses.iter().all(|other| other.unit == first.unit);
+        first.unit.clone().filter(|_| same)
+    });
+    Ok(RecordingResult {
+        file: recording.name().to_string(),
+        format: recording.format(),
+        sample_rate: Some(recording.sample_rate()),
+        seconds: Some(recording.duration()),
+        channels: recording.channels().to_vec(),
+        has_hammer: wiring.hammer.is_some(),
+        conditions: Conditions::default(),
+        tap_unit: match wiring.hammer {
+            Some(_) => wiring.hammer_unit.clone(),
+            None => common_unit,
+        },
+        responses,
+        band: settings.band,
+        overview: Some(Overview {
+            close_ups: close_ups(recording, &settings.source, &measurement.taps)?,
+            ..overview(recording, shown)?
+        }),
+        measurement,
+        mode_numbers: vec![None; readings],
+    })
+}
+
+/// The SI unit of what a sensor senses.
+pub fn si_unit(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acceleration => "m/s2",
+        SensorKind::Velocity => "m/s",
+        SensorKind::Displacement => "m",
+        SensorKind::Sound => "Pa",
+    }
+}
+
+/// The channels of hammer and responses; the recording carries their scales already.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Wiring {
+    /// Channel of the hammer (0-based); `None` without one.
+    pub hammer: Option<usize>,
+    /// Unit of the force; `None` where it is not known.
+    pub hammer_unit: Option<String>,
+    /// Channels of the responses (0-based), each with what is known of it.
+    pub responses: Vec<(usize, Response)>,
+}
+
+impl Wiring {
+    /// The channels in which taps are searched.
+    pub(super) fn source(&self) -> TapSource {
+        let responses = self.responses.iter().map(|(channel, _)| *channel).collect();
+        match self.hammer {
+            Some(channel) => TapSource::Hammer { channel, responses },
+            None => TapSource::Responses(responses),
+        }
+    }
+
+    /// Every channel with its unit.
+    pub(super) fn units(&self) -> impl Iterator<Item = (usize, &Option<String>)> {
+        let responses = self.responses.iter();
+        let responses = responses.map(|(channel, response)| (*channel, &response.unit));
+        responses.chain(self.hammer.map(|hammer| (hammer, &self.hammer_unit)))
+    }
+}

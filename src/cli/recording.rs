@@ -1,0 +1,232 @@
+//! Bare files, without a description.
+//!
+//! `tapjoint inspect` shows the contents of recordings. `tapjoint spectrum` shows the averaged spectrum of one recording
+//! and its peaks. `run` and `frf` analyse bare files from here, too.
+
+use super::Outcome;
+use super::arguments::{RecordingArguments, SpectrumSettings, reading};
+use super::input::{check_file, file_name};
+use super::output::OutputFile;
+use super::terminal::Terminal;
+use anyhow::{bail, ensure};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use tapjoint::description::ReadBy;
+use tapjoint::pipeline::{
+    Analysis, FunctionSettings, inspect_bare, run_functions, run_recording, together,
+};
+use tapjoint::recording::{
+    RecordingError, is_universal_file, list_datasets, open_frequency_responses,
+};
+use tapjoint::report::{datasets_of, document_of, inspection_of, render_spectrum_picture};
+
+/// Analyses a recording, or the frequency response functions of a file without samples in time.
+///
+/// # Errors
+/// The file cannot be read, an option does not apply to functions, or the analysis is not possible.
+pub(super) fn analyse(
+    path: &Path,
+    recording: &RecordingArguments,
+    spectrum: &SpectrumSettings,
+    reading: ReadBy,
+) -> anyhow::Result<Analysis> {
+    let problem = match recording.open(path) {
+        Ok(opened) => {
+            let analysis = run_recording(opened, recording.hammer.as_ref(), |measure| {
+                spectrum.apply(measure);
+                measure.reading = reading;
+            });
+            return Ok(analysis?);
+        }
+        Err(problem) => problem,
+    };
+    // Only a file that is recognised as no time series is read again.
+    if !is_no_time_series(&problem) {
+        return Err(problem.into());
+    }
+    let mut functions = match (problem, open_frequency_responses(path)) {
+        (_, Ok(functions)) => functions,
+        // A universal file without samples may hold neither.
+        (problem @ RecordingError::NoTimeSeries { .. }, Err(_)) => return Err(problem.into()),
+        (_, Err(problem)) => return Err(problem.into()),
+    };
+    let time_options = [
+        ("--hammer", recording.hammer.is_some()),
+        ("--sample-rate", recording.sample_rate.is_some()),
+        ("--block", spectrum.block.is_some()),
+        ("--window", spectrum.window.is_some()),
+    ];
+    refuse_given(path, &time_options)?;
+    functions.file = file_name(path);
+    let settings = FunctionSettings {
+        band: spectrum.zoom,
+        reading,
+        ..FunctionSettings::default()
+    };
+    Ok(run_functions(&functions, &settings)?)
+}
+
+/// Returns true if a file holds frequency response functions and no samples in time.
+///
+/// # Errors
+/// The file can be read as neither.
+pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> anyhow::Result<bool> {
+    match arguments.open(path) {
+        Ok(_) => Ok(false),
+        Err(problem) if is_no_time_series(&problem) => Ok(true),
+        Err(problem) => Err(problem.into()),
+    }
+}
+
+/// Returns true if a file was recognised and holds no samples in time.
+fn is_no_time_series(problem: &RecordingError) -> bool {
+    matches!(
+        problem,
+        RecordingError::FrequencyColumn { .. } | RecordingError::NoTimeSeries { .. }
+    )
+}
+
+/// Refuses the first of these options that was given: they do not apply to functions.
+///
+/// # Errors
+/// One of them was given.
+pub(super) fn refuse_given(path: &Path, options: &[(&str, bool)]) -> anyhow::Result<()> {
+    match options.iter().find(|(_, given)| *given) {
+        Some((name, _)) => bail!(
+            "{}: holds frequency response functions, and {name} is for samples in time; leave it out",
+            path.display()
+        ),
+        None => Ok(()),
+    }
+}
+
+/// Most samples of a universal file that are read, over all its time series. Reading more takes too long
+/// for a quick look, so they are only listed.
+const MOST_SAMPLES: u64 = 50_000_000;
+
+/// Show the contents and the quality of recordings.
+///
+/// Lists channels, sample rate, length, clipping, offsets and taps.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  tapjoint inspect taps.wav --hammer 1")]
+pub(super) struct InspectArguments {
+    /// Recordings (WAV, CSV, UFF58). The datasets of universal files are listed as well
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Only list the datasets of universal files by their headers. This is fast for files of any size,
+    /// and automatic beyond 50 million samples
+    #[arg(long)]
+    headers: bool,
+    #[command(flatten)]
+    recording: RecordingArguments,
+}
+
+pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    for file in &arguments.files {
+        check_file(file)?;
+    }
+    let (mut recordings, mut datasets) = (Vec::new(), Vec::new());
+    for file in &arguments.files {
+        let shown = file.display();
+        if is_universal_file(file)? {
+            let listed = list_datasets(file)?;
+            if listed.functions().next().is_none() {
+                let found = listed.contents();
+                terminal.warn(&format!(
+                    "{shown}: holds no function (dataset 58), only {found}"
+                ));
+            }
+            datasets.extend(datasets_of(&file_name(file), &listed));
+            // By the headers; a file has at most one sample a byte.
+            let series = listed
+                .functions()
+                .filter(|(_, function)| function.is_time_series());
+            let samples = series
+                .map(|(dataset, function)| function.points.min(dataset.bytes))
+                .fold(0, u64::saturating_add);
+            if arguments.headers || samples == 0 {
+                continue;
+            }
+            if samples > MOST_SAMPLES {
+                terminal.warn(&format!(
+                    "{shown}: {samples} samples by the headers: only these are listed; `tapjoint spectrum` reads the file"
+                ));
+                continue;
+            }
+        } else {
+            ensure!(
+                !arguments.headers,
+                "{shown}: --headers lists the datasets of universal files, and this is none; leave --headers out"
+            );
+        }
+        let recording = arguments.recording.open(file)?;
+        recordings.push(inspect_bare(
+            recording,
+            arguments.recording.hammer.as_ref(),
+        )?);
+    }
+    let warnings: Vec<_> = recordings
+        .iter()
+        .flat_map(|found| found.measurement.warnings.clone())
+        .collect();
+    let found = recordings
+        .iter()
+        .any(|recording| !recording.measurement.taps.taps.is_empty());
+    let listed_only = recordings.is_empty() && !datasets.is_empty();
+    let mut document = inspection_of(&recordings, &together(warnings));
+    document.datasets = (!datasets.is_empty()).then_some(datasets);
+    terminal.answer(&document)?;
+    Ok(Outcome::of(found || listed_only))
+}
+
+/// Show the averaged spectrum of a recording and its peaks.
+///
+/// Each peak has the bounds that follow from the resolution. A block of N samples gives N/2.56 lines over the band. The line spacing is the resolution. Zero
+/// padding and interpolation do not improve it.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"
+)]
+pub(super) struct SpectrumArguments {
+    /// Recording (WAV, CSV, UFF58), or frequency response functions (UFF58, text)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    spectrum: SpectrumSettings,
+    /// Way of reading the frequencies
+    #[arg(long, value_name = "R", default_value = "fit", value_parser = reading())]
+    reading: ReadBy,
+    /// Draw the spectrum into this file (PNG, or SVG if its name ends in .svg)
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArguments,
+}
+
+pub(super) fn spectrum(
+    arguments: &SpectrumArguments,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
+    check_file(&arguments.file)?;
+    let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
+    let analysis = analyse(
+        &arguments.file,
+        &arguments.recording,
+        &arguments.spectrum,
+        arguments.reading,
+    )?;
+    let document = document_of(&analysis);
+    if let Some(file) = png {
+        let recording = analysis.recordings.first();
+        let picture = recording
+            .map(|recording| render_spectrum_picture(recording, file.picture_format()))
+            .transpose()?
+            .flatten();
+        match picture {
+            Some(bytes) => file.write(&bytes)?,
+            None => terminal.warn("no tap was accepted, so there is no spectrum to draw"),
+        }
+    }
+    terminal.answer(&document)?;
+    Ok(Outcome::of_analysis(&analysis))
+}

@@ -1,0 +1,459 @@
+//! The model in the document: the estimate, predicted beside measured frequencies, and the diagnosis of the gap.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::format::significant;
+use tapjoint_analysis::{Estimate, EstimateMethod, Identification};
+use tapjoint_beam::Beam;
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{
+    AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
+    LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
+};
+use tapjoint_identify::consistent::{ConsistentEstimate, Correlation, Limit, Quantity};
+use tapjoint_identify::{SingleMode, Uncertain};
+use tapjoint_numerics::stats::times;
+
+/// The joint, or the free beam's material.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct EstimateSection {
+    /// "consistent", "pairs", or "free-beam".
+    pub method: EstimateMethod,
+    /// Modes that entered.
+    pub modes_used: Vec<usize>,
+    /// Why the estimate is doubtful, if it is.
+    pub reason: Option<String>,
+    /// Kx, non-dimensional.
+    pub kx: Option<Uncertain>,
+    /// Ky, non-dimensional.
+    pub ky: Option<Uncertain>,
+    /// Kz, non-dimensional.
+    pub kz: Option<Uncertain>,
+    /// sqrt(Kx Ky)/Kz.
+    pub coupling: Option<Uncertain>,
+    /// Kt (N/m).
+    pub kt: Option<Uncertain>,
+    /// Kr (N m/rad).
+    pub kr: Option<Uncertain>,
+    /// Ktr (N/rad).
+    pub ktr: Option<Uncertain>,
+    /// Young's modulus (Pa).
+    pub modulus: Option<Uncertain>,
+    /// Density (kg/m3).
+    pub density: Option<Uncertain>,
+    /// The beam that belongs to the joint: as described but for what was estimated of it; null of a closed
+    /// form.
+    pub beam: Option<Beam>,
+    /// Covariance of ln Kx and ln Ky, of a consistent estimate with both; scaled by the misfit where no
+    /// uncertainty is stated.
+    pub log_covariance: Option<[[f64; 2]; 2]>,
+    /// Correlations between the parameters.
+    pub correlations: Vec<Correlation>,
+    /// Probability of a larger misfit if the model is right; null where nothing is left to test with.
+    pub goodness_of_fit: Option<f64>,
+    /// The misfit behind it; null of a closed form.
+    pub misfit: Option<MisfitSection>,
+    /// Combinations of parameters that the frequencies determine; null of a closed form.
+    pub identifiability: Option<IdentifiabilitySection>,
+    /// The pair regression.
+    pub pairs: Option<PairsSection>,
+    /// A free beam in closed form.
+    pub free_beam: Option<FreeBeamSection>,
+    /// Estimates from each mode alone: of a lap joint its Kx if antisymmetric or Ky if symmetric, of a free
+    /// beam its modulus; else empty.
+    pub single_modes: Vec<SingleMode>,
+}
+
+/// Values of the pair regression: non-dimensional those of its equations, with units those of the joint that they make.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct PairsSection {
+    /// Kx.
+    pub kx: Option<f64>,
+    /// Ky.
+    pub ky: Option<f64>,
+    /// Kz.
+    pub kz: Option<f64>,
+    /// Kt (N/m).
+    pub kt: Option<f64>,
+    /// Kr (N m/rad).
+    pub kr: Option<f64>,
+    /// Ktr (N/rad).
+    pub ktr: Option<f64>,
+    /// Product implied by the regression over the product of its own estimates, minus 1.
+    pub closure: Option<f64>,
+    /// Largest over smallest singular value of the regression, its columns scaled to 1.
+    pub condition: Option<f64>,
+}
+
+/// Fit of the model to the frequencies: the goodness of the estimate in percent and in words.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct MisfitSection {
+    /// Sum of squared residuals over their standard deviations; null without uncertainties.
+    pub chi_squared: Option<f64>,
+    /// Frequencies and priors less parameters.
+    pub degrees_of_freedom: usize,
+    /// Root-mean-square relative misfit of the frequencies (%).
+    pub rms_percent: f64,
+    /// The verdict in a sentence.
+    pub verdict: String,
+}
+
+/// Combinations of parameters that the frequencies determine, and those that they do not.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct IdentifiabilitySection {
+    /// Singular values of the Jacobian, descending: the inverse of each is the relative uncertainty of
+    /// one combination of the parameters.
+    pub singular_values: Vec<f64>,
+    /// Largest over smallest.
+    pub condition: Option<f64>,
+    /// Flat directions, dead parameters, parameters at the end of their range, in sentences.
+    pub statements: Vec<String>,
+}
+
+/// A free beam's material in closed form: either value alone, with the other as described.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct FreeBeamSection {
+    /// Young's modulus (Pa) at the described density.
+    pub modulus: f64,
+    /// Density (kg/m3) at the described modulus instead.
+    pub density: f64,
+}
+
+/// One measured mode beside its prediction, of which there is lambda alone without a beam. error_percent = 100 (predicted - measured)/measured.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct PredictionSection {
+    /// Mode number.
+    pub mode: usize,
+    /// Measured (Hz).
+    pub measured: Option<f64>,
+    /// Predicted (Hz).
+    pub predicted: Option<f64>,
+    /// Predicted, non-dimensional.
+    pub lambda: Option<f64>,
+    /// Error (%).
+    pub error_percent: Option<f64>,
+    /// True if the mode entered the estimate.
+    pub used: bool,
+}
+
+/// Returns the main estimate, with the closed form beside it.
+pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection> {
+    let closed = found.estimate.as_ref().map(|estimate| match estimate {
+        Estimate::Joint(joint) => {
+            let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
+            EstimateSection {
+                method: EstimateMethod::Pairs,
+                modes_used: joint.modes_used.clone(),
+                reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
+                kx: joint.kx,
+                ky: joint.ky,
+                kz: joint.kz,
+                coupling: joint.coupling,
+                kt: joint.kt,
+                kr: joint.kr,
+                ktr: joint.ktr,
+                pairs: Some(PairsSection {
+                    kx: joint.pairs.kx,
+                    ky: joint.pairs.ky,
+                    kz: joint.pairs.kz,
+                    kt: joint.kt.map(|kt| kt.value),
+                    kr: joint.kr.map(|kr| kr.value),
+                    ktr: joint.ktr.map(|ktr| ktr.value),
+                    closure: joint.pairs.closure,
+                    condition: Some(joint.pairs.condition),
+                }),
+                single_modes: joint.single_modes.clone(),
+                ..Default::default()
+            }
+        }
+        Estimate::FreeBeam(free) => EstimateSection {
+            method: EstimateMethod::FreeBeam,
+            modes_used: free.modes_used.clone(),
+            modulus: Some(free.modulus),
+            density: Some(free.density),
+            free_beam: Some(FreeBeamSection {
+                modulus: free.modulus.value,
+                density: free.density.value,
+            }),
+            single_modes: free
+                .per_mode
+                .iter()
+                .map(|&(mode, modulus)| SingleMode {
+                    mode,
+                    modulus: Some(modulus),
+                    ..Default::default()
+                })
+                .collect(),
+            ..Default::default()
+        },
+    });
+    let Some(consistent) = &found.consistent else {
+        return closed;
+    };
+    let closed = closed.unwrap_or_default();
+    Some(EstimateSection {
+        pairs: closed.pairs,
+        free_beam: closed.free_beam,
+        single_modes: closed.single_modes,
+        ..consistent_section(consistent)
+    })
+}
+
+/// The main estimate; what stands beside it is added by the caller.
+fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
+    let goodness = &found.goodness;
+    EstimateSection {
+        method: EstimateMethod::Consistent,
+        modes_used: found.modes_used.clone(),
+        reason: goodness.uncertainty_factor().map(|factor| {
+            format!(
+                "the model misses the frequencies by {} % rms; uncertainties that would allow \
+                     that are {} times the stated ones",
+                significant(100.0 * goodness.relative_misfit, 2),
+                times(factor)
+            )
+        }),
+        kx: value(found, Quantity::Kx),
+        ky: value(found, Quantity::Ky),
+        kz: value(found, Quantity::Kz),
+        coupling: value(found, Quantity::Coupling),
+        kt: value(found, Quantity::Kt),
+        kr: value(found, Quantity::Kr),
+        ktr: value(found, Quantity::Ktr),
+        modulus: asked(found, Quantity::Modulus),
+        density: asked(found, Quantity::Density),
+        correlations: found.correlations.clone(),
+        beam: Some(found.beam),
+        log_covariance: found.stiffness_covariance,
+        goodness_of_fit: goodness.probability,
+        misfit: Some(MisfitSection {
+            chi_squared: goodness.chi_squared,
+            degrees_of_freedom: goodness.degrees_of_freedom,
+            rms_percent: 100.0 * goodness.relative_misfit,
+            verdict: goodness.words(),
+        }),
+        identifiability: Some(identifiability(found)),
+        ..EstimateSection::default()
+    }
+}
+
+/// Returns the value of an estimated quantity. A rigid joint is infinite in the tables and null in JSON; a value at the
+/// edge of its range has no standard deviation.
+fn value(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
+    let quantity = found.quantity(quantity)?;
+    let rigid = quantity.limit == Some(Limit::Rigid) || quantity.value.is_none();
+    let spring = !matches!(
+        quantity.quantity,
+        Quantity::Coupling | Quantity::Kz | Quantity::Ktr
+    );
+    if quantity.value.is_none() && !spring {
+        return None;
+    }
+    let rigid = rigid && spring;
+    let scaled = quantity.scaled.filter(|_| !rigid);
+    Some(Uncertain {
+        value: quantity.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
+        std: quantity.std.filter(|_| !rigid),
+        low: quantity.low,
+        high: quantity.high,
+        std_scaled: quantity.std_scaled.filter(|_| !rigid),
+        low_scaled: scaled.map(|scaled| scaled.0),
+        high_scaled: scaled.map(|scaled| scaled.1),
+        at_least: quantity.at_least,
+        at_most: quantity.at_most,
+    })
+}
+
+/// Returns the value of a quantity that was asked for: a property with a tolerance is fitted along without that.
+fn asked(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
+    value(found, quantity).filter(|_| is_asked(found, quantity))
+}
+
+fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {
+    let mut parameters = found.fit.iter();
+    parameters.any(|parameter| parameter.name() == quantity.name())
+}
+
+fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
+    let report = &found.identifiability;
+    let dead = report
+        .dead
+        .iter()
+        .map(|parameter| format!("{} is felt by none of these frequencies", parameter.name()));
+    let limits = report.at_limit.iter().map(|(parameter, limit)| {
+        let end = match limit {
+            Limit::Rigid => "rigid",
+            Limit::Absent => "absent",
+            Limit::FullCoupling => "as large as any joint can have it",
+        };
+        format!("{} is at the end of its range: {end}", parameter.name())
+    });
+    // The uncertain properties of the beam that were fitted along.
+    let beam = [
+        (Quantity::Modulus, "Pa"),
+        (Quantity::Density, "kg/m3"),
+        (Quantity::Length, "m"),
+        (Quantity::Width, "m"),
+        (Quantity::Thickness, "m"),
+    ];
+    let along = beam
+        .iter()
+        .filter(|(quantity, _)| !is_asked(found, *quantity));
+    let along = along.filter_map(|(quantity, unit)| {
+        let value = found.quantity(*quantity)?.value?;
+        Some(format!(
+            "{} has a tolerance and was fitted along, to {value:.6e} {unit}",
+            quantity.name()
+        ))
+    });
+    let flat = report.flat.iter().map(|flat| flat.words.clone());
+    IdentifiabilitySection {
+        singular_values: report.singular_values.clone(),
+        condition: report.condition,
+        statements: flat.chain(dead).chain(limits).chain(along).collect(),
+    }
+}
+
+/// The gap between model and measurement.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct GapSection {
+    /// The answer.
+    pub verdict: Verdict,
+    /// Location of the gap, given that there is one; null without a diagnosis.
+    #[serde(rename = "where")]
+    pub place: Option<GapPlaceSection>,
+    /// All hypotheses, the most probable first.
+    pub hypotheses: Vec<HypothesisResult>,
+    /// Root mean square of the standard uncertainties of the fitted frequencies (%).
+    pub noise_floor: Option<f64>,
+    /// Probability of a misfit as large or larger, under the best hypothesis.
+    pub goodness_of_fit: Option<f64>,
+    /// Change of the joint when the best hypothesis is added.
+    pub joint_shift: Option<JointShift>,
+    /// Modes above this number took no part in the fit; null without a diagnosis.
+    pub fitted_modes: Option<usize>,
+    /// The described model without sensors that have a mass but no stated position; null where every position is
+    /// known.
+    pub unplaced: Option<UnlocatedSensors>,
+    /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
+    pub decided_by: Option<DecidedBy>,
+    /// Evidence of the decays alone for a joint whose stiffness depends on the amplitude, whatever the
+    /// verdict; null where no frequency changes along them.
+    pub along_decays: Option<AmplitudeDependence>,
+    /// Changes along the beam that would explain the residual of the nominal model.
+    pub map: Option<LocationMap>,
+    /// Two plain answers beside the diagnosis: nothing added, and one common factor.
+    pub baselines: Vec<BaselineSection>,
+    /// Tests that would tell more, those first that tell most for their effort.
+    pub next_test: Vec<NextTest>,
+    /// The model with what was found, to predict with; null where nothing predicts, and where the verdict is
+    /// "unknown".
+    pub updated_model: Option<UpdatedModelSection>,
+}
+
+/// Location of the gap.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct GapPlaceSection {
+    /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
+    pub probability: LocationProbabilities,
+    /// Every frequency's error.
+    pub modes: Vec<Residual>,
+    /// The readings that fit worst.
+    pub worst_block: Option<String>,
+}
+
+/// A plain answer to set the diagnosis against.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct BaselineSection {
+    /// "none" or "scale".
+    pub name: Baseline,
+    /// Errors of the fitted frequencies (%, rms).
+    pub gap_after: Option<f64>,
+    /// Errors of withheld frequencies (%, rms).
+    #[serde(rename = "withheld_after")]
+    pub holdout_after: Option<f64>,
+}
+
+/// Addition of a plain answer to the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Baseline {
+    /// Nothing.
+    None,
+    /// One common factor on all frequencies.
+    Scale,
+}
+
+/// A model brought up to date.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct UpdatedModelSection {
+    /// The hypothesis that it takes for true.
+    pub effect: String,
+    /// The file that holds it as a test description; null where none was written.
+    pub file: Option<String>,
+    /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
+    /// file gives the same.
+    pub frequencies: Vec<f64>,
+}
+
+/// Returns the section of a diagnosis, or of the reason why there is none.
+pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
+    let found = match diagnosis {
+        Ok(found) => found,
+        Err(error) => {
+            return GapSection {
+                verdict: Verdict::NotEnoughData(error.to_string()),
+                ..GapSection::default()
+            };
+        }
+    };
+    let scale = Hypothesis::Effects(vec![EffectId::Modulus]);
+    let plain = [(Baseline::None, Hypothesis::None), (Baseline::Scale, scale)];
+    let baselines = plain.into_iter().filter_map(|(name, hypothesis)| {
+        let mut all = found.hypotheses.iter();
+        let answer = all.find(|one| one.hypothesis == hypothesis)?;
+        Some(BaselineSection {
+            name,
+            gap_after: answer.gap_after,
+            holdout_after: answer.holdout_after,
+        })
+    });
+    GapSection {
+        verdict: found.verdict.clone(),
+        place: Some(GapPlaceSection {
+            probability: found.locations,
+            modes: found.residuals.clone(),
+            worst_block: found.blocks.first().map(|block| block.name.clone()),
+        }),
+        hypotheses: found.hypotheses.clone(),
+        noise_floor: Some(found.noise_floor),
+        goodness_of_fit: found.goodness_of_fit,
+        joint_shift: Some(found.joint_shift),
+        fitted_modes: Some(found.fitted_modes),
+        unplaced: found.unlocated.clone(),
+        decided_by: Some(found.decided_by),
+        along_decays: found.amplitude_dependence.clone(),
+        map: found.location_map.clone(),
+        baselines: baselines.collect(),
+        next_test: found.next_tests.clone(),
+        updated_model: None,
+    }
+}
+
+impl GapSection {
+    /// The result of a hypothesis.
+    pub fn result(&self, hypothesis: &Hypothesis) -> Option<&HypothesisResult> {
+        let mut all = self.hypotheses.iter();
+        all.find(|found| found.hypothesis == *hypothesis)
+    }
+
+    /// The result of the hypothesis that the verdict names; `None` where it names none or several.
+    pub fn named(&self) -> Option<&HypothesisResult> {
+        match self.verdict.hypotheses().as_slice() {
+            [one] => self.result(one),
+            _ if self.verdict == Verdict::NoGap => self.result(&Hypothesis::None),
+            _ => None,
+        }
+    }
+}

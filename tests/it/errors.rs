@@ -6,7 +6,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use tapjoint::description::*;
-use tapjoint::pipeline::run_recording;
+use tapjoint::pipeline::{IdentifySettings, run_recording, run_test};
 use tapjoint::quantity::{Dimension, QuantityError, STANDARD_GRAVITY, parse_quantity};
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::report::{document_of, render_json};
@@ -723,6 +723,18 @@ proptest! {
             render_json(&document_of(&analysis)).unwrap();
         }
     }
+}
+
+#[test]
+fn regress_a_limit_far_from_the_estimate_ends_without_a_panic() {
+    // Frequencies nearly equal, which no joint gives, with a scatter that allows everything.
+    let text = "[beam]\nlength = 0.417\nwidth = 0.0821\nthickness = 0.000459\nmodulus = 7.954e8\n\
+                density = 18978\n[joint]\nkind = \"cantilever\"\nbeam = \"timoshenko\"\n[measured]\n\
+                frequencies = [94.1049, 95.5388, 95.5698, 95.5699, 95.57]\nscatter = 0.126\n";
+    let test = TestDescription::parse(text, "test.toml").unwrap();
+    let settings = IdentifySettings::unperturbed();
+    let analysis = run_test(&test, (Path::new("."), "test.toml"), &settings).unwrap();
+    render_json(&document_of(&analysis)).unwrap();
 }
 
 #[test]

@@ -362,8 +362,10 @@ impl<'a> Profile<'a> {
             }
             // A straight profile is met at once; a flat one is walked in growing strides.
             let straight = offset * wanted / (wanted + far.excess).max(0.1 * wanted);
+            // Beyond an offset of 30 a tenth more is the longer stride.
             offset = (1.05 * straight)
-                .clamp(1.1 * offset, offset + 3.0)
+                .min(offset + 3.0)
+                .max(1.1 * offset)
                 .min(furthest);
             near = far;
         };

@@ -20,7 +20,7 @@ step() {
     "$@" || fail "$*"
 }
 
-# All that is missing is said at once, in one line, with what installs it.
+# Lists all missing tools at once, in one line, each with the command that installs it.
 require_tools() {
     local missing=()
     command -v cargo >/dev/null 2>&1 || missing+=("cargo (https://rustup.rs, or Debian packages rustc and cargo)")

@@ -216,7 +216,7 @@ class AbaqusDeck:
                 args = (length, modulus * a * b**3 / 12, density * a * b, shear)
                 stiffness, mass = (beam or element)(*args)
                 if shear:
-                    # ROTARY INERTIA = EXACT is what Abaqus takes for Timoshenko beams unless told otherwise.
+                    # ROTARY INERTIA = EXACT is what Abaqus takes for Timoshenko beams by default.
                     mass += np.diag([0, 1, 0, 1]) * density * a * b**3 / 12 * length / 2
                 rows = [row(near, W), row(near, THETA), row(far, W), row(far, THETA)]
                 k[np.ix_(rows, rows)] += stiffness

@@ -6,9 +6,9 @@
 
 Needs numpy and pyEMA (package sdypy-EMA). Five modes, accelerances from 0 to 700 Hz in closed form,
 without noise and with noise of 1e-3 and 1e-2 of the highest line. Times are the shortest of several
-runs, so that other work on the machine counts as little as possible; for pyEMA get_poles and
-select_closest_poles, told the true frequencies; for this crate the stabilisation diagram and the
-selection, told nothing. pyEMA's order 40 is 80 real coefficients, 40 poles in the band; here it is 40
+runs, so that other work on the machine counts as little as possible. For pyEMA they are those of
+get_poles and select_closest_poles, which gets the true frequencies. For this crate they are those of
+the stabilisation diagram and the selection, which gets no frequencies. pyEMA's order 40 is 80 real coefficients, 40 poles in the band; here it is 40
 complex ones, 40 poles in the band.
 """
 import contextlib

@@ -3,12 +3,12 @@
 
     scripts/compare_verdicts.py tests/golden/blind_check_190_seed18.csv NEW
 
-NEW, and what it is compared with, is a `cases.csv`, the folder of a blind check's results, its score.json (the
-cases.csv beside it is read as well), or a file as lies in tests/golden. Listed is each case whose verdict, named
-effects or first hypothesis differs, or whose probability differs by more than --tolerance; "near" marks those whose
-old or new probability lies within 0.01 of a threshold of src/diagnosis/settings.rs: 0.8, from which a name is given, and
-0.9, which the shortest list has to hold. Of two score.json the figures are compared too. The exit code is 1 where
-anything differs.
+Each of the two is a `cases.csv`, the folder of a blind check's results, its score.json, or a file such as those in
+tests/golden. Beside a score.json its cases.csv is read as well. The script lists each case whose verdict, named
+effects or first hypothesis differs, or whose probability differs by more than --tolerance. "near" marks cases whose
+old or new probability lies within 0.01 of a threshold of src/diagnosis/settings.rs. These are 0.8, from which a name
+is given, and 0.9, which the shortest list has to hold. The figures of two score.json are compared too. The exit code
+is 1 where anything differs.
 
     scripts/compare_verdicts.py --freeze RESULTS > tests/golden/NAME.csv
 

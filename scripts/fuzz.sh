@@ -2,11 +2,11 @@
 # Feeds random bytes, guided by coverage, to everything that reads: libFuzzer on the targets in fuzz/.
 #
 #   scripts/fuzz.sh                    each target for 10 s
-#   scripts/fuzz.sh SECONDS            each target for so long
+#   scripts/fuzz.sh SECONDS            each target for this time
 #   scripts/fuzz.sh SECONDS TARGET...  these targets: recording responses description truths identify chain
 #
-# An execution must end within 2 s and 300 MB without a panic. What does not is written to fuzz/artifacts, and
-# the script exits with 1. The corpus grows in fuzz/corpus. Needs a C++ compiler and Python 3 beside Rust.
+# An execution must end within 2 s and 300 MB without a panic. The bytes of one that fails are written to
+# fuzz/artifacts, beside the log of each target, and the script exits with 1. The corpus grows in fuzz/corpus. Needs a C++ compiler and Python 3 beside Rust.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

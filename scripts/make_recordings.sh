@@ -25,7 +25,7 @@ simulate() {
     printf '%s\n' "$folder/$name"
 }
 
-# The cantilever of Ingole & Chatterjee in two bands; sensor A weighs 24 g, which nobody wrote down.
+# The cantilever of Ingole & Chatterjee in two bands; sensor A weighs 24 g, which the description leaves out.
 simulate cantilever --seed 17 --kx 1400 --ky 4.8 --damping 1.2%,0.9%,0.5%,0.4% \
     --seconds 25.5 --with sensor-mass:mass=24g
 # The same beam on a joint with cross coupling, all masses written down.

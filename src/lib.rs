@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Each stage is a module that takes plain data and returns plain data. Measurement and theory never
-//! import each other; they meet in [`identify`]. The names below are the usual entry points, and the
-//! modules hold the rest. Symbols and sign conventions: [`notation`]. Sources: [`references`].
+//! import each other; they meet in [`description`] and [`pipeline`]. The names below are the usual entry
+//! points, and the modules hold the rest. Symbols and sign conventions: [`notation`]. Sources: [`references`].
 //!
 //! # Example
 //!

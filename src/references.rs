@@ -17,11 +17,11 @@
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
 //! - **Feldman & Cousins 1998**: "Unified approach to the classical statistical analysis of small
-//!   signals", Physical Review D 57, 3873-3889. Why the data must not choose between two ends and one.
+//!   signals", Physical Review D 57, 3873-3889. Limits for data that also choose between one end and two.
 //! - **Golub & Pereyra 1973**, SIAM Journal on Numerical Analysis 10, 413-432, and **Kaufman 1975**, BIT
 //!   15, 49-57. Variable projection: least squares whose linear unknowns are eliminated.
-//! - **Hausman 1978**: "Specification tests in econometrics", Econometrica 46, 1251-1271. Whether a smaller
-//!   model biases what a larger one estimates less precisely.
+//! - **Hausman 1978**: "Specification tests in econometrics", Econometrica 46, 1251-1271. Tests a precise
+//!   estimate of a smaller model for bias, by the less precise one of a larger model.
 //! - **DerSimonian & Laird 1986**, Controlled Clinical Trials 7, 177-188, and **Hartung & Knapp 2001**,
 //!   Statistics in Medicine 20, 3875-3889. Mean of values that scatter beyond their own uncertainty.
 //! - **Madsen, Nielsen & Tingleff 2004**: "Methods for Non-Linear Least Squares Problems",
@@ -35,7 +35,7 @@
 //! - **Peeters et al. 2004**: "The PolyMAX frequency-domain method: a new standard for modal parameter
 //!   estimation?", Shock and Vibration 11, 395-409. Stabilisation diagrams from one factorisation.
 //! - **Cauberghe 2004**: "Applied frequency-domain system identification in the field of experimental
-//!   and operational modal analysis", thesis, Vrije Universiteit Brussel. Which coefficient to fix.
+//!   and operational modal analysis", thesis, Vrije Universiteit Brussel. Choice of the fixed coefficient.
 //! - **Golub & Van Loan**: "Matrix Computations". The shifted QR algorithm.
 //! - **Parlett 1998**: "The Symmetric Eigenvalue Problem", SIAM. Rayleigh quotient iteration and its third order.
 //! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
@@ -45,9 +45,9 @@
 //! - **Box & Hill 1967**: "Discrimination among mechanistic models", Technometrics 9, 57-71. The experiment
 //!   whose outcomes the rival models predict furthest apart.
 //! - **Kolchinsky & Tracey 2017**: "Estimating mixture entropy with pairwise distances", Entropy 19, 361. Bounds
-//!   on what a reading tells about which of several distributions it came from.
-//! - **Cook & Weisberg 1982**: "Residuals and Influence in Regression", Chapman and Hall. What a fit without some
-//!   readings would predict of them.
+//!   on the information of a reading about the distribution that it came from.
+//! - **Cook & Weisberg 1982**: "Residuals and Influence in Regression", Chapman and Hall. Prediction of readings
+//!   by a fit without them.
 //! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
 //!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.
 //! - **Cowper 1966**: "The shear coefficient in Timoshenko's beam theory", Journal of Applied Mechanics 33, 335-340.
@@ -55,7 +55,7 @@
 //!   of Standards 87, 377-385. Scatter between groups beyond their own uncertainties.
 //! - **Smyth 2004**: "Linear models and empirical Bayes methods for assessing differential expression in
 //!   microarray experiments", Statistical Applications in Genetics and Molecular Biology 3, 3. Variances from
-//!   few repeats, drawn towards what they have in common.
+//!   few repeats, drawn towards their common value.
 //! - **Kass & Raftery 1995**: "Bayes factors", Journal of the American Statistical Association 90, 773-795.
 //! - **Sellke, Bayarri & Berger 2001**: "Calibration of p values for testing precise null hypotheses", The
 //!   American Statistician 55, 62-71. The highest odds against a hypothesis that a misfit gives.

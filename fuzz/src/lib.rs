@@ -1,6 +1,6 @@
 //! Functions that must end without a panic, whatever the bytes: one for each fuzz target.
 //!
-//! `scripts/fuzz.sh` builds and runs them. Each function also checks a promise of the code it calls.
+//! `scripts/fuzz.sh` builds and runs them. Most functions also check a promise of the code that they call.
 
 use std::cell::RefCell;
 use std::fs;
@@ -17,7 +17,7 @@ thread_local! {
     static FILE: RefCell<Option<PathBuf>> = const { RefCell::new(None) };
 }
 
-/// Puts bytes into a file and returns its path. The folder `/dev/shm` is in memory, where it exists.
+/// Puts bytes into a file and returns its path. The file lies in memory (`/dev/shm`) where the system has this folder.
 fn file_of(bytes: &[u8]) -> PathBuf {
     let path = FILE.with_borrow_mut(|file| {
         let name = format!("tapjoint-fuzz-{}", std::process::id());
@@ -29,7 +29,7 @@ fn file_of(bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Opens a recording and reads all of it. A header's promises do not count: there are no more samples than bytes.
+/// Opens a recording and reads all of it. Whatever the header states, there are no more samples than bytes.
 pub fn recording(bytes: &[u8]) {
     let settings = ReadSettings {
         sample_rate: Some(1000.0),
@@ -95,7 +95,7 @@ impl Numbers<'_> {
         low + self.next() * (high - low)
     }
 
-    /// A number whose logarithm is drawn evenly.
+    /// A number whose logarithm is spread evenly.
     fn log_between(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
@@ -109,7 +109,7 @@ impl Numbers<'_> {
     }
 }
 
-/// Estimates a joint from stated frequencies. Every number of the report is finite or null.
+/// Estimates a joint from stated frequencies, and writes the report.
 pub fn identify(bytes: &[u8]) {
     let mut numbers = Numbers(bytes);
     let kind = numbers.choice(&["cantilever", "lap", "free"]);

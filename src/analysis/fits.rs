@@ -1,8 +1,8 @@
 //! Modes fitted to the free decays or the response functions of one recording, beside its peak readings.
 //!
-//! Starts come from the peaks and from a polyreference fit over the band, which also sees modes that
-//! make no peak of their own. The fit itself is the maximum-likelihood one of [`fit_modes`]; a mode that
-//! only the polyreference fit proposes must be asked for by the data.
+//! Starts come from the peaks and from a polyreference fit over the band. That fit also sees modes without a peak of
+//! their own; such a mode is kept only if the data call for it. The fit itself is the maximum-likelihood one of
+//! [`fit_modes`].
 
 use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
@@ -206,8 +206,8 @@ impl Candidates<'_> {
         let Some((first, last)) = lines.first().zip(lines.last()) else {
             return;
         };
-        // A damped mode among others peaks beside its frequency, by its half-power width at most. What lies farther
-        // off is another mode, or none.
+        // A damped mode among others peaks beside its frequency, by its half-power width at most. A fit farther off
+        // belongs to another mode, or to none.
         let frequency = fit.frequency.value;
         let width = 2.0 * fit.damping_ratio.value * frequency;
         let reach = 2.0 * self.lines.half_line() + width;

@@ -337,8 +337,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Averages, and without a hammer also every tap's own transforms (their phases differ, so they
-    /// cannot be averaged), up to a bound on memory.
+    /// Returns the averages. Without a hammer it also returns every tap's own transforms, up to a bound on memory:
+    /// their phases differ, so that they cannot be averaged.
     fn averages(
         &self,
         window: Window,
@@ -363,8 +363,8 @@ impl<'a> Stage<'a> {
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
-                // Time zero is moved to the trigger: the slope that the quiet before it puts on the phase is no
-                // background that a fit of few lines could follow.
+                // Time zero is moved to the trigger. The quiet stretch before it tilts the phase, and a fit of few
+                // lines could not follow that tilt as a background.
                 let delay = tap.time - tap.record.start as f64 / rate;
                 for mut transform in responses {
                     for (line, value) in transform.iter_mut().enumerate() {
@@ -615,9 +615,9 @@ struct PulseWindow {
 /// The ringing of a filter ahead of a pulse lasts no longer than this (s), or eight samples.
 const AHEAD_OF_PULSE: f64 = 2e-3;
 
-/// The force window of a tap: from just before the trigger to the end of the pulse, and as long again
-/// for what the search for its end may have missed. Noise and offset of the hammer before and after
-/// would ripple through every quotient. `None` without a hammer.
+/// The force window of a tap, from just before the trigger to the end of the pulse. It goes on for as long again,
+/// since the search for that end may stop early. Noise and offset of the hammer before and after would ripple through
+/// every quotient. `None` without a hammer.
 fn pulse_window(tap: &Tap, sample_rate: f64) -> Option<PulseWindow> {
     let trigger = (tap.time * sample_rate).round() as u64;
     let pulse = tap.pulse_end?.saturating_sub(trigger).max(1) as usize;

@@ -33,8 +33,8 @@ const FREE_BEAM_RANGE: f64 = 0.2;
 /// of a usual bar.
 const FREE_BEAM_TOLERANCE: f64 = 0.04;
 
-/// Largest relative change of a frequency by another sensor position or tap level: 24 g at the end of a
-/// usual bar are 3 %, a joint that softens by 15 % at the hardest tap 4 %. Bending modes are farther
+/// Largest relative change of a frequency by another sensor position or tap level: 24 g at the end of a usual bar
+/// change it by 3 %. A joint that softens by 15 % at the hardest tap changes it by 4 %. Bending modes are farther
 /// apart.
 const OTHER_CONFIGURATION: f64 = 0.05;
 
@@ -255,11 +255,11 @@ fn number_in_order(modes: &mut [ModeResult]) {
     }
 }
 
-/// Returns the numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
-/// to it, within their half lines together and [`OTHER_CONFIGURATION`], and no reading serves two
-/// modes. A reading that lies nearer to a peak without a number is that peak's, if none is nearer to the peak: a torsion
-/// mode stays one where the sensor sits on a node of the bending mode beside it, and a bending mode that moved towards
-/// it stays that one.
+/// Returns the numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest to it,
+/// within their half lines together and [`OTHER_CONFIGURATION`]. No reading serves two modes. A reading that lies
+/// nearer to a peak without a number belongs to that peak, if none is nearer to the peak. So a torsion peak keeps its
+/// reading where the sensor sits on a node of the bending mode beside it. A bending mode that moved towards a torsion
+/// peak keeps its own reading too.
 fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
@@ -290,8 +290,8 @@ fn is_within(reading: &ModeReading, mode: &ModeResult, share: f64) -> bool {
 /// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
 const OF_ITS_LINE: f64 = 0.01;
 
-/// Returns true if a reading lies nearer to a peak without a number, one apart from this mode, than to the mode, and
-/// is the reading that shows the peak: the nearest to it of all readings.
+/// Returns true if a reading lies nearer to a peak without a number than to the mode, and is of all readings the
+/// nearest to that peak. The peak must be apart from this mode.
 fn is_of_another(
     reading: &ModeReading,
     mode: &ModeResult,
@@ -493,9 +493,9 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
 /// Peaks that a warning about the numbering lists.
 const MOST_CHANGES: usize = 4;
 
-/// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
-/// which these masses take the reference configuration's modes. Where that is not known they lose the numbers
-/// that their neighbours of the reference gave them: a heavy mass takes a mode to another's place.
+/// Numbers the readings of all recordings whose fastened masses differ from those of the first. The numbers follow
+/// from the frequencies to which these masses take the reference configuration's modes. Where those are not known,
+/// the readings lose the numbers of the nearest reference modes: a heavy mass takes a mode to another's place.
 fn pair_mass_loaded(
     recordings: &mut [RecordingResult],
     modes: &[ModeResult],
@@ -532,8 +532,8 @@ fn pair_mass_loaded(
     warnings
 }
 
-/// Frequencies (Hz) of the structure without and with the other masses, on the joint that the reference's
-/// frequencies have, else on the described one; `None` where the joint is not known.
+/// Frequencies (Hz) of the structure without and with the other masses. The joint is the one estimated from the
+/// reference's frequencies, else the described one; `None` where neither is known.
 fn frequencies(
     modes: &[ModeResult],
     structure: &TestedStructure,
@@ -552,7 +552,7 @@ fn frequencies(
                 Ok(modes.map(|mode| mode.frequency).collect())
             })
         }
-        // Of a joint that is known nothing is left to estimate.
+        // A known joint leaves nothing to estimate.
         Err(_) => {
             let joint = structure.known.over(None)?;
             there.map(|there| frequencies_of(&there, &joint, count))

@@ -76,7 +76,7 @@ pub fn read_elsewhere(mut modes: Vec<ObservedMode>) -> Configuration {
         band: None,
         covariance: independent(&modes),
         modes,
-        // What was stated is meant to be all.
+        // A stated uncertainty includes the common part.
         common: 0.0,
         extra_peaks: Vec::new(),
     }
@@ -106,7 +106,7 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
             .iter()
             .map(|&(number, reading)| ModeSeen::new(number, reading, seen_taps))
             .collect();
-        // What was not fitted tap by tap says the same at every level.
+        // A reading that was not fitted tap by tap is the same at every level.
         seen.retain(|seen| place == 0 || seen.is_of_taps());
         judge_scatter(&mut seen);
         let forces = taps.iter().filter_map(|&tap| peaks.get(tap).copied());
@@ -166,7 +166,7 @@ fn sensors(recording: &RecordingResult) -> Vec<ObservedSensor> {
     sensors
 }
 
-/// Resonances without a number, and mains lines. What is no resonance at all is left out.
+/// Resonances without a number, and mains lines. Peaks that are no resonance are left out.
 fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
     let mut peaks = Vec::new();
     let numbered = recording.readings().iter().zip(&recording.mode_numbers);

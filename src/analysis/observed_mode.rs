@@ -20,15 +20,17 @@ use tapjoint_signal::recording::ResponseForm;
 /// A 95 % bound over the standard uncertainty of a normal distribution.
 const BOUND: f64 = 1.96;
 
-/// Amplitude at which a decay's late end is read, over the largest (1), where it was followed further: a
-/// change with any power of the amplitude from 1/2 on is over there by two thirds, and beyond it
-/// noise and neighbours bend the curve.
+/// Amplitude at which a decay's late end is read, over the largest (1), where it was followed further. A change with
+/// a power of the amplitude of 1/2 or more is then over by two thirds. At smaller amplitudes noise and neighbours
+/// bend the curve.
 const LATE_SHARE: f64 = 0.1;
 
 /// Taps of one level in a recording.
 #[derive(Clone, Copy)]
 pub(super) struct SeenTaps<'a> {
+    /// The recording.
     pub recording: &'a RecordingResult,
+    /// Numbers of the taps, from 0.
     pub taps: &'a [usize],
     /// True if these are all taps of the recording.
     pub all: bool,
@@ -338,8 +340,8 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// From the taps' own values; `joint` is what a fit of all taps together says, where these are all
-    /// of them, and `inflation` what else its noise is known to be larger by.
+    /// Returns repeats from the taps' own values (tap, value, standard uncertainty). `joint` is the value of a fit of
+    /// all taps together, where these are all of them. `inflation` is a known factor (1) on the noise.
     pub fn new(
         taps: Vec<(usize, f64, f64)>,
         joint: Option<&FittedValue>,
@@ -386,7 +388,7 @@ impl Repeats {
     pub fn observed(&self) -> Observed {
         let taps = self.pairs();
         if let [(a, _), (b, _)] = taps[..] {
-            // Of two, the half difference is a bound worth keeping and no more.
+            // Half the difference of two values serves as a lower bound only.
             let std = self.by_noise.std.max(0.5 * (a - b).abs());
             return Observed {
                 std,
@@ -407,9 +409,9 @@ impl Repeats {
     }
 }
 
-/// Judges the frequencies' scatter over all modes together: what makes the structure differ between
-/// taps moves several modes a little, and is seen in their sum where it is not in each. Then every mode
-/// that scatters beyond its noise at all counts as scattered.
+/// Judges the frequencies' scatter over all modes together. A structure that differs between taps moves several modes
+/// a little; their sum shows it even if no single mode does. Then every mode that scatters beyond its noise at all
+/// counts as scattered.
 pub(super) fn judge_scatter(modes: &mut [ModeSeen<'_>]) {
     let sums = modes.iter().filter_map(|mode| mode.frequency.chi_squared());
     let (chi_squared, freedom) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));

@@ -232,7 +232,7 @@ mod tests {
         let lengths: Vec<usize> = forces.iter().map(|force| force.len()).collect();
         assert_eq!(lengths, [31, 32, 12, 47]);
         assert!((all[1].start + 0.002).abs() < 1e-12, "{}", all[1].start);
-        // Of both channels the same frames, each less its mean.
+        // Both channels show the same frames, each less its mean.
         assert_eq!(all[1].force, all[1].response);
         assert_eq!(forces[1][0], 48.0 - 49.5);
         let alone = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");

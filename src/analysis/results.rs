@@ -126,10 +126,9 @@ pub(super) fn between(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
 
 /// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.
 ///
-/// That with which the squares are as large as expected, sum f variance/(own + share^2) = sum f with f degrees of
-/// freedom each (in the manner of Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
-/// little, and one that stands still beside others that do not decides nothing by itself. 0 where there is no more
-/// than noise.
+/// It makes the squares as large as expected: sum f variance/(own + share^2) = sum f, with f degrees of freedom of
+/// each mode (after Paule & Mandel 1982, "Consensus values and weighting factors"). Coarsely read modes count little.
+/// One mode that stands still while others move decides nothing by itself. 0 where there is no more than noise.
 pub(super) fn common_share(all: &[BetweenRecordings]) -> f64 {
     let freedom: f64 = all.iter().map(|one| one.freedom as f64).sum();
     if all.is_empty() || squares(all, 0.0) <= freedom {

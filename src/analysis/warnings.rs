@@ -238,7 +238,7 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
     for text in found.quantities.iter().filter_map(open_end) {
         warnings.push(Warning::new("at-limit", text));
     }
-    // Of one parameter alone the open end says the same.
+    // With one parameter alone the open end already states this.
     let several = found.fit.len() > 1;
     for flat in found.identifiability.flat.iter().filter(|_| several) {
         warnings.push(Warning::new("flat-direction", flat.words.as_str()));
@@ -271,9 +271,9 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
     warnings
 }
 
-/// The largest misfit of a prediction that is beyond what a beam's stated dimensions usually leave open in its
-/// frequencies, and beyond three standard deviations of its reading. A coarse reading may miss by more than a sharp one
-/// and mean less.
+/// Returns a warning about the largest notable misfit of a prediction. A notable misfit exceeds the usual effect of a
+/// beam's stated dimensions on its frequencies, and three standard deviations of its reading. A coarse reading may
+/// miss by more than a sharp one and mean less.
 pub(super) fn of_prediction(
     prediction: &[PredictedMode],
     measured: &[MeasuredMode],

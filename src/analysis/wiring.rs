@@ -260,7 +260,7 @@ fn channel(
         let info = &recording.channels()[index];
         let scale = match scale {
             Scale::PerUnit(scale) => scale,
-            // What the header's unit made of the file is volts already, mV included.
+            // Where the header states volts, mV included, its own factor gives volts and is kept.
             Scale::PerVolt(scale) if info.unit.as_deref() == Some("V") => scale * info.scale,
             Scale::PerVolt(scale) => scale,
         };

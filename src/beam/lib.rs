@@ -14,7 +14,7 @@
 //! interface                either of both seen from the joint, with exact derivatives
 //! ```
 //!
-//! This module must not import anything about measurements.
+//! This crate must not depend on anything about measurements.
 
 pub mod beam;
 pub mod effects;
@@ -48,7 +48,7 @@ pub enum StructureError {
         quantity: &'static str,
         /// The value given (SI; non-dimensional for the joint of a beam).
         value: f64,
-        /// What it has to be, in words that continue the sentence.
+        /// Requirement that it breaks, in words that continue the sentence.
         rule: &'static str,
     },
     /// A joint whose compliance matrix is not positive definite: it would release energy.
@@ -78,7 +78,7 @@ pub enum StructureError {
         /// End of the structure (m).
         length: f64,
     },
-    /// More modes than a beam theory says anything about.
+    /// More modes than a beam theory holds for.
     #[error("{count} modes were asked for; at most {MODE_LIMIT} are computed")]
     TooManyModes {
         /// Number asked for.

@@ -1,11 +1,11 @@
 //! Files and folders that appear whole or not at all.
 //!
 //! A file is written under a temporary name in its own folder and renamed at the end. A report
-//! folder is filled in a temporary folder: if the report folder is new, that folder is renamed to
-//! it in one step; if it exists, the temporary one lies inside it and its files (also those in folders
-//! below it) are renamed one by one, each replacing its predecessor whole; files of other names stay, except leftovers that the
-//! caller names. The temporary file or folder is made before any work, which shows that writing will be
-//! possible; when the work fails, it is removed.
+//! folder is filled in a temporary folder. If the report folder is new, the temporary folder is renamed
+//! to it in one step. If it exists, the temporary folder lies inside it. Its files, also those in folders
+//! below it, are then renamed one by one, and each replaces its predecessor whole. Files of other names
+//! stay, except leftovers that the caller names. The temporary file or folder is made before any work,
+//! which shows that writing will be possible. When the work fails, it is removed.
 
 use super::overwrite::{CHECKSUMS, Files, carries_mark, checksum_list, signed};
 use anyhow::{anyhow, bail};
@@ -424,7 +424,7 @@ mod tests {
         }
         let output = OutputFolder::prepare(folder.path()).unwrap();
         output.add("report.json", NEW.as_bytes()).unwrap();
-        // Nobody, not even the system's owner, removes a file of the kernel's.
+        // Files of the kernel cannot be removed, not even by the system's owner.
         std::os::unix::fs::symlink("/proc", folder.path().join("kernel")).unwrap();
         let stale = ["old.png", "kernel/version", "kernel/uptime", "older.png"];
         let stale = stale.map(str::to_owned);

@@ -283,8 +283,8 @@ const DECK_HEAD: &str = ": beam with its joint, written by tapjoint";
 /// Bytes that are read at the beginning and at the end of a file.
 const LOOKED_AT: u64 = 4096;
 
-/// Returns the file's content with a mark of the program, where the format has a place for one and does not
-/// name the program yet: PNG, SVG and universal files.
+/// Returns the file's content with a mark of the program, for PNG, SVG and universal files. The other formats
+/// have no place for a mark, or name the program already.
 pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
     let (place, mark) = if bytes.starts_with(PNG) && bytes.len() > PNG_HEADER_END {
         (PNG_HEADER_END, PNG_SOFTWARE)
@@ -314,6 +314,7 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// | JSON | an object with a whole `version` and a list `warnings` |
 /// | CSV | names of the first columns |
 /// | TOML, manual page, deck | first comment |
+/// | list of checksums | its name, and the form of its lines |
 ///
 /// A file of any other format, and a file that cannot be read, counts as foreign.
 pub(super) fn is_made_here(path: &Path) -> bool {
@@ -491,7 +492,7 @@ mod tests {
         assert!(is_made_here(&folder.path().join(CHECKSUMS)));
         fs::write(&file, "RIFX").unwrap();
         assert!(!is_made_here(&file));
-        // What an earlier list names and a new one does not stays listed.
+        // A file that only the earlier list names stays listed.
         assert_eq!(checksum_list(&list, &[]).unwrap(), list);
     }
 }

@@ -1,8 +1,7 @@
 //! The test description, `test.toml`: one file describes one tested structure.
 //!
-//! [`TestDescription::parse`] takes text (the caller reads the file) and returns validated data in
-//! SI units, or a [`DescriptionError`] that names the line, the key, what is allowed and the
-//! nearest known key. It opens no files.
+//! [`TestDescription::parse`] takes text and returns validated data in SI units. It opens no files: the caller reads
+//! them. A [`DescriptionError`] names the line, the key, the allowed values and the nearest known key.
 
 mod keys;
 mod parse;

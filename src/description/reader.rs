@@ -1,5 +1,5 @@
-//! Typed access to the tables of a TOML text: every value knows its line and its key path, so
-//! that whatever is wrong with it can say where.
+//! Typed access to the tables of a TOML text. Every value knows its line and its key path, so that an error can state
+//! them.
 
 use super::keys::{self, KnownTable};
 use std::cell::RefCell;

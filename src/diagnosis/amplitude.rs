@@ -223,16 +223,16 @@ pub fn set_joint_motions(dataset: &mut Dataset, observations: &Observations, nom
 /// measured change where that is larger: a fifth, since several motions at once are reduced to one amplitude. A
 /// share of the measured change alone would give low data the larger weight (Peelle's puzzle).
 const CHANGE_MODEL: f64 = 0.2;
-/// Error with which the change is predicted that other modes cause, relative to the largest change of the
-/// joint's stiffness along a decay of the same recording: of a spring, and of friction. Steady motions are
-/// predicted to 6 and 13 % ([`JointLaw::change_among`]). In a dying motion sliders remember what a steady one makes
-/// them forget; on virtual tests (none of those that are scored) smaller shares than these refuted true slip.
+/// Error of the predicted change that other modes cause: of a spring, and of friction. It is relative to the largest
+/// change of the joint's stiffness along a decay of the same recording. Steady motions are predicted to 6 and 13 %
+/// ([`JointLaw::change_among`]). In a dying motion sliders remember what a steady one makes them forget; on virtual
+/// tests (none of those that are scored) smaller shares than these refuted true slip.
 const SHARED_MODEL: [f64; 2] = [0.15, 0.4];
 /// Fits of the law between which the uncertainty of the data takes up the error of its prediction.
 const LAW_FITS: usize = 2;
 
-/// Inflates the data by the errors of a law of the joint: a share of each predicted or measured change, and, where
-/// the law is detected, what every mode feels of the others.
+/// Inflates the data by the errors of a law of the joint. They are a share of each predicted or measured change and,
+/// where the law is detected, the error of the change that other modes cause.
 fn inflate_changes(dataset: &mut Dataset, models: &[ModalModel]) {
     let rows: Vec<usize> = dataset.slopes().collect();
     let own: Vec<Datum> = rows.iter().map(|&row| dataset.data[row]).collect();
@@ -285,10 +285,10 @@ fn inflate_shared(dataset: &mut Dataset, models: &[ModalModel], law: &JointLaw) 
         } else if observable.is_slope() {
             let arrangement = &dataset.arrangements[configuration];
             // A joint whose stiffness changes makes tones at sums and differences of the modes' frequencies, in
-            // proportion to the amplitudes of those that make them. A tone near a mode rings with it, and pulls its
-            // frequency by what the mode feels of the joint's change times the ratio of the initial amplitudes. Six modes
-            // make some hundred tones of the third order, so that one near each mode is assumed. Frequencies keep their
-            // own share: they are averages over whole decays.
+            // proportion to the amplitudes of these modes. A tone near a mode rings with it and pulls its frequency.
+            // The pull is the mode's share in the joint's change times the ratio of the initial amplitudes. Six modes
+            // make some hundred tones of the third order, so that one near each mode is assumed. Frequencies keep
+            // their own share: they are averages over whole decays.
             let motion = arrangement.joint_motion.as_ref();
             let ratio = motion.and_then(|motion| motion.others_over_own(mode));
             let tones = ratio.unwrap_or(1.0).max(1.0);

@@ -93,8 +93,8 @@ impl<'a> PairSearch<'a> {
         }
     }
 
-    /// Returns the pairs of one of the best effects with a second whose linearised models explain the data best, and
-    /// better than the first by `needed`; and how many were tried.
+    /// Returns how many pairs were tried, and the most promising ones: one of the best effects with a second. Their
+    /// linearised models lower the objective (1) of the best first effect by more than `needed`.
     fn screened(&self, needed: f64) -> (usize, Vec<Pair<'a>>) {
         let mut tasks: Vec<(&Candidate, &Candidate)> = Vec::new();
         for first in self.singles.iter().take(FIRST_EFFECTS) {
@@ -129,8 +129,8 @@ impl<'a> PairSearch<'a> {
         (tasks.len(), pairs.collect())
     }
 
-    /// Returns of all pairs those that explain the frequencies best, which count at first as uncertain as the best single
-    /// effect leaves them unexplained; and how many were tried.
+    /// Returns how many pairs were tried, and those of all that explain the frequencies best. At first the
+    /// frequencies count as uncertain as the best single effect leaves them unexplained.
     fn by_multi_start(&self) -> (usize, Vec<Pair<'a>>) {
         let singles = &self.singles;
         let left = singles
@@ -265,11 +265,11 @@ fn is_local(effect: &CandidateEffect) -> bool {
 
 /// Gives `unknown` the evidence of pairs that imitate it, and removes pairs of one kind.
 ///
-/// An unknown change may be spread over a part of the beam. Two changes at locations of their own imitate every
-/// such change, with as many parameters as its location, extent, mass and stiffness: it explains what they
-/// explain, and these data cannot separate them. So does one beside a fixture at a frequency of
-/// its choice, and the best two effects of any kind that miss the hold-out data by more than its noise. Two
-/// of the same kind are no hypothesis of their own: they are one way of being unknown.
+/// An unknown change may be spread over a part of the beam. Two changes at locations of their own imitate every such
+/// change, with as many parameters as its location, extent, mass and stiffness: it explains what they explain, and
+/// these data cannot separate them. So does one such change beside a fixture at any frequency. So do the best two
+/// effects of any kind, if they miss the hold-out data by more than its noise. Two of the same kind are no hypothesis
+/// of their own: they are one way of being unknown.
 fn compare_with_unknown(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     let pairs = candidates.iter().filter(|one| one.effects().len() > 1);
     let fits: Vec<&Fit> = pairs.map(|one| &one.fit).collect();

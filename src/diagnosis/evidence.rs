@@ -320,9 +320,9 @@ fn log_integral(size: &Size, from: f64, to: f64, log_likelihood: impl Fn(f64) ->
     log_sum(&pieces.collect::<Vec<_>>())
 }
 
-/// Returns what the profile of the likelihood over the size of a single effect adds to the evidence of its parabola.
-/// Only a size that is so badly known that the parabola need not hold has one; beside another effect, or at a
-/// fitted location, the parabola is taken.
+/// Returns the correction that the likelihood's profile over a single effect's size adds to the log evidence of its
+/// parabola. It is computed only for a poorly known size, where the parabola need not hold. Beside another effect, or
+/// at a fitted location, it is 0.
 pub fn profile_correction(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
     let [effect] = &forward.layout.effects[..] else {
         return 0.0;

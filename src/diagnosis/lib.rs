@@ -20,10 +20,11 @@
 //! ```
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
-//! Under each, the joint's stiffnesses and all nuisance parameters (the geometry's common scale, drift of the
-//! joint and temperature between set-ups, masses, inertias and positions of sensors, calibration) are fitted and
-//! integrated over. The uncertainty of the data comes from the measurement, never from a residual. This crate cannot
-//! reach the simulator, so that its answers to virtual tests are independent of it.
+//! Under each, the joint's stiffnesses and all nuisance parameters are fitted and integrated over. Nuisance
+//! parameters are the geometry's common scale, and drift of the joint and temperature between set-ups. So are masses,
+//! inertias and positions of sensors, and calibration. The uncertainty of the data comes from the measurement, never
+//! from a residual. This crate cannot reach the simulator, so that its answers to virtual tests are independent of
+//! it.
 
 mod amplitude;
 mod compare;

@@ -1,4 +1,4 @@
-//! What the observations of a test show before any model is fitted: up to which mode, which peaks belong to no
+//! Facts that the observations of a test show before any model is fitted: up to which mode, which peaks belong to no
 //! mode, and whether they show one structure at all.
 
 use crate::settings::{
@@ -302,7 +302,7 @@ impl UnpairedPeaks {
             (low, high) = (low.min(log), high.max(log));
         }
         let all = common_peaks(&searched);
-        // What a recording shows beside its modes and the common peaks, without mains and the like.
+        // Peaks of single recordings beside their modes and the common peaks, without mains and the like.
         let peaks = searched.iter().flat_map(|(_, one)| &one.extra_peaks);
         let peaks = peaks.filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()));
         let doubtful = peaks
@@ -429,7 +429,7 @@ mod tests {
         assert!((peaks.all[0].log - 183.35_f64.ln()).abs() < 1e-6);
         assert_eq!(peaks.all[0].constants.len(), 2);
         assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
-        // What one recording shows may be a fixture's all the same; what most show states where it is.
+        // A peak of one recording may still be a fixture's; a peak of most recordings states its frequency.
         let doubtful = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln()));
         assert_eq!(doubtful, [true, true, false, false, false]);
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.

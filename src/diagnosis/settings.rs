@@ -117,14 +117,14 @@ pub struct GapSettings {
     pub gain_std: f64,
     /// Scatter of the nominal damping ratios about a power of the frequency (natural logarithm): 0.4.
     pub damping_scatter: f64,
-    /// Standard deviation of that power: 0.5, so that damping proportional to the mass (air, cables), which falls
-    /// with the frequency, and to the stiffness, which rises with it, are both two standard deviations off.
+    /// Standard deviation of that power: 0.5. Damping proportional to the mass (air, cables) falls with the
+    /// frequency, and damping proportional to the stiffness rises with it. Both are then two standard deviations off.
     pub damping_tilt: f64,
     /// Standard deviation of the logarithm of the joint's stiffnesses about where the search begins:
     /// 1.5, a factor of 20 either way in 95 % of cases.
     pub joint_std: f64,
-    /// The highest mode that is compared: 10. Waves of higher ones are short beside the width of a joint, the height of a
-    /// sensor and the thickness of the beam, of which the model takes the first order only.
+    /// The highest mode that is compared: 10. Higher modes have waves that are short beside a joint's width, a
+    /// sensor's height and the beam's thickness. The model takes these to first order only.
     pub highest_mode: usize,
     /// Number of modes from which on the highest is held out: 6.
     pub withhold_from: usize,
@@ -198,7 +198,7 @@ impl Default for GapSettings {
 // Thresholds, each with its reason and its source. Step sizes, numbers of starts and the like stand beside their
 // algorithms.
 
-// What observations must show.
+// Requirements on observations.
 
 /// Ratio of the frequencies of one mode in two configurations beyond which they show two structures: a
 /// heavy sensor or a re-tightened joint moves a frequency by up to 15 %.
@@ -224,10 +224,9 @@ pub const NEAR_FIXTURE: f64 = 0.02;
 /// Level over the noise (dB) that a peak needs to be read, as the search for resonances requires by default.
 /// A level that is the height over the surroundings is smaller, hence on the safe side.
 pub const READABLE_LEVEL: f64 = 15.0;
-/// Level (dB) over the median mode of the beam at which a fixture's peak is read half of the time. At
-/// resonance the accelerance is the modal constant over twice the damping ratio. 60 to 80 dB lie between
-/// the strongest modes and the noise, a peak needs 15 dB, and a fixture is damped up to ten times as much as a
-/// beam: 40 to 60 dB are left.
+/// Level (dB) over the median mode of the beam at which a fixture's peak is read half of the time. At resonance the
+/// accelerance is the modal constant over twice the damping ratio. 60 to 80 dB lie between the strongest modes and
+/// the noise, and a peak needs 15 dB. A fixture is damped up to ten times as much as a beam: 40 to 60 dB are left.
 pub const FIXTURE_LEVEL: f64 = -50.0;
 /// Largest eigenvalue of a correlation matrix above which modes have a common scatter: unrelated modes are
 /// shrunk towards 1.

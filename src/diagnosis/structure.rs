@@ -468,8 +468,8 @@ impl ModalModel {
         self.rotation_sensitivity(index) * (log_stiffness(own) - log_stiffness(changes.mean))
     }
 
-    /// Returns derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary
-    /// inertia, by Rayleigh's quotient of a beam that has a little less of both.
+    /// Returns derivatives (1) of the frequencies' logarithms with respect to the relative size of shear and rotary
+    /// inertia. They follow from Rayleigh's quotient of a beam that has a little less of both.
     pub fn shear_slopes(&self, modes: usize) -> Option<Vec<f64>> {
         const STEP: f64 = 1e-3;
         let mut less = self.seen.specimen.clone();
@@ -540,7 +540,7 @@ pub fn joint_amplitude(
 /// Logarithms of the modal constants (1/kg) at the strongest sensor that decide whether a fixture's mode is read.
 #[derive(Debug, Clone, Copy)]
 pub struct FixtureStrength {
-    /// Of the fixture's own mode.
+    /// That of the fixture's own mode.
     pub own: f64,
     /// Median of the beam's modes.
     pub median: f64,

@@ -80,8 +80,9 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
     }
 }
 
-/// Returns what decided, by the likelihood ratio of the two best hypotheses at their optima, and by whether one had to
-/// give way. `unknown` has its own noise model, so that its likelihood is not comparable with the others.
+/// Returns what decided: data or priors. It follows from the likelihood ratio of the two best hypotheses at their
+/// optima, and from the refutation of a better one. `unknown` has its own noise model, so that its likelihood is not
+/// comparable with the others.
 fn decided_by(dataset: &Dataset, candidates: &[Candidate]) -> DecidedBy {
     let known: Vec<&Candidate> = candidates.iter().filter(|one| !one.is_unknown()).collect();
     let weights = known.iter().map(|one| one.log_weight());

@@ -290,9 +290,9 @@ impl HoldoutErrors {
 /// Returns the probability of errors on the hold-out data as large or larger if the hypothesis is true; `None` where
 /// there are no such data, or the hypothesis does not predict them.
 ///
-/// A hypothesis that `is_refuted` by the prediction linearised about the fit is tried again without that, and with
-/// every spread of the joint's drift, as probable as the fit has left it. The most probable spread is not the only one,
-/// and a drift multiplies an effect at the joint.
+/// The prediction is first linearised about the fit. If that prediction `is_refuted`, the hypothesis is tried again
+/// without linearisation, with every spread of the joint's drift at its probability in the fit. The most probable
+/// spread is not the only one, and a drift multiplies an effect at the joint.
 pub fn holdout_goodness(
     dataset: &Dataset,
     fit: &Fit,
@@ -316,8 +316,8 @@ pub fn holdout_goodness(
     Some(linearised.max(nonlinear))
 }
 
-/// Returns the probability of what the hold-out data add to the misfit when the same parameters have to explain them as
-/// well, with this spread of the joint's drift.
+/// Returns the probability of the misfit that the hold-out data add when the same parameters explain them too. The
+/// joint's drift has this spread.
 ///
 /// Twice the growth is chi square with as many degrees of freedom as there are hold-out data; for a linear model it is
 /// the quadratic form of [`HoldoutErrors::goodness`].

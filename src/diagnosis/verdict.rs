@@ -130,8 +130,8 @@ impl GoodnessOfFit {
     }
 
     /// Returns whether the hold-out data leave the hypothesis its name: it closes half of the gap, and some of it for
-    /// certain or predicts them within its uncertainty. If they cannot decide, closing some or predicting suffices, but
-    /// no named effect makes their errors much worse.
+    /// certain or predicts them within its uncertainty. If they cannot decide, closing some suffices, or predicting
+    /// without making their errors much worse.
     fn passes_holdout(&self) -> bool {
         let Some(closure) = self.closure else {
             return true;

@@ -207,8 +207,9 @@ impl Configuration {
     }
 }
 
-/// The share of its first amplitude at which a decay has the frequency that is fitted to all of it,
-/// where the frequency changes with this power p of the amplitude: (2/(2 + p))^(2/p).
+/// Share of its first amplitude (1) at which a decay has the frequency that is fitted to all of it.
+///
+/// It is (2/(2 + p))^(2/p), where the frequency changes with this power p of the amplitude.
 ///
 /// Least squares weigh the phase with e^{-2 sigma t}; a frequency change c e^{-p sigma t} then fits as
 /// cov(t, integral of c)/var(t) = c (2/(2 + p))^2. It is 0.41 to 0.5 for powers between 1/2 and 2, so

@@ -4,11 +4,10 @@
 //! term, a product of them. Subtracting the equations of every two modes removes that product;
 //! the differences are solved by least squares with the pseudo-inverse.
 //!
-//! The normal equations of all pair differences are n times those of the equations less their
-//! mean. What is computed here is therefore the same estimate from n rows instead of n(n-1)/2:
-//! ordinary least squares with the product as a free intercept. That the product is left free is
-//! also the method's weakness: an estimate need not satisfy its own frequency equation, and
-//! `closure` says by how much it does not.
+//! The normal equations of all pair differences are n times those of the equations less their mean. The estimate is
+//! therefore computed from n rows instead of n(n-1)/2: ordinary least squares with the product as a free intercept.
+//! That the product is left free is also the method's weakness: an estimate need not satisfy its own frequency
+//! equation, and `closure` is the relative error left there.
 
 use super::IdentifyError;
 use super::perturbation::Stiffnesses;

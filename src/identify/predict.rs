@@ -42,8 +42,8 @@ pub fn predict(
     Ok(compare(beam, &frequencies, measured, used))
 }
 
-/// Sets predicted frequencies (Hz) of modes 1, 2, ..., wherever they come from, beside the measured
-/// modes, of which those with numbers in `used` entered the estimate.
+/// Sets predicted frequencies (Hz) of modes 1, 2, ... beside the measured modes. Those with numbers in `used` entered
+/// the estimate.
 pub fn compare(
     beam: &Beam,
     predicted: &[f64],

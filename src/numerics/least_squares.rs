@@ -61,7 +61,7 @@ pub enum Linearised {
     Triangle(DMatrix<f64>),
 }
 
-/// When a search ends.
+/// Limits at which a search ends, and its damping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// At most so many accepted steps.

@@ -19,11 +19,10 @@ pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Ratio beyond which its size says nothing more.
+/// Largest ratio that is written with its size.
 const MOST_TIMES: f64 = 1000.0;
 
-/// A ratio of a size to its uncertainty as a text has it, "2.4" or "120": two digits below a hundred, and
-/// "more than 1000" where the uncertainty is next to nothing.
+/// Magnitude of a ratio (of a size to its uncertainty, say) in words: "0.25", "2.4", "120", or "more than 1000".
 pub fn times(ratio: f64) -> String {
     match ratio.abs() {
         size if size > MOST_TIMES => format!("more than {MOST_TIMES:.0}"),
@@ -61,7 +60,7 @@ pub mod student {
         (freedom + 1.0) / (freedom + residual * residual)
     }
 
-    /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any.
+    /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any, 0 where t is not finite.
     pub fn two_sided(t: f64, freedom: f64) -> f64 {
         if !t.is_finite() {
             return 0.0;

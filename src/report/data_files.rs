@@ -16,9 +16,9 @@ const PARAMETERS: &str =
 /// Heads of `modes.csv`.
 const MODES: &str = "mode,label,recording,method,frequency_Hz,std_Hz,line_frequency_Hz,half_line_Hz,\
      interpolated_frequency_Hz,interpolated_bound_Hz,damping,damping_std,lambda,coherence,random_error";
-/// Heads of `perturbation.csv`: `kind` is what was done to the frequencies, `percent` by how much
-/// where all were changed alike, `mode` which one where one was changed alone, `statistic` what of the
-/// estimates the three numbers are.
+/// Heads of `perturbation.csv`. `kind` names the change of the frequencies. `percent` is its size where all
+/// were changed alike, and `mode` the mode that was changed alone. `statistic` says how `kx`, `ky` and `kz`
+/// (values without unit, or percent) follow from the estimates.
 const PERTURBATION: &str = "method,kind,percent,mode,statistic,kx,ky,kz";
 /// Heads of the table of frequency response functions.
 const FUNCTIONS: &str = "recording,response,form,unit,frequency_Hz,h1_real,h1_imaginary,h2_real,h2_imaginary,\
@@ -26,8 +26,8 @@ const FUNCTIONS: &str = "recording,response,form,unit,frequency_Hz,h1_real,h1_im
 
 /// Returns `parameters.csv`: one row for each parameter and method; only its header without an estimate.
 ///
-/// The estimate's own values come first, then those of the pair regression and of the free beam's closed form where
-/// the estimate is by another method.
+/// The estimate's own values come first. Those of the pair regression and of the free beam's closed form follow,
+/// where the estimate is by another method.
 ///
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.

@@ -252,7 +252,7 @@ fn at_place_together(value: f64, other: f64, place: i32) -> (String, String) {
     let largest = value.abs().max(other.abs());
     let step = 10f64.powi(place);
     let written = if largest >= PLAIN_LARGEST || step < PLAIN_SMALLEST {
-        // Of the rounded number, so that 9.9999e9 becomes 1.000e10 and 9.7e9 stays.
+        // The exponent is that of the rounded number: 9.9999e9 becomes 1.000e10, and 9.7e9 stays.
         let exponent = last_place((largest / step).round() * step, 12) + 11;
         let decimals = (exponent - place).max(0) as usize;
         [value, other].map(|number| {

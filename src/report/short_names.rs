@@ -7,9 +7,11 @@ const LEFT_OUT: char = '\u{2026}';
 /// Shortest a name becomes (characters).
 const SHORTEST: usize = 4;
 
-/// Returns names in ways that take less and less room: as they are, without the folder and the ending
-/// that all share, without the words that all begin and end with, and at last without their middles. A way
-/// in which two names would be the same is left out.
+/// Returns names in ways that take less and less room.
+///
+/// First they are as given, then without the folder and the ending that all share. Next they lack the words
+/// that all begin and end with, and at last their middles. A way in which two names would be the same is left
+/// out.
 pub fn ways(names: &[String]) -> Vec<Vec<String>> {
     let without_folder = without_shared(names, |name| {
         name.split_at(name.rfind(['/', '\\']).map_or(0, |at| at + 1))
@@ -119,7 +121,7 @@ fn middle_out(name: &str, width: usize) -> String {
     if letters.len() <= width {
         return name.to_owned();
     }
-    // What all share is left out already, and the end tells most: "\u{2026}00001" and not "\u{2026}0\u{2026}1".
+    // The words that all share are left out already, and the end differs most: "\u{2026}00001" and not "\u{2026}0\u{2026}1".
     if letters.first() == Some(&LEFT_OUT) && letters.last() != Some(&LEFT_OUT) {
         let end = letters.iter().skip(letters.len() + 1 - width.max(1));
         return std::iter::once(&LEFT_OUT).chain(end).collect();

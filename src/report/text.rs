@@ -259,9 +259,16 @@ struct Shown {
     width: usize,
 }
 
-/// Returns a table with its caption, in 80 columns. Heads go to two lines where one has no room, names of files
-/// are shortened so that they stay apart, columns that can be had elsewhere are left out, then words that do
-/// not fit go on below, and at last columns do. Numbers are never cut.
+/// Returns a table with its caption, in 80 columns.
+///
+/// Where it has no room, these steps follow each other until it fits:
+/// 1. Heads go to two lines.
+/// 2. Names of files are shortened, and still differ from each other.
+/// 3. Columns that other outputs show are left out.
+/// 4. Words go on below.
+/// 5. Columns go on below.
+///
+/// Numbers are never cut.
 pub fn render_table(table: &Table) -> String {
     let Layout {
         table,

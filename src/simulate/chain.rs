@@ -73,7 +73,7 @@ struct Disturbance {
     mains_step: f64,
 }
 
-/// The rates of a channel (Hz): of the simulation, and of the file in true seconds.
+/// Rate of the file (Hz, in true seconds), and steps of the simulation for each of its samples.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rates {
     pub(super) factor: usize,

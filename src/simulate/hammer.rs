@@ -32,15 +32,15 @@ pub struct Tap {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TapKind {
-    /// Once.
+    /// One hit at full strength.
     Clean,
-    /// Far too weakly.
+    /// A hit that is far too weak.
     Weak,
-    /// A second time.
+    /// Two hits.
     Double {
-        /// After so long (s).
+        /// Time from the first hit to the second (s).
         delay: f64,
-        /// With this share of the first peak (1).
+        /// Peak of the second hit over that of the first (1).
         ratio: f64,
     },
 }

@@ -207,7 +207,7 @@ pub enum SimulateError {
         /// Keys to add.
         keys: &'static str,
     },
-    /// A reading bias needs no simulator.
+    /// The effect `resolution`: a bias of reading, which no recording contains.
     #[error(
         "`resolution` is a bias of reading frequencies, which no recording contains; plant it in [measured]"
     )]
@@ -242,7 +242,7 @@ pub enum SimulateError {
         /// Rate that is needed (Hz).
         needed: f64,
     },
-    /// A number of the laboratory that cannot be.
+    /// A setting of the laboratory outside its range.
     #[error("{quantity} is {value}, but must be {allowed}")]
     Setting {
         /// Name of the number.

@@ -13,7 +13,7 @@ use tapjoint_description::{coupling, described_beam, described_specimen};
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
 /// them has fallen with the cube of their number.
 const COMPLIANT_MODES: usize = 24;
-/// More modes say nothing about a beam of which 200 elements are made.
+/// Most modes: of 200 elements a higher mode is not exact.
 const MOST_MODES: usize = 100;
 /// A mode that is damped more follows like a spring.
 const MOST_DAMPING: f64 = 0.9;
@@ -119,7 +119,7 @@ impl ObservedStructure {
         modes.map(|mode| mode.frequency)
     }
 
-    /// Returns the response to a strike at a position (m).
+    /// Returns shapes and compliances of the place at a position (m), as a strike there meets them.
     pub fn struck(&self, position: f64) -> StruckPlace {
         let (modes, moving) = (&self.modes, self.reduced.modes.len());
         let to_sensors = self.sensors.iter().map(|&x| {

@@ -405,8 +405,8 @@ fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
 
 /// Refuses effects that would change nothing or that no recording contains: the truth would not be true.
 ///
-/// It also refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would then be
-/// simulated is not what the ratio says.
+/// It also refuses a joint whose slope 1 + c (p + 1) a^p falls below [`LEAST_SLOPE`] before the hardest tap's
+/// rotation a. There the simulated moment leaves the planted law.
 fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), SimulateError> {
     let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
     if planted.contains(&EffectId::Resolution) {

@@ -38,7 +38,7 @@ pub struct RecordingPlan {
     pub sample_rate: u32,
     /// Samples per channel.
     pub frames: u64,
-    /// Factor on a true frequency when the file is read: the clock's error.
+    /// Factor on a true frequency when the file is read (1): the clock's error and a planted error of the time base.
     pub frequency_scale: f64,
     /// Channels in the order of the file, each with its SI units per unit of the file. Responses come
     /// in the order of the structure's sensors.

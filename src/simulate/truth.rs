@@ -1,4 +1,4 @@
-//! The truth about a virtual test, to be kept from whoever diagnoses it.
+//! The truth about a virtual test, which its diagnosis must not see.
 
 use super::hammer::Tap;
 use super::laboratory::Laboratory;

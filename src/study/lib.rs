@@ -1,6 +1,6 @@
-//! Studies that need both sides: the published paper's tables beside ours, the blind check, what
-//! a planned test could tell apart, and what the spectral resolution of a virtual test does to the
-//! stiffness estimated from it.
+//! Studies that need both simulator and chain: the published paper's tables beside ours, the blind check, and the
+//! effects that a planned test could tell apart. Also the error that a virtual test's spectral resolution causes in
+//! the stiffness, and a described model updated by a diagnosis.
 
 pub mod blind_check;
 

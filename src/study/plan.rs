@@ -19,8 +19,8 @@ use tapjoint_diagnosis::{
     observe,
 };
 
-/// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
-/// 1 % level, (2.576 + 1.282)^2.
+/// Non-centrality of chi square (one degree of freedom) that the 1 % level notices nine times out of ten:
+/// (2.576 + 1.282)^2.
 pub(super) const NOTICED: f64 = 14.9;
 
 /// Settings for the judgement of a plan.
@@ -165,7 +165,7 @@ pub(super) fn plan_of(
         modes: settings.modes,
         taps: settings.taps,
         frequency_std: settings.frequency_std,
-        // What fits of calibrated sensors reach: 3 % of the largest constant, 3 % of the damping.
+        // Fits of calibrated sensors reach 3 % of the largest constant, and 3 % of the damping.
         shape_std: test.hammer.is_some().then_some(0.03),
         damping_std: Some(0.03),
         // A decay is followed over two e-folds with the accuracy of the frequency itself.

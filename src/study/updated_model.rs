@@ -20,11 +20,11 @@ pub struct UpdatedModel {
     pub text: String,
 }
 
-/// Reason for which there is no such structure, or no effect that is described with it.
+/// Reason for which a described structure, or an effect described with it, cannot exist.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}{cause}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
 pub struct DescribedEffectError {
-    /// Line of the effect's table; `None` where there is no such structure without effects either.
+    /// Line of the effect's table; `None` where the structure without effects cannot exist either.
     pub line: Option<usize>,
     /// The fault.
     pub cause: EffectCause,
@@ -247,12 +247,12 @@ pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, Describe
     Ok(effects)
 }
 
-/// The lowest natural frequencies (Hz), as they would be read, of a described structure with the effects that
-/// it describes and with its sensors on it.
+/// Returns the lowest `count` natural frequencies (Hz) of a described structure, as they would be read. Its described
+/// effects and its sensors count.
 ///
 /// # Errors
-/// The first effect that there is not or that the structure cannot have, or what is wrong with the structure
-/// itself.
+/// [`DescribedEffectError`]: the first effect that does not exist or that the structure cannot have, or a fault of
+/// the structure itself.
 pub fn described_frequencies(
     test: &TestDescription,
     count: usize,
@@ -261,8 +261,8 @@ pub fn described_frequencies(
     Ok(frequencies.into_iter().map(|one| seen.read(one)).collect())
 }
 
-/// A described structure with the effects that it describes and with its sensors on it, and the lowest natural
-/// frequencies (Hz) that it has, however they would be read.
+/// Returns a described structure with its described effects and its sensors, and its lowest `count` natural
+/// frequencies (Hz). These are the structure's own, before any effect of the acquisition.
 ///
 /// # Errors
 /// As [`described_frequencies`].

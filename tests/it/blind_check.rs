@@ -281,7 +281,7 @@ fn regress_parameters_of_two_effects_find_their_owner() {
             .len(),
         1
     );
-    // What lies outside the catalogue may have a mass too.
+    // A fault outside the catalogue may have a mass too.
     let outside =
         r#"[{"name": "a", "effects": ["sensor-mass", "loose-screw"], "params": {"mass": 0.01}}]"#;
     let truth = &parse_truths(outside).unwrap().truths[0];

@@ -98,7 +98,7 @@ fn limit_what_a_test_can_show_is_said_of_what_was_planted() {
         }
     }
     assert_eq!(detectable.len(), GROUPS.len());
-    // Of a dozen effects from small to large, some but not all are seen by one recording.
+    // One recording shows some, but not all, of a dozen effects from small to large.
     assert!(detectable.contains(&true) && detectable.contains(&false));
 }
 
@@ -137,7 +137,7 @@ fn prop_kept_tests_are_what_was_sealed_and_score_the_same_again() {
         let text = fs::read_to_string(folder.path().join(out).join("cases.csv")).unwrap();
         text.lines().nth(1).unwrap().to_owned()
     };
-    // Whether the effect could be noticed is written too, and read again.
+    // Detectability of the effect is written too, and read again.
     assert!(truth.contains("\"detectable\":"), "{truth}");
     assert_eq!(cases("blind-check"), cases("again"));
 }

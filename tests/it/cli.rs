@@ -936,7 +936,7 @@ fn val_identify_from_the_frequencies_of_table_4() {
     // Worked out independently, to these digits; the paper rounds its lambdas and has 969.8, 1.272.
     assert!((kx - 970.5).abs() < 0.1, "Kx {kx}");
     assert!((ky - 1.251).abs() < 1e-3, "Ky {ky}");
-    // Nothing was said about how well the frequencies were read.
+    // No uncertainty of the frequencies was stated.
     assert_eq!(document["estimate"]["kx"]["std"], Value::Null);
     let used: Vec<bool> = document["prediction"]
         .as_array()

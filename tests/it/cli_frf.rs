@@ -290,8 +290,8 @@ fn limit_without_taps_there_is_no_function() {
     assert_eq!(names(folder.path()), ["q.wav"]);
 }
 
-/// What `frf` writes it reads, and a report of it shows its curves: the picture of a file's functions is that of the
-/// functions themselves.
+/// A file that `frf` wrote is read again, and a report of it shows its curves: the picture of a file's functions is
+/// that of the functions themselves.
 #[test]
 fn regress_a_file_of_functions_has_its_curves() {
     let folder = bare(3);

@@ -125,7 +125,7 @@ fn regress_a_nastran_deck_chooses_the_set_that_holds_a_rigid_joint() {
         let test = described(&text, &[17.8, 121.7, 355.4]);
         let source = source_of(&test, &analysed(&test)).unwrap();
         let deck = render_nastran(&deck_of("rigid", &source).unwrap());
-        // What the case control, above the bulk data, does not name has no effect.
+        // A constraint set that the case control, above the bulk data, does not name has no effect.
         let (control, bulk) = deck.split_once("BEGIN BULK").unwrap();
         let sets = bulk.lines().filter(|line| line.starts_with("SPC1,1,"));
         (control.contains("SPC = 1\n"), sets.count())

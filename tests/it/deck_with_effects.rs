@@ -94,7 +94,7 @@ impl Matrices {
     }
 
     fn add_springs(&mut self, joint: &DeckJoint) {
-        // What is tied is held by a spring a thousand times as stiff as an element.
+        // A tied point is held by a spring a thousand times as stiff as an element.
         const TIED: f64 = 1e13;
         let other = |k: usize| joint.other.map(|other| 2 * other + k);
         for (k, stiffness) in [joint.translation, joint.rotation].into_iter().enumerate() {

@@ -662,7 +662,7 @@ fn regress_outputs_that_cannot_be_written_are_found_out_before_any_work() {
 
 #[test]
 fn regress_sample_rates_beyond_reason_end_in_words() {
-    // A time column may have any step; whatever rate follows, the program answers or refuses.
+    // A time column may have any step; at every rate the program answers or refuses.
     for step in ["1e-300", "1e-25", "1e-9", "1e3", "1e12", "1e200"] {
         let folder = tempfile::tempdir().unwrap();
         let rows: Vec<String> = (0..600)

@@ -256,7 +256,7 @@ fn regress_loaded_recordings_are_numbered_with_a_known_joint_and_never_by_the_ba
         let test = TestDescription::parse(text, "test.toml").unwrap();
         run_test(&test, (&out, "test.toml"), &IdentifySettings::default()).unwrap()
     };
-    // Of a known joint nothing is estimated, and the masses' effect is known all the same.
+    // Nothing is estimated of a known joint, and the masses' effect follows nevertheless.
     let known = analysed(&text.replace(kind, &format!("{kind}kt = 1.994e6\nkr = 1223\n")));
     let numbers = |analysis: &Analysis, recording: usize| {
         let numbers = analysis.recordings[recording].mode_numbers.iter();

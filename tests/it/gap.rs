@@ -167,7 +167,7 @@ fn recover_the_mass_of_a_sensor_that_stands_up_beside_its_place() {
     assert!(off < 4.0 * mass.std.unwrap(), "{mass:?}");
 }
 
-/// What many modes show beyond the tenth is left aside.
+/// Modes beyond the tenth are left aside.
 #[test]
 fn limit_ten_modes_are_compared_at_most() {
     let plan = TestPlan {
@@ -393,7 +393,7 @@ fn prop_probabilities_sum_to_one_and_repeat_themselves() {
     let p = first.locations;
     let places = p.joint + p.fixture + p.sensor + p.body + p.acquisition + p.unknown;
     assert!((places - 1.0).abs() < 1e-9, "{places}");
-    // The same bits on any number of threads.
+    // Equal bits on any number of threads.
     let text = format!("{first:?}");
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -635,7 +635,7 @@ fn paper() -> Diagnosis {
     let std = |f: f64| Some((0.125_f64.powi(2) / 3.0 + (3e-3 * f).powi(2)).sqrt());
     let mut nominal = strip_on_springs(1.0, Some(0.024));
     nominal.reading_bias = Some(0.125);
-    // Thickness to 0.1 mm alone is 2 % of every frequency; nobody stated it.
+    // Thickness to 0.1 mm alone is 2 % of every frequency; it was not stated.
     diagnose(&read(&PAPER, std), &nominal, &GapSettings::default()).unwrap()
 }
 

@@ -125,7 +125,7 @@ fn recover_refits_where_the_body_was_renewed() {
         estimator.refit(&estimator.frequencies(), &near),
     );
     for (first, second) in fit.point.iter().zip(&again.point) {
-        // The same minimum of the same model.
+        // Both find one minimum of one model.
         assert!((first - second).abs() < 1e-8, "{fit:?} against {again:?}");
     }
     // Elements are right to a millionth, and the body follows the modulus to 1e-4 squared.

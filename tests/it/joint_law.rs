@@ -1,4 +1,4 @@
-//! What the law of a non-linear joint means in closed form, for tests.
+//! Closed forms of the law of a non-linear joint, for tests.
 
 use std::f64::consts::PI;
 use tapjoint::structure::effects::{JointLaw, JointLawKind};

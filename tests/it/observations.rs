@@ -205,7 +205,7 @@ fn recover_the_scatter_of_a_structure_that_differs_from_tap_to_tap() {
     let mut score = Score::default();
     let (mut together, mut apart, mut seen) = (0.0, 0.0, 0);
     for seed in 0..SEEDS {
-        // What the first two modes share, 0.1 %: many times the noise; the third stands still.
+        // Common scatter of the first two modes, 0.1 %: many times the noise; the third stands still.
         let draws: Vec<f64> = (0..5).map(|_| StandardNormal.sample(&mut random)).collect();
         let found = five_taps(
             |tap| {

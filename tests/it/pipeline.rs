@@ -235,7 +235,7 @@ fn prop_a_sensitivity_is_per_volt_whatever_the_header_says() {
         h1[0].iter().map(|h| h.norm()).fold(0.0, f64::max)
     };
     let (volts, millivolts) = (level("V", 1.0), level("mV", 1000.0));
-    // The same signal, printed to nine decimals of volts.
+    // This signal, printed to nine decimals of volts.
     assert!(
         (volts / millivolts - 1.0).abs() < 1e-4,
         "{volts} and {millivolts}"
@@ -501,8 +501,8 @@ fn without_mode_1(
 
 #[test]
 fn regress_modes_are_numbered_with_the_joint_that_is_estimated() {
-    // The best joint of the numbering says where the mode is that nobody measured: right only if it is
-    // searched for where the estimate will be.
+    // The best joint of the numbering predicts the mode that was not measured: right only if it is searched for where
+    // the estimate will be.
     let error = |about: f64, joint: &JointStiffness| {
         let first = &mode_shapes(&steel_strip(), Assembly::Cantilever, joint, 1).unwrap()[0];
         (about / first.frequency - 1.0).abs()
@@ -528,7 +528,7 @@ fn regress_modes_are_numbered_with_the_joint_that_is_estimated() {
     // The frequency is said to a tenth of a hertz, 0.2 % of it.
     assert!(held < 0.003, "{held}");
     assert!(ignored > 0.006, "{ignored}");
-    // What is neither fitted nor stated is rigid, and no rotation alone has these frequencies.
+    // A spring that is neither fitted nor stated is rigid, and no rotation alone has these frequencies.
     let soft = JointStiffness::two_parameter(150.0, 20.0);
     let only = vec![FitParameter::Kr];
     let only = (PairsModel::TwoParameter, KnownJoint::default(), Some(only));

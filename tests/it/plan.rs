@@ -131,7 +131,7 @@ fn regress_a_lap_joint_is_planned_with_cables_and_masses() {
 
 #[test]
 fn regress_a_described_coupling_beside_usual_stiffnesses_is_a_joint_that_can_be() {
-    // With the usual Kt and Kr the coupling would be 8, of a joint that nobody described.
+    // With the usual Kt and Kr the coupling would be 8, but no joint was described.
     for (joint, expected) in [
         ("ktr = 6000\n", 0.95),
         ("ktr = -6000\n", -0.95),

@@ -1,6 +1,6 @@
 //! The whole chain on recordings made by others, in the folder that TAPJOINT_DATA names.
 //!
-//! What is expected was published by who measured it, or computed from the file by other programs.
+//! Expected values were published with the recordings, or computed from the files by other programs.
 
 use crate::shared::data;
 use std::fs;

@@ -48,7 +48,7 @@ macro_rules! virtual_strip {
 }
 pub(crate) use virtual_strip;
 
-/// The same with a hammer and sensor A at four fifths; what is given follows.
+/// The strip with a hammer and sensor A at four fifths; the given text follows.
 macro_rules! tapped_strip {
     ($rest:literal) => {
         concat!(

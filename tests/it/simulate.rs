@@ -147,7 +147,7 @@ fn limit_static_compliance_of_a_clamped_beam() {
         .map(|mode| mode.shape_at_tap * mode.shape_at_sensors[0] / (TAU * mode.frequency).powi(2))
         .sum();
     let expected = beam.length.powi(3) / (3.0 * beam.bending_stiffness());
-    // What modes beyond 20 leave: the sum over ((n - 1/2) pi)^-4 from 21 on, 1e-6.
+    // The share of modes beyond 20: the sum over ((n - 1/2) pi)^-4 from 21 on, 1e-6.
     assert!(
         (compliance / expected - 1.0).abs() < 1e-5,
         "{compliance} for {expected} m/N"

@@ -1,4 +1,4 @@
-//! What the diagnosis says of odd tests.
+//! Answers of the diagnosis to odd tests.
 
 use super::tapjoint;
 use serde_json::Value;

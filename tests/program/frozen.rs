@@ -1,8 +1,8 @@
 //! Snapshots of what the program puts out, to be reviewed as a whole when it changes.
 //!
-//! Each test is run as a user runs it, in a folder of its own. Frozen are the terminal text, `parameters.csv`,
-//! `report.json` (numbers with six significant digits, of long lists the length and the ends, of lists of
-//! objects the details of one) and the text that the page shows. `INSTA_UPDATE=always cargo test --test program frozen` writes the snapshots anew.
+//! Each test is run as a user runs it, in a folder of its own. The snapshots hold the terminal text,
+//! `parameters.csv`, `report.json` and the text of the page. Numbers of `report.json` have six significant digits.
+//! Long lists are shortened to their length and their ends, lists of objects to the details of one. `INSTA_UPDATE=always cargo test --test program frozen` writes the snapshots anew.
 
 use super::program;
 use serde_json::Value;

@@ -81,7 +81,7 @@ impl Place {
     }
 }
 
-/// Effects that most data cannot tell apart share a group.
+/// Group of effects that most data cannot distinguish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Group {
     /// One effect alone.

@@ -13,7 +13,7 @@ pub use catalogue::{Dimension, EffectId, Group, ParameterInfo, ParameterScale, P
 use statrs::function::gamma::gamma;
 use std::f64::consts::PI;
 
-/// Reason for which an effect cannot be had.
+/// Reason why an effect cannot be made from its name and values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// No effect of that name.
@@ -105,8 +105,8 @@ impl Effect {
     /// With named values (SI); the others are typical ones.
     ///
     /// # Errors
-    /// [`EffectError`] for an unknown name, a value twice or outside its range, or a missing value
-    /// that nothing is typical of.
+    /// [`EffectError`] for an unknown name, a value given twice or outside its range, or a missing value of a
+    /// parameter without a typical one.
     pub fn from_pairs(id: EffectId, pairs: &[(&str, f64)]) -> Result<Self, EffectError> {
         let mut values = vec![None; id.parameters().len()];
         for (name, value) in pairs {
@@ -204,7 +204,7 @@ pub struct Circumstances<'a> {
     pub sensors: &'a [PointMass],
     /// Amplitude relative to the hardest tap's (1), from 0 to 1.
     pub level: f64,
-    /// Draws for this visit's drift of Kt and Kr (1), in standard deviations.
+    /// Random deviations of Kt and Kr on this visit (1), in standard deviations of the drift.
     pub drift: [f64; 2],
 }
 
@@ -471,9 +471,11 @@ impl JointLaw {
         self.ratio * size.powf(p)
     }
 
-    /// Returns the loss factor over the change of the stiffness (1): 4 p/(pi (p + 2) D), D being the describing function;
-    /// 0 for a conservative spring. Of one mode by itself exact for small changes; others share in the
-    /// sliders' slip.
+    /// Returns the loss factor over the change of the stiffness (1): 4 p/(pi (p + 2) D) with the describing
+    /// function D.
+    ///
+    /// It is 0 for a conservative spring. For small changes it is exact where one mode moves alone; other modes
+    /// share in the sliders' slip.
     pub fn loss_over_change(&self) -> f64 {
         let p = self.exponent;
         match self.kind() {

@@ -241,7 +241,7 @@ impl Element {
         }
     }
 
-    /// S of the chapter's text: the work of each end motion's inertia on the response to another's.
+    /// S of the module's text: the work of each end motion's inertia on the response to another's.
     fn second_order(&self, motions: &[Motion; 4], responses: &[Motion; 4]) -> Square {
         let (m, j) = (self.mass_per_length, self.rotary_inertia);
         std::array::from_fn(|i| {
@@ -289,7 +289,7 @@ pub(super) struct Section {
     /// Stiffness of the axial force alone.
     geometric: Square,
     pub(super) mass: Square,
-    /// S of the chapter's text.
+    /// S of the module's text.
     pub(super) second_order: Square,
     /// Displacement inside, over omega^2, for each end motion.
     inner: [Polynomial; 4],

@@ -216,8 +216,8 @@ impl Specimen {
         }
     }
 
-    /// Returns a beam on its joint, with nothing on it but a lap joint's overlap. Of a lap joint `beam` has the
-    /// left half's properties and the total length; `lap` has no meaning for one beam.
+    /// Returns a beam on its joint, with nothing on it but a lap joint's overlap. For a lap joint `beam` has the
+    /// left half's properties and the total length. For one beam `lap` has no meaning.
     pub fn jointed(
         theory: BeamTheory,
         beam: &Beam,

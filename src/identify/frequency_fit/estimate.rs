@@ -123,8 +123,8 @@ impl Finished<'_> {
         let unit = self.covariance.std(&gradient);
         let std = unit.zip(slope).map(|(std, slope)| std * slope);
         let scale = self.scale();
-        // The interval with the misfit for uncertainty is that of the coordinate to first order, by
-        // Student's distribution, because so few frequencies know the misfit only roughly.
+        // The interval with the misfit for uncertainty is that of the coordinate to first order. Student's
+        // distribution accounts for the few frequencies, which give the misfit only roughly.
         let freedom = self.goodness.degrees_of_freedom as f64;
         let scaled = unit.zip(scale).map(|(unit, scale)| {
             let half = student::quantile(0.05, freedom) * unit * scale;
@@ -287,11 +287,10 @@ impl Finished<'_> {
 // the last one. The signed root of the rise in chi-squared is nearly straight in most cases, so
 // that a secant finds its end within a few such estimates.
 
-/// Rise in chi-squared at the ends of a 95 % interval: the 95 % point of chi-squared with one degree
-/// of freedom. The same holds where one end is missing. A limit at the 90 % point, of one side alone,
-/// would be right in 95 % only of those who had decided for it beforehand; here the data decide, and
-/// who takes the interval where it has two ends and that limit where not is wrong more often
-/// (Feldman & Cousins 1998).
+/// Rise in chi-squared at the ends of a 95 % interval: the 95 % point of chi-squared with one degree of freedom. It
+/// also serves where one end is missing. A one-sided limit at the 90 % point covers 95 % only if it is chosen before
+/// the data are seen. Here the data decide between interval and limit, so that such a limit would cover less (Feldman
+/// & Cousins 1998).
 pub const RISE_95: f64 = 3.841_459;
 
 /// One end of a quantity's interval, looked for from the best point on.
@@ -439,7 +438,7 @@ impl<'a> Profile<'a> {
     }
 }
 
-// What these frequencies can tell and what they cannot.
+// Identifiability: the parameters that these frequencies determine.
 
 /// A combination of parameters known no better than this (1, relative) is called flat: a factor of
 /// two either way is within its 95 % interval.

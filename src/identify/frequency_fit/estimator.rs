@@ -297,8 +297,8 @@ impl ConsistentEstimator {
         let mut starts = promising(&problem, &self.base, &self.settings.fit);
         starts.extend(self.pairs_guess(&problem));
         let mut minima = self.minima(&problem, &starts);
-        // A misfit below three times what it should be, or, without stated uncertainties, below what any
-        // reading achieves leaves no room for another minimum.
+        // A fit this good leaves no room for another minimum: below three times the expected misfit or, without
+        // stated uncertainties, below the error of any reading.
         const READING: f64 = 1e-4;
         let allowed = match self.settings.weights {
             ResidualWeights::Measured => 9.0,
@@ -411,8 +411,8 @@ impl ConsistentEstimator {
         })
     }
 
-    /// Moves a stiffness that no frequency feels to its limit, where that is no worse than wherever the
-    /// search lost interest.
+    /// Moves a stiffness that no frequency feels to its limit, unless the misfit there is larger than where the
+    /// search ended.
     fn follow_to_the_limit(&self, problem: &Problem<'_>, minimum: &mut Minimum) {
         // Relative change of every frequency per relative change of the stiffness.
         const UNFELT: f64 = 1e-4;
@@ -448,13 +448,12 @@ impl ConsistentEstimator {
 const CHUNK: usize = 256;
 
 impl ConsistentEstimator {
-    /// Repeats the estimate `samples` times with independent normal errors of the frequencies of
-    /// their stated standard deviations, and of the properties of the beam that have a tolerance of
-    /// theirs, each repetition from every minimum of the first estimate, its
-    /// [`ConsistentEstimator::neighbourhood`]. The body is that of the first estimate: what a repetition moves
-    /// of the beam is followed to first order, which leaves less than a thousandth of a standard deviation.
-    /// The same seed gives the same answer on any number of threads. Repetitions that do not converge count
-    /// as failed.
+    /// Repeats the estimate `samples` times with independent normal errors. The frequencies have their stated
+    /// standard deviations, and the beam's properties their tolerances. Each repetition starts from every minimum of
+    /// the first estimate, its [`ConsistentEstimator::neighbourhood`]. The body is that of the first estimate, and
+    /// changes of the beam are followed to first order. This leaves less than a thousandth of a standard deviation.
+    /// The result depends on the seed, not on the number of threads. Repetitions that do not converge count as
+    /// failed.
     ///
     /// # Errors
     /// [`IdentifyError::NoUncertainty`] where a mode has no standard uncertainty.
@@ -501,7 +500,7 @@ impl ConsistentEstimator {
                 let error: f64 = error;
                 datum.frequency = mean + std * error;
             }
-            // What is stated of the beam is a reading too, with its own error.
+            // A stated property of the beam is a reading too, with its own error.
             for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {
                 prior.value += prior.std * error;
             }

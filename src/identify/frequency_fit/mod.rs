@@ -32,7 +32,7 @@ use serde::Serialize;
 use tapjoint_beam::{Beam, Joint, JointStiffness};
 use tapjoint_numerics::stats::chi_square_tail;
 
-// What is to be estimated, and how.
+// Settings of an estimate.
 
 /// Divisor of the residuals.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -351,7 +351,7 @@ pub(super) fn joint_at(point: &Point) -> JointStiffness {
     }
 }
 
-// Whether the model can explain the frequencies at all.
+// Goodness of fit: can the model explain the frequencies at all?
 
 /// Below this probability the stated uncertainties and the model do not go together.
 const DOUBTFUL: f64 = 0.01;

@@ -88,7 +88,7 @@ impl JointedStructure {
         let masses = there.masses.iter_mut().map(|mass| &mut mass.position);
         let springs = there.springs.iter_mut().map(|spring| &mut spring.position);
         for position in masses.chain(springs) {
-            // A point at the end stays on the beam, whatever the last digit of the product.
+            // A point at the end stays on the beam, even if the product is rounded up.
             *position = (*position * longer).min(beam.length);
         }
         there.beam = *beam;
@@ -310,8 +310,8 @@ impl FrequencyModel {
         [a, b, coupling * (a * b).sqrt()]
     }
 
-    /// Returns by how much the ratios of attached masses to the beam's, and of support springs to the
-    /// beam's stiffness, differ from those of the body, as logarithms.
+    /// Returns two differences from the body, as logarithms: of the ratio of attached masses to the beam's, and of
+    /// support springs to the beam's stiffness.
     fn attachment_ratios(&self, point: &Point) -> (f64, f64) {
         let moved: Point = std::array::from_fn(|i| point[i] - self.built_at[i]);
         let [_, _, _, modulus, density, length, width, thickness] = moved;
@@ -319,8 +319,8 @@ impl FrequencyModel {
         (mass, 3.0 * length - modulus - width - 3.0 * thickness)
     }
 
-    /// Returns true where the attachments' shares at this point differ from the body's so much that it
-    /// has to be built anew. To first order they are followed exactly.
+    /// Returns true where the attachments' shares at this point differ too much from the body's: it has to be built
+    /// anew. To first order they are followed exactly.
     pub(super) fn is_far(&self, point: &Point) -> bool {
         // The error left is the square of this, and half of it again.
         const FAR: f64 = 1e-4;

@@ -18,10 +18,10 @@ const DENSITY: f64 = 0.375;
 /// Prior means of ln Kx, ln Ky and atanh of the coupling, and their standard deviations: joints of
 /// built structures lie within some decades of the beam's own stiffness, couplings within 0.3.
 const PRIOR: [(f64, f64); 3] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3)];
-/// Decades of the grid, Kx and Ky, and its step. A frequency rises at most with the root of both
-/// stiffnesses together, so that the nearest place of the grid, half a step off in both, misses it by
-/// 10^(0.3/4) - 1 = 19 % at most, where all stiffness is in soft springs. The candidates allow for that,
-/// and the search for the joint goes on from there.
+/// Decades of the grid, Kx and Ky, and its step. A frequency rises at most with the root of both stiffnesses
+/// together. The nearest place of the grid is half a step off in both at most, and misses it by up to 10^(0.3/4) - 1
+/// = 19 %, where all stiffness is in soft springs. The candidates allow for that, and the search for the joint goes
+/// on from there.
 const DECADES: [(f64, f64); 2] = [(-1.0, 6.0), (-2.0, 4.5)];
 const STEP: f64 = 0.3;
 /// Largest step of the search (1).
@@ -32,11 +32,13 @@ const STRONGEST: f64 = 0.999;
 /// Peaks and the model they are compared with.
 pub(super) struct JointSearch<'a> {
     model: &'a FrequencyModel,
+    /// The measured peaks, ascending.
     pub peaks: &'a [MeasuredPeak],
     settings: &'a PairingSettings,
     units: StiffnessUnits,
     /// 1/Kz (1) of a coupling that is held; 0 without one.
     cross: f64,
+    /// Number of modes looked at.
     highest: usize,
 }
 
@@ -68,6 +70,7 @@ impl<'a> JointSearch<'a> {
         }
     }
 
+    /// Returns true for a frequency (Hz) inside one of the bands, or anywhere if there are no bands.
     pub fn in_band(&self, frequency: f64) -> bool {
         let mut bands = self.settings.bands.iter();
         bands.len() == 0 || bands.any(|&(low, high)| (low..=high).contains(&frequency))
@@ -290,6 +293,7 @@ pub(super) struct View {
 }
 
 impl View {
+    /// Returns the shapes of the fitted joint; none for unequal halves, or where no peak has a shape.
     pub fn new(search: &JointSearch<'_>, fit: &JointFit) -> Self {
         let mut places = Vec::new();
         for at in search.peaks.iter().flat_map(|peak| &peak.shape) {

@@ -3,12 +3,12 @@
 //! A structure without a joint is known but for a common factor, and its peaks are paired by frequency
 //! ([`crate::predict::pair_by_ratio`]). With a joint the natural frequencies themselves are unknown, so that pairing and
 //! joint are sought together ([`pair_modes`]):
-//! 1. *Candidates*: for every joint of a grid the assignment of peaks to modes that suits
-//!    it best, peaks left over and modes left out at a price. Mode n of any joint lies between those of
-//!    the free and of the clamped beam, so that no candidate violates that.
-//! 2. *Joint* (`joint`): for each candidate the joint whose frequencies are nearest, and how probable
-//!    the frequencies are over all joints (Laplace's approximation), so that an assignment that any joint
-//!    could have explained is not preferred for a perfect fit.
+//! 1. *Candidates*: for every joint of a grid the assignment of peaks to modes that suits it best, peaks left over
+//!    and modes left out at a price. Mode n of any joint lies between those of the free and of the clamped beam.
+//!    Every candidate keeps to that.
+//! 2. *Joint* (`joint`): for each candidate the joint whose frequencies are nearest, and how probable the frequencies
+//!    are over all joints (Laplace's approximation). An assignment that many joints fit is thus not beaten by one
+//!    that a single joint fits perfectly.
 //! 3. *Shape* (`joint`): measured shapes and signs against those of that joint; whether a mode left out
 //!    could have been seen at all.
 //! 4. *Strength*: of several poles that may be the same mode, a weak one has its price.
@@ -32,8 +32,8 @@ pub struct MeasuredPeak {
     pub std: Option<f64>,
     /// Values of its shape at the sensors; empty where places or amplitudes are unknown.
     pub shape: Vec<ShapeAt>,
-    /// Strength in each recording, in the same order for all peaks, `None` where it did not;
-    /// empty where that is unknown.
+    /// Strength in each recording, in the same order for all peaks. `None` of a recording that did not show it; empty
+    /// where all strengths are unknown.
     pub strengths: Vec<Option<PeakStrength>>,
 }
 
@@ -58,7 +58,7 @@ pub struct ShapeAt {
 pub struct PairingSettings {
     /// Stiffnesses of the joint that are estimated: two by default; those not named are held.
     pub fit: Vec<Parameter>,
-    /// Held stiffnesses Kt (N/m), Kr (N m/rad) and Ktr (N/rad). What is neither estimated nor held is
+    /// Held stiffnesses Kt (N/m), Kr (N m/rad) and Ktr (N/rad). A stiffness that is neither estimated nor held is
     /// infinite: rigid, or without coupling. None.
     pub held: [Option<f64>; 3],
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
@@ -216,7 +216,7 @@ fn score(
         .sum();
     let weak = neighbours.cost(assignment);
     // Shapes may be compared without those of the weak peaks beside a stronger one that is left over and whose own
-    // shape is lost in noise. What is known of the weaker one then speaks for neither.
+    // shape is lost in noise. The shape of the weaker one then speaks for neither.
     let mut shaped = pairs.clone();
     shaped.retain(|pair| {
         !neighbours.stronger[pair.0].iter().any(|&(other, _)| {

@@ -169,8 +169,8 @@ fn panel(
     }
 }
 
-/// Returns on each line the largest level of all frequency response functions, or without a hammer of all responses,
-/// each over its own highest value.
+/// Returns on each line the largest level of all frequency response functions, each over its own highest value.
+/// Without a hammer the responses take their place.
 fn level(spectra: &MeasuredSpectra, frfs: &[Frf]) -> Vec<f64> {
     let curves: Vec<Vec<f64>> = match frfs.is_empty() {
         true => spectra.averages.responses.clone(),
@@ -355,8 +355,8 @@ impl Quantity<'_> {
         dots
     }
 
-    /// Values of the points that are known well enough to tell something, and of those that differ from them
-    /// by far more than their own uncertainty, with some room.
+    /// The vertical axis, with some room. It shows the points that are known well, and points that differ from them
+    /// by far more than their own uncertainty.
     fn axis(&self) -> Axis {
         let values = &self.values;
         let mut stds: Vec<f64> = values.iter().map(|(_, std)| *std).collect();

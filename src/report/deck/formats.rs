@@ -53,7 +53,7 @@ pub fn render_abaqus(deck: &Deck) -> String {
     }
     for (index, own) in deck.masses.iter().enumerate() {
         let (number, node) = (index + 1, own.node + 1);
-        // Of a plane model only the inertia about z counts.
+        // Only the inertia about z acts in a plane model.
         let of_mass = ("MASS", "MASS", "MASS", "", own.mass);
         let of_inertia = (
             "ROTARYI",
@@ -181,7 +181,7 @@ pub fn render_nastran(deck: &Deck) -> String {
         let density = number(beam.density);
         let _ = writeln!(text, "MAT1*,{id},{modulus},,{poisson}\n*,{density}");
         let (area, bend) = (number(beam.area()), number(beam.second_moment()));
-        // Of the other directions, which are held, any positive number will do.
+        // The other directions are held: any positive number will do.
         let _ = writeln!(text, "PBAR*,{id},{id},{area},{bend}\n*,{bend},{bend}");
         if deck.theory == BeamTheory::Timoshenko {
             // k = (k G A)/(G A); K1 and K2 are the fifth and sixth fields of the third line.

@@ -1,8 +1,7 @@
 //! The updated beam with its identified joint as input of a finite-element program.
 //!
-//! The beam lies along x and bends in the x-y plane: w is the translation along y, theta = dw/dx the
-//! rotation about z, so that every spring acts on the degrees of freedom that the theory knows, with
-//! its signs.
+//! The beam lies along x and bends in the x-y plane. w is the translation along y, and theta = dw/dx the
+//! rotation about z. So every spring acts on the degrees of freedom of the theory, with its signs.
 
 mod formats;
 
@@ -192,9 +191,10 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     Ok(deck)
 }
 
-/// Returns the scalar springs of a joint of Kt (N/m), Kr (N m/rad) and 1/Ktr (rad/N): with the stiffness matrix K,
-/// the inverse of the compliance `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`, they are w to ground K11 + K12, theta to ground
-/// K22 + K12, and between w and theta -K12.
+/// Returns the scalar springs of a joint of Kt (N/m), Kr (N m/rad) and 1/Ktr (rad/N).
+///
+/// The stiffness matrix K is the inverse of the compliance `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`. The springs are w to
+/// ground K11 + K12, theta to ground K22 + K12, and -K12 between w and theta.
 fn scalar_springs(kt: f64, kr: f64, cross: f64, node: usize) -> Result<DeckJoint, DeckError> {
     let plain = DeckJoint {
         node,

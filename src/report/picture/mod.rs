@@ -163,10 +163,10 @@ pub struct Series {
     pub x: Places,
     /// Heights (unit of the axis); empty for a band.
     pub y: Vec<f64>,
-    /// Lower ends of error bars or of a band; may be empty.
+    /// Lower ends of error bars or of a band (unit of the axis); may be empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub low: Vec<f64>,
-    /// Upper ends.
+    /// Upper ends of the same (unit of the axis).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub high: Vec<f64>,
     /// Further facts for the pointer (unit of the panel's `extra`).

@@ -280,8 +280,8 @@ fn view(name: &str, panels: &[Panel]) -> Block {
     }
 }
 
-/// Most points of a curve beside those about modes: two for each pixel of the page's width, so that zooming finds
-/// more than the whole view shows, while five long recordings stay below the page's limit of 3 MB.
+/// Most points of a curve beside those about modes: two for each pixel of the page's width. Zooming then finds
+/// more than the whole view shows, and five long recordings stay below the page's limit of 3 MB.
 const MOST_POINTS: usize = 2000;
 /// Lines kept on either side of a mode: what zooming to it shows.
 const ABOUT_MODES: usize = 40;

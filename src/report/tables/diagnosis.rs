@@ -52,8 +52,8 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
     Some(Table::of("What may be missing", rows, note(document, gap)))
 }
 
-/// Explains the columns, why even the hypothesis that nothing is missing mostly leaves less than the described model,
-/// and why the errors are not those of the estimate.
+/// Explains the columns. Also says why even the hypothesis `none` mostly leaves smaller errors than the described
+/// model, and why the errors differ from those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
     let described = percent(Some(gap.hypotheses[0].gap_before));
     let withheld = gap.hypotheses[0].holdout_before;

@@ -140,8 +140,8 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         percent(Some(found.gap_before)),
         left(found.gap_after, gap.noise_floor),
     );
-    // What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of
-    // the errors.
+    // The errors that are left where nothing is added. They are stated if the tolerances, and a joint's drift between
+    // recordings, explain half of the errors.
     let none = gap.result(&Hypothesis::None);
     let remains = none
         .and_then(|none| none.gap_after)
@@ -424,8 +424,8 @@ fn no_gap(gap: &GapSection) -> String {
             probability(p)
         ),
         None => {
-            // Where the described model itself leaves much more than the readings' uncertainty and than what is left
-            // with a joint that may differ between recordings.
+            // Stated where the described model leaves errors more than twice as large as two others: the readings'
+            // uncertainty, and the errors with a joint that may differ between recordings.
             let floor = gap.noise_floor;
             let left_over =
                 of_none.and_then(|none| Some((none.gap_before, none.gap_after?, floor?)));

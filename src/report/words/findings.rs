@@ -339,8 +339,8 @@ fn misfit(document: &Document) -> Option<String> {
     ))
 }
 
-/// Returns the spans that reading on lines alone would leave open; nothing beside a misfit that is larger than what the readings leave
-/// open, for the spans would look like what is known of the joint.
+/// Returns the spans of the stiffness if frequencies were read on lines only. `None` beside limits scaled by the
+/// misfit, which are wider: the spans would look like the uncertainty of the joint.
 fn resolution(document: &Document) -> Option<String> {
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
     let parameters = estimate.map(estimated).unwrap_or_default();
@@ -349,7 +349,7 @@ fn resolution(document: &Document) -> Option<String> {
     }
     let main = estimate.map(|estimate| estimate.method);
     let spans = document.resolution_span.as_deref()?;
-    // Of the method that the estimate is by; else of the one that there is.
+    // The span of the estimate's own method; else the only one.
     let span = spans.iter().find(|span| Some(span.method) == main);
     let span = span.or(spans.first())?;
     let ranges = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)];

@@ -276,7 +276,7 @@ pub struct Interpolation {
     pub bound: f64,
     /// Standard deviation (Hz), half the bound.
     pub std: f64,
-    /// Damping ratio, the window's own decay taken out; `None` when nothing is left of it.
+    /// Damping ratio, the window's own decay taken out; `None` when nothing is left of it, and under a Hann window.
     pub damping_ratio: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_std: f64,
@@ -534,13 +534,16 @@ impl Resonance {
 
 /// Merges the readings of several recordings, ascending in frequency.
 ///
-/// Readings are the same resonance when they differ by less than their half lines together plus
-/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule), or by up to 1.5 % (a joint's
-/// drift of 3 %, where the mode lives in the joint) and no recording shows both, though the band of each reaches to
-/// where the other has its own; a fitted
-/// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
-/// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are
-/// never merged.
+/// Two readings are one resonance in either of two cases; readings of one recording are never merged.
+///
+/// 1. They differ by less than their half lines together plus 0.3 %. As a rule re-mounting a sensor, or a joint's
+///    drift, moves a frequency by that much.
+/// 2. They differ by up to 1.5 %, as after a joint's drift of 3 % where the mode lives in the joint. Each
+///    recording's band must then reach to the other's reading, and no recording may show both.
+///
+/// A mode stays before a peak that is none, and a fit before any other reading. Of two fits the one with the
+/// smaller standard deviation stays. Of two others it is the one with the smaller half line, and among equals the
+/// more prominent one.
 pub fn merge_modes(recordings: &[BandReadings]) -> Vec<MergedMode> {
     let mut merged: Vec<Resonance> = Vec::new();
     for (recording, shown) in recordings.iter().enumerate() {

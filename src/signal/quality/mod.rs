@@ -106,9 +106,9 @@ pub enum DampingSource {
 pub struct ResonanceEvidence {
     /// Its frequency (Hz).
     pub frequency: f64,
-    /// `false` for a peak without a mode number among others that have theirs.
+    /// `false` for a peak that has no mode number, where other peaks of the recording have one.
     pub is_mode: bool,
-    /// Standard deviation of that (Hz); `None` where it is not known.
+    /// Standard deviation of the frequency (Hz); `None` where it is not known.
     pub std: Option<f64>,
     /// Damping ratio as the spectra show it, the window's share in it.
     pub apparent_damping_ratio: Option<f64>,
@@ -127,7 +127,7 @@ pub struct RecordingEvidence {
     pub file: String,
     /// Position of the hammer (m); `None` where it is not given.
     pub tap_position: Option<f64>,
-    /// Places (m) and masses (kg) of what is fastened to the beam for this recording.
+    /// Position (m) and mass (kg) of each mass fastened to the beam for this recording.
     pub fastened: Vec<(f64, f64)>,
     /// All taps, accepted and rejected, in order of time.
     pub taps: Vec<TapEvidence>,

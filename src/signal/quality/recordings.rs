@@ -34,7 +34,7 @@ pub(super) fn check_reciprocity(recordings: &[RecordingEvidence]) -> Vec<Verdict
     or_missing(verdicts, Check::Reciprocity, limits::RECIPROCITY, why)
 }
 
-/// The verdicts, or where there are none one on the test that says why the check does not apply.
+/// Returns the verdicts. Without any it returns one on the test, with the reason why the check does not apply.
 fn or_missing(mut verdicts: Vec<Verdict>, check: Check, limit: f64, why: &str) -> Vec<Verdict> {
     if verdicts.is_empty() {
         verdicts.push(Verdict::new(check, Subject::Test, limit).missing(why));
@@ -178,8 +178,8 @@ fn same_arrangement(first: &RecordingEvidence, second: &RecordingEvidence) -> bo
         && same_sensors(first, second)
 }
 
-/// One verdict for each mode of both recordings on its shift in standard deviations. `change` says how `second`
-/// differs from `first`; among `levels` a shift may follow the order of the tap levels.
+/// Returns one verdict for each mode of both recordings on its shift in standard deviations. `change` words how
+/// `second` differs from `first`. `levels` are the recordings among which a shift may follow the tap levels.
 fn shifts(
     check: Check,
     first: &RecordingEvidence,
@@ -252,10 +252,11 @@ impl Seen {
     }
 }
 
-/// Returns a sentence where a mode's frequency follows the order of the tap levels: of all recordings in `first`'s
-/// arrangement that read it, every frequency at one level is clearly on the same side of every one at the level
-/// below. A level is another one where it is `two_levels` times the next lower recording's. `None` where it does not,
-/// or where so few would by chance.
+/// Returns a sentence where a mode's frequency follows the order of the tap levels.
+///
+/// All recordings in `first`'s arrangement that read the mode take part. From each level to the next every frequency
+/// must clearly rise, or every one clearly fall. Two levels differ where their ratio is [`limits::TWO_LEVELS`] or more.
+/// `None` where the frequency does not follow, or where the order is too likely by chance ([`LARGEST_CHANCE`]).
 fn in_order(
     mode: &ResonanceEvidence,
     first: &RecordingEvidence,
@@ -400,8 +401,8 @@ pub(super) fn check_antiresonances(recording: &RecordingEvidence) -> Vec<Verdict
     })
 }
 
-/// One verdict for each sensor at the tap's place, or one that says why there is none. `judge` takes the receptance
-/// there and returns value, outcome and sentence.
+/// Returns one verdict for each sensor at the tap's place. Without such a sensor it returns one, with the reason.
+/// `judge` takes the receptance there and returns value, outcome and sentence.
 fn of_driving_points(
     recording: &RecordingEvidence,
     check: Check,

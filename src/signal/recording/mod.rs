@@ -233,8 +233,8 @@ impl Recording {
     /// A recording in memory, for simulated signals and tests. `sample_rate` in Hz.
     ///
     /// # Errors
-    /// No channels, no samples, unequal lengths, samples that are not finite, a sample rate that is
-    /// not positive.
+    /// No channels, no samples, unequal lengths, samples that are not finite, a sample rate outside
+    /// 0.001 to 1e9 Hz.
     pub fn from_samples(
         name: impl Into<String>,
         sample_rate: f64,
@@ -372,7 +372,8 @@ impl Recording {
 
     /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
     /// negative when the sensor was mounted the other way. It replaces the factor of a unit in the
-    /// header, with a warning where it is another one but for the sign, volts apart, of which it says what they mean.
+    /// header. A warning follows where the two differ in magnitude, and beside an unknown unit. Beside the unit V
+    /// there is none: the scale then states the sensor's sensitivity.
     ///
     /// # Errors
     /// An unknown channel; a scale that is 0 or not finite.

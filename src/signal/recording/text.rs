@@ -292,9 +292,9 @@ impl UnevenStep {
         )
     }
 
-    /// Says how many rows may be lost: " (as if 2 rows were missing)".
+    /// Returns words on the rows that may be lost: " (as if 2 rows were missing)".
     ///
-    /// It says nothing where the gap is no whole number of steps.
+    /// They are empty where the gap is no whole number of steps.
     pub(super) fn lost_rows(&self) -> String {
         let steps = self.step / self.expected;
         let whole = steps.round();

@@ -143,8 +143,10 @@ pub fn choose_window(checks: &[DecayCheck], duration: f64) -> Window {
 /// is there, and the decay it adds stays below that of the record.
 const GENTLE: f64 = 0.1;
 
-/// The exponential window for one who asks for it: it brings a response that keeps `remaining` of its
+/// The exponential window where a description asks for it. It brings a response that keeps `remaining` of its
 /// level down to 1 %, and falls to 10 % at least.
+///
+/// `duration` is the record's length T (s).
 pub fn exponential_to(remaining: f64, duration: f64) -> Window {
     let fall = (RUNG_DOWN / remaining.max(f64::MIN_POSITIVE)).clamp(RUNG_DOWN, GENTLE);
     Window::Exponential {

@@ -2,9 +2,9 @@
 //!
 //! Two rules look at the unwindowed force. A second excursion above a tenth of the peak is one,
 //! whatever its exact form, unless it is ringing or far wider or narrower than a blow. Below that, a
-//! weaker copy of the tap's own pulse is looked for: the same thing as a ripple of period 1/delay and
-//! depth (1 + r)/(1 - r) in the force spectrum, for |1 + r e^{-j omega d}| swings between 1 + r and
-//! 1 - r, but without the spectrum's trouble to tell a ripple of long period from the pulse's own fall.
+//! weaker copy of the tap's own pulse is looked for. In the force spectrum such a copy is a ripple of period
+//! 1/delay and depth (1 + r)/(1 - r), for |1 + r e^{-j omega d}| swings between 1 + r and 1 - r. The
+//! spectrum cannot distinguish a ripple of long period from the pulse's own fall; the search in time can.
 
 use super::search::{Force, half_width};
 use super::{Event, TapSettings};

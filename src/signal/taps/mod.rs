@@ -125,7 +125,7 @@ pub enum Rejection {
     DoubleHit {
         /// Time between the two (s).
         delay: f64,
-        /// The smaller peak over the larger.
+        /// [`SecondHit::ratio`].
         ratio: f64,
         /// Limit of that ratio.
         limit: f64,

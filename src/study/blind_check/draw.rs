@@ -1,9 +1,9 @@
 //! Draws virtual tests (a structure, a plan of recordings, and an effect that its description leaves out)
 //! and records them.
 //!
-//! All tests of a campaign look alike from outside: a cantilever that is described as an Euler beam
-//! with two springs and sensors without mass, so that the description does not give the effect away.
-//! Sizes are drawn from small to large as a test engineer meets them, positions off any grid.
+//! All tests of a campaign look alike from outside: a cantilever, described as an Euler beam with two springs and
+//! sensors without mass. The description thus does not give the effect away. Sizes are drawn from small to large as a
+//! test engineer meets them, positions off any grid.
 
 use super::case::{CaseKind, Extent, Planted, Truth};
 use super::planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform};
@@ -42,8 +42,8 @@ pub struct Campaign {
     pub extent: Extent,
     /// Noise of the responses below their root mean square (dB). 60.
     pub noise_db: f64,
-    /// Largest standard deviation of the joint's drift between recordings (1); each test draws its
-    /// own up to it, and is not told. 0.01.
+    /// Largest standard deviation of the joint's drift between recordings (1). Each test draws its own up to it, and
+    /// its description does not state it. 0.01.
     pub drift: f64,
     /// Seed of everything.
     pub seed: u64,
@@ -137,7 +137,7 @@ pub enum DrawError {
     /// A drawn test is no plan.
     #[error("what a drawn test can show cannot be planned: {0}")]
     Plan(#[from] PlanError),
-    /// The limits of a drawn test cannot be told.
+    /// The limits of a drawn test cannot be computed.
     #[error("what a drawn test can show cannot be said: {0}")]
     Limits(#[from] GapError),
     /// The nominal description cannot be written.
@@ -328,9 +328,10 @@ const FREQUENCY_STD: f64 = 5e-5;
 
 impl DrawnTest {
     /// Returns the truth with the limits that readings without scatter set. One effect is detectable where the
-    /// nominal model misses them by an amount that is noticed nine times out of ten, two effects where it does
-    /// so for each of them alone. A fault outside the catalogue is refutable where the best of the catalogue
-    /// misses them so far that with the usual scatter chi square would exceed its 1 % limit.
+    /// nominal model misses these readings by an amount that is noticed nine times out of ten. Two effects are
+    /// detectable where each of them alone is. A fault outside the catalogue is refutable where the best hypothesis
+    /// of the catalogue misses these readings clearly. With the usual scatter, chi square would then exceed its 1 %
+    /// limit.
     ///
     /// # Errors
     /// [`DrawError`]: a defect of the drawing.

@@ -67,9 +67,9 @@ impl Entry {
             .collect()
     }
 
-    /// Gives parameters to the effect that has them: those written as `effect.parameter`, and of several effects those
-    /// that only one of them knows, unless one lies outside the catalogue and has parameters of its own. What is given
-    /// twice stays where it is, and is told.
+    /// Gives parameters to the effect that has them. These are the ones written as `effect.parameter`. With several
+    /// effects, all of the catalogue, they are also those that only one of them has. A parameter that is given twice
+    /// stays where it is and raises a doubt.
     fn sort_parameters(&mut self) {
         let effects = self.known_effects();
         let all_known = effects.len() == self.effects.len() && effects.len() > 1;

@@ -86,7 +86,7 @@ pub fn reproduce() -> Result<Reproduction, PublicationError> {
     Ok(Reproduction { tables })
 }
 
-// What several tables have in common.
+// Shared by several tables.
 
 /// The paper fits the first four modes.
 const FIT_MODES: usize = 4;

@@ -37,7 +37,7 @@ pub enum PublicationError {
 pub enum Verdict {
     /// Equal within the row's tolerance.
     Reproduces,
-    /// Different, but not beyond what the rounding of the printed input does to our number.
+    /// Different, within the effect that rounding of the printed input has on our number.
     WithinRounding,
     /// Different; the remark says why.
     DoesNotReproduce,
@@ -219,8 +219,11 @@ fn stiffnesses(model: PairsModel, lambdas: &[f64]) -> Option<Stiffnesses> {
 
 /// Spans of an estimate.
 pub(super) struct Spans {
+    /// Span of Kx (1).
     pub kx: Option<Span>,
+    /// Span of Ky (1).
     pub ky: Option<Span>,
+    /// Span of 1/Kz (1).
     pub cross_compliance: Option<Span>,
 }
 

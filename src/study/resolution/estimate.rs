@@ -20,7 +20,7 @@ use tapjoint_signal::modal::{
 };
 use tapjoint_signal::spectral::{SpectralAverager, Window, largest_smooth_block};
 
-/// Fewest samples of a decay that is worth a fit.
+/// Fewest samples of a decay that is fitted.
 const LEAST_SAMPLES: usize = 64;
 
 /// One frequency as read.
@@ -145,7 +145,7 @@ fn transformed(
     band.transformer.transform(&windowed)
 }
 
-/// Fits the free decay from every resonance, and from whatever was read near a mode.
+/// Fits the free decay from every resonance, and from every reading near a mode.
 fn fit(
     band: &BandPlan,
     record: &VirtualRecord,

@@ -1,10 +1,10 @@
 //! Spectral resolution error: from block size, band, window and reading to the error of each natural
 //! frequency and of each joint stiffness.
 //!
-//! Every draw is a virtual test of one tap. Its beam and joint differ a little from the nominal ones,
-//! so that natural frequencies fall anywhere between two lines; its recording is transformed and read
-//! by the measurement stage, and its joint estimated by the estimators that a real test meets. Each
-//! draw is judged by its own truth, so that nothing but the reading is left in its errors.
+//! Every draw is a virtual test of one tap. Its beam and joint differ a little from the nominal ones, so that natural
+//! frequencies fall anywhere between two lines; its recording is transformed and read by the measurement stage, and
+//! its joint estimated by the estimators that a real test meets. Each draw is judged by its own truth, so that its
+//! errors stem from the reading alone.
 
 mod estimate;
 mod plan;
@@ -250,7 +250,7 @@ pub fn study_resolution(
         sentence: String::new(),
     };
     for (number, plan) in plans.iter().enumerate() {
-        // Collected in order: sums are then the same whatever the number of threads.
+        // Collected in order, so that sums do not depend on the number of threads.
         let draws: Vec<Draw> = (0..settings.draws)
             .into_par_iter()
             .map(|index| {

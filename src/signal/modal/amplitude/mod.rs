@@ -116,7 +116,7 @@ pub enum AmplitudeVerdict {
         /// Frequency of the neighbour (Hz).
         frequency: f64,
     },
-    /// A mode given lies nearer than the decay can tell apart.
+    /// Another given mode lies so near that one decay cannot separate the two.
     Unresolved {
         /// Frequency of that mode (Hz).
         frequency: f64,

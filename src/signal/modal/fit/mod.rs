@@ -76,7 +76,7 @@ pub enum FitError {
         /// Index of the line, from 0.
         line: usize,
     },
-    /// The axis is none.
+    /// The axis has frequencies that do not ascend, or no positive resolution.
     #[error(
         "the lines of a fit must have positive, ascending frequencies and a positive resolution"
     )]

@@ -55,7 +55,7 @@ const LEAST_DECAY: f64 = 0.02;
 struct Candidate {
     /// The pole, decay of an exponential window taken out.
     pole: Complex64,
-    /// The same as the responses show it, the window's decay included.
+    /// The pole as the responses show it, the window's decay included.
     seen: Complex64,
     participation: Vec<Complex64>,
 }

@@ -1,6 +1,6 @@
 //! Poles of every order, compared with those of the order before.
 //!
-//! The reduced normal equations of the denominator, for all orders at once.
+//! They follow from the reduced normal equations of the denominator, set up for all orders at once.
 //!
 //! Model (right matrix fraction): row o of H is B_o(z) A(z)^{-1}, with the denominator
 //! A(z) = sum_{j=0}^{n} A_j z^j (inputs by inputs) and the numerator
@@ -15,7 +15,7 @@
 //! modes outside the band is then modelled equally well at every order, and M of a lower order is a
 //! leading part of M of the highest, so that one factorisation serves the whole diagram.
 //!
-//! Roots of a matrix polynomial: eigenvalues of its block companion matrix.
+//! The roots of the matrix polynomial A are the eigenvalues of its block companion matrix.
 
 use std::f64::consts::TAU;
 
@@ -65,7 +65,7 @@ pub struct StabilisationPole {
 /// Poles of all orders from 2 to the highest, ascending in order and frequency.
 ///
 /// Shown are poles within the band that decay, with a damping ratio below [`MOST_DAMPING`]: with the
-/// lowest coefficient fixed the others belong to no structure (see the module's text).
+/// lowest coefficient fixed the others belong to no structure (see the text of `polyreference`).
 ///
 /// # Errors
 /// [`PolyreferenceError::TooFewLines`] where the band holds fewer lines than unknowns,
@@ -167,8 +167,8 @@ fn participation(coefficients: &DMatrix<Complex64>, inverse_root: Complex64) -> 
 /// Largest relative change of the frequency from one order to the next at which a pole is stable. 1 %, as usual
 /// in the field.
 const FREQUENCY_TOLERANCE: f64 = 0.01;
-/// The same in half-power widths. 0.25: of a mode with 0.1 % damping 1 % is five half-power widths, within which
-/// another mode has room; the narrower of both limits holds.
+/// Largest such change in half-power widths; the narrower of both limits holds. 0.25: at 0.1 % damping 1 % is five
+/// half-power widths, within which another mode has room.
 const HALF_POWER_TOLERANCE: f64 = 0.25;
 /// Largest relative change of the damping ratio. 5 %, as usual in the field.
 const DAMPING_TOLERANCE: f64 = 0.05;
@@ -258,7 +258,7 @@ impl CircleMap {
         )
     }
 
-    /// z of a pole, e^{(p - j 2 pi f_first) T_a}.
+    /// Inverse root w = 1/z of a pole, e^{-(p - j 2 pi f_first) T_a}.
     pub(super) fn inverse_root(&self, pole: Complex64) -> Complex64 {
         (-(pole - Complex64::new(0.0, TAU * self.first)) * self.time).exp()
     }

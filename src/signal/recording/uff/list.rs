@@ -92,7 +92,7 @@ impl UniversalFile {
         Some(RecordingWarning::new("header-cut", message))
     }
 
-    /// Contents in words: "2 coherence, 1 units (164)".
+    /// Contents in words: "2 x coherence, 1 x units (dataset 164)".
     pub fn contents(&self) -> String {
         let mut kinds: Vec<(String, usize)> = Vec::new();
         for dataset in &self.datasets {
@@ -422,7 +422,7 @@ impl Scanner {
         Ok(ended)
     }
 
-    /// Reads more into the buffer; how many bytes is the result.
+    /// Reads more into the buffer, and returns how many bytes it read.
     fn fill(&mut self, bytes: usize) -> Result<usize, RecordingError> {
         if self.at > SCAN_BYTES {
             self.buffer.drain(..self.at);

@@ -109,8 +109,10 @@ pub(in crate::recording) fn open_uff(
     })
 }
 
-/// Returns the names of the channels: the first of entity name, degree of freedom, axis label and description
-/// that every channel has and that tells all of them apart; else whatever a channel has.
+/// Returns the names of the channels.
+///
+/// Candidates are entity name, degree of freedom, axis label and description, in this order. The first that differs
+/// from channel to channel is taken for all of them. Where none does, each channel takes its own first candidate.
 fn channel_names(channels: &[Measured]) -> Vec<Option<String>> {
     let functions = channels.iter().map(|channel| &channel.values.function);
     let names: Vec<[Option<String>; 4]> = functions
@@ -498,7 +500,9 @@ impl<'a> FunctionGroup<'a> {
     }
 }
 
-/// Settles where the points of a function lie; `Err` inside says why that is not known. A stored abscissa is read and must be even.
+/// Settles where the points of a function lie. A stored abscissa is read and must be even.
+///
+/// The inner `Err` holds the reason why the points are not known.
 ///
 /// The header prints the step with six digits. Where a simpler number lies within that rounding, it
 /// is used: for time a whole sample rate, for frequency a whole number of 2^-12 Hz.

@@ -226,7 +226,7 @@ fn reading(frequency: f64, half_line: f64) -> ModeReading {
     }
 }
 
-/// What a recording shows of a band (Hz).
+/// Readings of one recording in a band (Hz).
 fn within(band: (f64, f64), readings: Vec<ModeReading>) -> BandReadings {
     BandReadings { band, readings }
 }

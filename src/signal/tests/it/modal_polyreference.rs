@@ -149,7 +149,7 @@ fn with_sub_bands(matrix: &ResponseMatrix) -> Vec<PolyreferenceMode> {
     all_modes(&searches.unwrap())
 }
 
-/// Whether every mode is found within `tolerance` (Hz) and nothing else is.
+/// Returns `true` where every mode is found within `tolerance` (Hz) and nothing else is.
 fn exactly(found: &[PolyreferenceMode], modes: &[Mode], tolerance: f64) -> bool {
     let mut truth: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
     truth.sort_by(f64::total_cmp);

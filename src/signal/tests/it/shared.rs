@@ -1,4 +1,4 @@
-//! What several tests use: lines without a zoom band, and real recordings where they are at hand.
+//! Helpers of several tests: lines without a zoom band, and real recordings where they are at hand.
 
 use std::path::PathBuf;
 

@@ -208,7 +208,7 @@ fn regress_a_scale_that_turns_the_sign_overrules_no_unit() {
     // -1 N for every kN is another unit.
     assert_eq!(scaled(-1.0, "t,force (kN),b"), 1);
     assert_eq!(scaled(-1.0, "t,force (tons),b"), 1);
-    // What a volt means no header says; per how many of them, one in millivolts leaves open.
+    // A scale per volt gives a header in V its meaning. Beside mV it may be per volt or per millivolt.
     assert_eq!(scaled(200.0, "t,force (V),b"), 0);
     assert_eq!(scaled(200.0, "t,force (mV),b"), 1);
 }
@@ -302,7 +302,7 @@ fn without_a_time_column_the_rate_must_be_given() {
     assert_eq!(recording.frames(), 9);
     assert_eq!(recording.channels()[0].name, None);
     assert_eq!(recording.read(1, 0..1).unwrap(), [2.5]);
-    // One column, decimal comma, told by the header.
+    // One column with a decimal comma: the header shows that the comma separates nothing.
     let (_file, recording) = with_rate("force (N)\n2,5\n3,5\n5,25\n", 5120.0);
     assert_eq!(recording.read(0, 0..9).unwrap(), [2.5, 3.5, 5.25]);
 }

@@ -1,4 +1,4 @@
-//! What is said about the quality of samples, on signals whose faults are known.
+//! Health of channels and its warnings, on signals whose faults are known.
 
 use std::f64::consts::TAU;
 

@@ -12,7 +12,7 @@ use super::{assert_message, file, open, open_error, read_all};
 const PRIMES: [i64; 12] = [2, -3, 5, -7, 11, -13, 17, -19, 23, -29, 31, -37];
 const CHANNELS: u16 = 3;
 
-/// What a WAV file is made of.
+/// Parts of a WAV file.
 #[derive(Clone)]
 pub struct Parts {
     pub tag: u16,
@@ -213,7 +213,7 @@ fn every_coding_is_read_exactly() {
     }
 }
 
-/// Returns `true` where a doubt of this kind says `words`.
+/// Returns `true` where a warning of this code contains `words`.
 fn has(warnings: &[RecordingWarning], code: &str, words: &str) -> bool {
     let mut all = warnings.iter();
     all.any(|warning| warning.code() == code && warning.to_string().contains(words))
@@ -317,7 +317,7 @@ fn a_promise_of_terabytes_costs_nothing() {
     let bytes = rf64(b"RF64", 1 << 45);
     let (_file, recording) = open(&bytes);
     let recording = recording.unwrap();
-    // The chunk behind is 12 bytes: two frames more, since nobody can know that it is none.
+    // The chunk behind is 12 bytes and reads as two frames more: the promised size would hold them.
     assert_eq!(recording.frames(), 6);
     assert_eq!(recording.warnings()[0].code(), "truncated");
 }

@@ -192,7 +192,7 @@ def decays():
     for index, (frames, frequency) in enumerate([(600, 0.05), (1500, 0.2), (300, 0.4)]):
         force = [20000 if n % (frames // 2) in (20, 21, 22) else 0 for n in range(frames)]
         response = [int(9000 * math.exp(-((n - 20) % (frames // 2)) / 100) * math.sin(frequency * n)) for n in range(frames)]
-        yield f"taps-{index}", bytes([60 * index, 200, 255]) + struct.pack(f"<{2 * frames}h", *force, *response)
+        yield f"taps-{index}", bytes([60 * index, 200, 255, 255]) + struct.pack(f"<{2 * frames}h", *force, *response)
 
 
 def main():

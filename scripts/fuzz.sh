@@ -25,6 +25,7 @@ cargo build --release --quiet --manifest-path fuzz/Cargo.toml --target "$host"
 folder="$(cargo metadata --manifest-path fuzz/Cargo.toml --format-version 1 --no-deps \
     | python3 -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')"
 
+rm -rf fuzz/seeds
 python3 fuzz/seeds.py fuzz/seeds >/dev/null
 mkdir -p fuzz/artifacts
 failed=0
@@ -40,9 +41,10 @@ for target in "${targets[@]}"; do
         failed=1
     fi
     executions="$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")"
-    coverage="$(grep -o 'cov: [0-9]*' "$log" | tail -1)"
+    coverage="$(grep -o 'cov: [0-9]*' "$log" | tail -1)" || true
     memory="$(sed -n 's/^stat::peak_rss_mb: *//p' "$log")"
     printf '%-12s %12s executions  %s  corpus %s  %s MB  %s\n' "$target" "$executions" "${coverage:-cov: ?}" \
         "$(find "fuzz/corpus/$target" -type f | wc -l)" "$memory" "$result"
 done
+rm -f /dev/shm/tapjoint-fuzz-*
 exit "$failed"

@@ -152,7 +152,7 @@ pub fn identify(bytes: &[u8]) {
 
 /// Takes samples through the chain to modes. Every frequency is finite.
 pub fn chain(bytes: &[u8]) {
-    let (head, samples) = bytes.split_at(bytes.len().min(3));
+    let (head, samples) = bytes.split_at(bytes.len().min(4));
     let mut numbers = Numbers(head);
     let rate = numbers.log_between(1.0, 1e6);
     let hammer = numbers.is().then_some(ChannelRef::Number(1));
@@ -168,7 +168,7 @@ pub fn chain(bytes: &[u8]) {
         samples: samples[channel * frames..(channel + 1) * frames].to_vec(),
         ..Channel::default()
     });
-    let recording = Recording::from_samples("samples", rate, channels.to_vec()).expect("finite samples");
+    let recording = Recording::from_samples("samples", rate, channels.into()).expect("finite samples");
     if let Ok(analysis) = run_recording(recording, hammer.as_ref(), |_| {}) {
         assert!(analysis.modes.iter().all(|mode| mode.frequency.is_finite()));
         render_json(&document_of(&analysis)).expect("a report");

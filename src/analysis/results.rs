@@ -298,8 +298,7 @@ pub struct AverageSection {
     pub ky_percent: Option<f64>,
     /// Mean of the magnitudes, of Kz (%).
     pub kz_percent: Option<f64>,
-    /// Magnitude of the error of the two estimates' mean (%), as in table 14: smaller, because
-    /// opposite errors cancel. Of Kx.
+    /// Magnitude of the error of the mean of Kx (%), as in table 14. It is smaller, because opposite errors cancel.
     pub kx_of_mean_percent: Option<f64>,
     /// Magnitude of the error of the mean of Ky (%).
     pub ky_of_mean_percent: Option<f64>,

@@ -303,7 +303,7 @@ pub(super) fn words<T: Copy + Send + Sync + 'static, const N: usize>(
 pub(super) fn assembly() -> impl TypedValueParser<Value = Assembly> {
     let help = [
         "A beam held at one end",
-        "Two beams joined end to end, free otherwise",
+        "Two beams joined in the middle, free at both ends",
         "A free beam",
     ];
     words(ASSEMBLIES, help)

@@ -23,7 +23,7 @@ use tapjoint::study::publication::reproduce;
 const TASKS: &[(&str, &[&str])] = &[
     (
         "A test from recordings to report",
-        &["init", "run", "inspect", "batch", "compare"],
+        &["init", "run", "inspect"],
     ),
     ("Spectra", &["spectrum", "frf"]),
     (

@@ -181,8 +181,9 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
 
 /// Show the averaged spectrum of a recording and its peaks.
 ///
-/// Each peak has the bounds that follow from the resolution. A block of N samples gives N/2.56 lines over the band. The line spacing is the resolution. Zero
-/// padding and interpolation do not improve it.
+/// Each peak has the bounds that follow from the resolution. A block of N samples gives N/2.56 lines over the band.
+/// The resolution is the larger of the line spacing and 1/T, where T is the length of signal used. Zero padding and
+/// interpolation do not improve it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"

@@ -269,7 +269,8 @@ impl<'t> Entry<'t> {
         remedy: &str,
     ) -> DescriptionError {
         self.error(format!(
-            "{found} values stand here; allowed: {allowed}; {remedy}"
+            "{found} value{} here; allowed: {allowed}; {remedy}",
+            if found == 1 { " stands" } else { "s stand" }
         ))
     }
 

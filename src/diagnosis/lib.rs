@@ -54,7 +54,7 @@ pub use result::{
     Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
     Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
-pub use settings::{DETECTED, GapError, GapSettings, MISFIT};
+pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
 pub use structure::{Nominal, NominalSensor};
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
 

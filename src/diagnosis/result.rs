@@ -28,7 +28,7 @@ pub struct Diagnosis {
     pub joint_shift: JointShift,
     /// Changes along the beam that the residual of the nominal model calls for; `None` with too few data.
     pub location_map: Option<LocationMap>,
-    /// Whether data or priors decided between the two best hypotheses.
+    /// Data or priors: what decided between the two best hypotheses.
     pub decided_by: DecidedBy,
     /// Joint whose stiffness depends on the amplitude, as the decays alone show it; `None` where no frequency
     /// changes along them.
@@ -430,17 +430,16 @@ pub struct AmplitudeDependence {
     /// that change do so the same way, of which there are two at least; else null. Joints soften in translation too,
     /// which modes feel that do not turn them; the change of the rotation is then unknown.
     pub effect: Option<EffectId>,
-    /// Whether more than one frequency changes in a certain direction: of one alone the cause stays open.
+    /// True if more than one frequency changes in a certain direction. The cause of a single change stays open.
     pub enough: bool,
-    /// Whether a law of the joint's rotation explains the changes: only then `ratio` is its size.
+    /// True if a law of the joint's rotation explains the changes. Only then `ratio` is its size.
     pub lawful: bool,
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1), over that at
     /// rest: negative where it softens. No change beyond 0.7 is looked for.
     pub ratio: f64,
     /// Its standard uncertainty (1).
     pub ratio_std: f64,
-    /// Whether the changes ask for as much as is looked for: `ratio` is then a bound, and `ratio_std` does
-    /// not hold.
+    /// True if the search ended at its limit. `ratio` is then a bound, and `ratio_std` does not hold.
     pub at_bound: bool,
     /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
     pub exponent: f64,

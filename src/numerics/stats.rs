@@ -60,9 +60,13 @@ pub mod student {
         (freedom + 1.0) / (freedom + residual * residual)
     }
 
-    /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any, 0 where t is not finite.
+    /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any, or for a t that is no
+    /// number.
     pub fn two_sided(t: f64, freedom: f64) -> f64 {
-        if !t.is_finite() {
+        if t.is_nan() {
+            return 1.0;
+        }
+        if t.is_infinite() {
             return 0.0;
         }
         StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| 2.0 * student.cdf(-t.abs()))

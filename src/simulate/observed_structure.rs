@@ -4,7 +4,6 @@ use super::laboratory::{SimulateError, SpecimenSettings};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_beam::{JointStiffness, StructureError};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
@@ -179,12 +178,7 @@ fn joint(
     }
     let (missing, keys) = match (given, test.joint.kt, test.joint.kr) {
         (Some(given), ..) => {
-            let units = StiffnessUnits::of(&described_beam(test));
-            return Ok(Some(Joint {
-                kt: given.kx * units.kt,
-                kr: given.ky * units.kr,
-                coupling: coupling(given.kx, given.ky, given.cross_compliance),
-            }));
+            return Ok(Some(given.in_si(&described_beam(test))));
         }
         (None, Some(kt), Some(kr)) => {
             let coupling = coupling(kt, kr, 1.0 / test.joint.ktr.unwrap_or(f64::INFINITY));

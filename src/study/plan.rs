@@ -15,13 +15,9 @@ use tapjoint_beam::effects::{EffectError, EffectId};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, TestDescription};
 use tapjoint_diagnosis::{
-    GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
-    observe,
+    DETECTABLE, GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose,
+    nominal_chi_square, observe,
 };
-
-/// Non-centrality of chi square (one degree of freedom) that the 1 % level notices nine times out of ten:
-/// (2.576 + 1.282)^2.
-pub(super) const NOTICED: f64 = 14.9;
 
 /// Settings for the judgement of a plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +61,7 @@ pub enum PlanError {
     )]
     NoRecordings,
     /// A recording without a tap position.
-    #[error("recording \"{file}\" does not say where it will be tapped; give `tap` (m)")]
+    #[error("recording \"{file}\" has no tap position; give `tap` (m)")]
     NoTap {
         /// Its file.
         file: String,
@@ -207,7 +203,7 @@ fn case(
     let truth = Truth {
         name: format!("draw-{number:03}"),
         effects: effects.iter().map(Planted::of).collect(),
-        detectable: (!effects.is_empty()).then_some(chi_square > NOTICED),
+        detectable: (!effects.is_empty()).then_some(chi_square > DETECTABLE),
         refutable: None,
     };
     let diagnosis = diagnose(&observed, nominal, &GapSettings::default());

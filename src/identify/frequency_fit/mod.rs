@@ -159,9 +159,9 @@ pub struct EstimatedQuantity {
 /// Correlation of two estimated parameters (their logarithms; of the coupling its atanh).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
-    /// One.
+    /// First parameter.
     pub first: Parameter,
-    /// The other.
+    /// Second parameter.
     pub second: Parameter,
     /// Between -1 and 1.
     pub value: f64,

@@ -354,7 +354,7 @@ pub(super) fn check_frequency_scatter(
         _ if !beyond_noise => Outcome::Good,
         _ if relative > least => Outcome::Doubtful,
         _ => {
-            small = format!("; up to {:.3} % is none to doubt", 100.0 * least);
+            small = format!("; a scatter up to {:.3} % is no doubt", 100.0 * least);
             Outcome::Good
         }
     };
@@ -459,11 +459,11 @@ pub(super) fn check_window_damping(
         let outcome = Outcome::doubtful_unless(share <= limit);
         (outcome, format!("{own:.5} is the structure's"))
     } else {
-        let none = "so that none is left: it is refused";
+        let none = "so none is left, and it is not stated";
         (Outcome::Bad, none.to_owned())
     };
     let happened = format!(
-        "Of the damping ratio {apparent:.5} the window makes {:.0} %, {rest} (limit {:.0} %).",
+        "The window makes {:.0} % of the damping ratio {apparent:.5}, {rest} (limit {:.0} %).",
         100.0 * share,
         100.0 * limit
     );

@@ -411,7 +411,7 @@ fn of_driving_points(
 ) -> Vec<Verdict> {
     let none = recording.verdict(check, 0.0);
     if recording.tap_position.is_none() {
-        return vec![none.missing("Not applicable: nobody said where the hammer strikes.")];
+        return vec![none.missing("Not applicable: the tap position is not given.")];
     }
     if recording.resonances.len() < least_modes {
         return vec![none.missing("Not applicable: too few resonances.")];

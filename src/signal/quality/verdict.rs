@@ -199,7 +199,7 @@ impl From<Check> for &'static str {
     }
 }
 
-/// What came out.
+/// The outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
@@ -241,7 +241,7 @@ impl Outcome {
 pub struct Verdict {
     /// What was checked.
     pub check: Check,
-    /// On what.
+    /// Subject of the check.
     #[serde(flatten)]
     pub subject: Subject,
     /// What was found (unit: [`Verdict::unit`]); `None` where there is nothing to measure.
@@ -250,14 +250,14 @@ pub struct Verdict {
     pub limit: f64,
     /// Unit of value and limit; "1" for a ratio.
     pub unit: &'static str,
-    /// What came out.
+    /// The outcome.
     pub outcome: Outcome,
     /// What happened, with its numbers: a sentence.
     #[serde(rename = "text")]
     pub happened: String,
-    /// Of a doubt why it might be; else `None`.
+    /// Likely cause; `None` without a doubt.
     pub cause: Option<&'static str>,
-    /// Of a doubt what helps; else `None`.
+    /// Remedy; `None` without a doubt.
     pub remedy: Option<&'static str>,
 }
 
@@ -386,7 +386,7 @@ impl Subject {
 /// A subject as `report.json` has it.
 #[derive(Serialize, JsonSchema)]
 struct WrittenSubject {
-    /// On what, in words: "full.wav, tap 2".
+    /// Subject in words: "full.wav, tap 2".
     subject: String,
     /// File of the recording; null of the test as a whole.
     recording: Option<String>,

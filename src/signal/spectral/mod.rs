@@ -38,7 +38,7 @@ pub enum SpectralError {
     },
     /// The band holds fewer resolution widths than a spectrum needs lines.
     #[error(
-        "the band {low} to {high} Hz is too narrow for {seconds:.3} s of signal: what that resolves are lines {resolution:.3} Hz apart; give a band of at least {least_width:.3} Hz, or set the taps farther apart"
+        "the band {low} to {high} Hz is too narrow: {seconds:.3} s of signal resolve {resolution:.3} Hz; give a band of at least {least_width:.3} Hz, or leave more time between taps"
     )]
     TooNarrow {
         /// Lower end (Hz).

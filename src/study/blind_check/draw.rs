@@ -7,7 +7,7 @@
 
 use super::case::{CaseKind, Extent, Planted, Truth};
 use super::planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform};
-use crate::plan::{NOTICED, PlanError, PlanSettings, plan_of};
+use crate::plan::{PlanError, PlanSettings, plan_of};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,7 +19,7 @@ use tapjoint_beam::{
 };
 use tapjoint_description::{DescriptionError, TestDescription};
 use tapjoint_diagnosis::{
-    GapError, GapSettings, Hypothesis, diagnose, nominal_chi_square, observe,
+    DETECTABLE, GapError, GapSettings, Hypothesis, diagnose, nominal_chi_square, observe,
 };
 use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
 use tapjoint_simulate::{
@@ -135,10 +135,10 @@ pub enum DrawError {
     #[error("a drawn test cannot be simulated: {0}")]
     Simulate(#[from] SimulateError),
     /// A drawn test is no plan.
-    #[error("what a drawn test can show cannot be planned: {0}")]
+    #[error("the drawn test cannot be planned: {0}")]
     Plan(#[from] PlanError),
     /// The limits of a drawn test cannot be computed.
-    #[error("what a drawn test can show cannot be said: {0}")]
+    #[error("the limits of a drawn test cannot be computed: {0}")]
     Limits(#[from] GapError),
     /// The nominal description cannot be written.
     #[error("a drawn description cannot be written: {0}")]
@@ -357,7 +357,7 @@ impl DrawnTest {
         let settings = GapSettings::default();
         if let CaseKind::Single(_) = kind {
             let chi_square = nominal_chi_square(&readings, &nominal, &settings)?;
-            truth.detectable = Some(chi_square > NOTICED);
+            truth.detectable = Some(chi_square > DETECTABLE);
             return Ok(truth);
         }
         let found = diagnose(&readings, &nominal, &settings)?;
@@ -376,7 +376,8 @@ impl DrawnTest {
             all.find(|one| one.hypothesis == own)?.misfit
         });
         let misfits: Option<Vec<_>> = misfits.collect();
-        truth.detectable = misfits.map(|all| all.iter().all(|misfit| misfit.chi_square > NOTICED));
+        truth.detectable =
+            misfits.map(|all| all.iter().all(|misfit| misfit.chi_square > DETECTABLE));
         Ok(truth)
     }
 

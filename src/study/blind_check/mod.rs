@@ -20,7 +20,7 @@ pub use case::{Answer, Case, CaseKind, Class, Extent, Planted, Truth};
 pub use draw::{Campaign, DrawError, DrawnTest, Recorded, RecordedTest};
 pub use planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect};
 pub use score::{
-    Calibration, Conduct, Rate, ReliabilityBin, SET_SHARE, Scores, always_scale, score, shuffled,
+    Calibration, Conduct, Rate, ReliabilityBin, Scores, always_scale, score, shuffled,
 };
 pub use table::{Row, Target, render_rows, rows};
 pub use truth_file::{TruthError, TruthFile, commitment, parse_truths};

@@ -9,10 +9,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{Beta, ContinuousCDF};
 use tapjoint_beam::effects::{EffectId, Group};
-use tapjoint_diagnosis::Verdict;
-
-/// Share of the probability that an answer's set holds.
-pub const SET_SHARE: f64 = 0.9;
+use tapjoint_diagnosis::{SET_PROBABILITY, Verdict};
 
 /// All rates of a blind check.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +84,7 @@ pub fn score(cases: &[Case]) -> Scores {
     let sizes = sorted(singles.iter().filter_map(|(t, a)| size_error(t, a)));
     let classed = cases.iter().filter_map(|(truth, answer)| {
         let class = truth.class()?;
-        Some((class, answer.set(SET_SHARE)))
+        Some((class, answer.set(SET_PROBABILITY)))
     });
     let sets: Vec<(Class, Vec<Class>)> = classed.collect();
     let failed = cases.iter().filter(|(_, answer)| answer.verdict.is_none());
@@ -116,7 +113,7 @@ pub fn score(cases: &[Case]) -> Scores {
         null_called_effect: Rate::of(&nulls, |(_, a)| {
             Some(match &a.verdict {
                 Some(Verdict::Named(_) | Verdict::Group(_)) => true,
-                Some(Verdict::Set(_)) => !a.set(SET_SHARE).contains(&Class::None),
+                Some(Verdict::Set(_)) => !a.set(SET_PROBABILITY).contains(&Class::None),
                 Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
             })
         }),

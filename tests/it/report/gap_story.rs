@@ -341,7 +341,7 @@ fn frozen_story_of_what_drift_explains() {
     gap.hypotheses[1].gap_after = Some(1.5);
     tell(
         &mut text,
-        "less than half of the gap: not worth a word",
+        "less than half of the gap: not mentioned",
         &document,
     );
     assert_snapshot("story_drift", &text);

@@ -6,6 +6,7 @@
 FOLDER/TARGET/ then holds the seeds of each target. Python's standard library is enough.
 """
 
+import json
 import math
 import struct
 import sys
@@ -26,7 +27,8 @@ def chunk(name, content):
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
 
-def wav(tag, bits, magic=b"RIFF", extensible=False, extra=b"", channels=2):
+def wav(tag, bits, magic=b"RIFF", extensible=False, extra=b"", channels=2, low_end=False):
+    """A file; `low_end` puts the valid bits at the wrong end of their containers."""
     data = b""
     for frame in zip(*samples(channels=channels)):
         for value in frame:
@@ -36,7 +38,7 @@ def wav(tag, bits, magic=b"RIFF", extensible=False, extra=b"", channels=2):
                 data += struct.pack("B", int(128 + 127 * value))
             else:
                 size = (bits + 7) // 8
-                data += int(value * (2 ** (bits - 1) - 1) * 2 ** (8 * size - bits)).to_bytes(size, "little", signed=True)
+                data += int(value * (2 ** (bits - 1) - 1) * 2 ** (0 if low_end else 8 * size - bits)).to_bytes(size, "little", signed=True)
     size = (bits + 7) // 8 * channels
     form = struct.pack("<HHIIHH", 0xFFFE if extensible else tag, channels, 2560, 2560 * size, size, (bits + 7) // 8 * 8)
     if extensible:
@@ -57,6 +59,12 @@ def wavs():
     yield "rf64", wav(1, 16, magic=b"RF64")
     yield "bw64", wav(3, 32, magic=b"BW64")
     yield "with-list", wav(1, 16, extra=chunk(b"LIST", b"INFOINAM\4\0\0\0tap\0"))
+    yield "odd-chunk", wav(1, 16, extra=b"LIST\5\0\0\0INFOa")
+    yield "low-end", wav(1, 20, extensible=True, low_end=True)
+    for name, size in [("size-0", 0), ("size-unknown", 0xFFFFFFFF), ("size-too-large", 1 << 20)]:
+        whole = wav(1, 16)
+        at = whole.index(b"data") + 4
+        yield name, whole[:at] + struct.pack("<I", size) + whole[at + 4 :]
     yield "one-channel", wav(1, 16, channels=1)
     yield "cut", wav(1, 16)[:-7]
 
@@ -84,6 +92,19 @@ def texts():
     yield "two-headers", table(",", ".", "time,force,tip\ns,N,m/s2\n")
     yield "utf-16", "\ufefft;a\n0;1\n0,1;2\n0,2;3\n".encode("utf-16-le")
     yield "utf-8-mark", b"\xef\xbb\xbftime,x\n0,1\n0.1,2\n0.2,3\n"
+    yield "old-line-ends", table(",", ".", "time,x,y\r", end="\r")
+    yield "names-in-comment", table("\t", ".", "", comment="# time (s)\tforce (N)\ttip (g)\n")
+    yield "names-in-comment-blanks", table(" ", ".", "", comment="% t force (N) tip (V)\n")
+    yield "units-in-brackets", table(";", ".", "time;force;tip\n[s];[N];[m/s2]\n")
+    yield "temperature", b"T (degC),t (ms),x (mV),y (furlong)\n20,0,1,2\n20,1,2,4\n20,2,3,5\n"
+    yield "empty-column", b"t;x;\n0;1;\n1;2;\n2;3;\n"
+    yield "latin-1", b"Zeit;Tr\xe4ger (m/s\xb2)\n0,0;1,5\n0,1;2,5\n0,2;3,5\n"
+    yield "single-precision", "".join(f"{n * 0.1:.8g}\t{n % 3}\n" for n in range(30)).encode()
+    yield "summed-time", b"time,x\n" + "".join(f"{n / 3:.3f},{n % 5}\n" for n in range(30)).encode()
+    yield "flat-tops", b"x,y\n" + "".join(f"{min(n % 9, 6)},{0 if n > 20 else n % 7}\n" for n in range(80)).encode()
+    yield "text-among-numbers", b"t,x\n0,1\n1,abc\n2,nan\n"
+    yield "gap", b"t,x\n0,1\n1,2\n4,3\n"
+    yield "two-decimal-marks", b"t;x\n0,0;1.5\n0,1;2,5\n"
     yield "exponents", b"t,x\n0,1e-3\n1e-1,-2.5E+02\n2.0d-1,3\n"
 
 
@@ -91,6 +112,10 @@ def functions_as_text():
     rows = "".join(f"{0.5 * n},{1 / (1 + n):.6g},{-0.1 * n:.6g}\n" for n in range(24))
     yield "columns", ("frequency (Hz),real,imag\n" + rows).encode()
     yield "tabs", rows.replace(",", "\t").encode()
+    yield "coherence", ("Freq (kHz);Real;Imag;Coherence\n" + "".join(f"{n};1;{n};0.9\n" for n in range(9))).encode()
+    yield "angular", ("w (rad/s),Re (mm/s)/N,Im (mm/s)/N\n" + rows).encode()
+    yield "points", ("Ref Chan:Resp Chan,1+Z:3+Z\nunit,m/N\nHz,Re,Im\n" + rows).encode()
+    yield "polar", ("Frequency (Hz),Magnitude,Phase (deg)\n" + rows).encode()
     yield "unit", ("f [Hz];Re [(m/s2)/N];Im [(m/s2)/N]\n" + rows.replace(",", ";")).encode()
 
 
@@ -119,6 +144,12 @@ def values58(numbers, per_line, digits):
     return ["".join(cells[at : at + per_line]) for at in range(0, len(cells), per_line)]
 
 
+def uneven_double(pairs):
+    """Lines of 2(E13.5,E20.12)."""
+    cells = [f"{time:13.5e}{value:20.12e}" for time, value in zip(pairs[::2], pairs[1::2])]
+    return ["".join(cells[at : at + 2]) for at in range(0, len(cells), 2)]
+
+
 def universal_series():
     first = samples(24, 1)[0]
     complex_values = [part for value in first for part in (value, -value)]
@@ -127,6 +158,15 @@ def universal_series():
     yield "real-double", dataset(58, *header58(1, 4, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 4, 11))
     yield "uneven", dataset(58, *header58(1, 2, 24, 0, 0, 0, 17, 12), *values58(pairs, 6, 5))
     yield "complex", dataset(58, *header58(1, 5, 24, 1, 0, 1 / 1280, 17, 12), *values58(complex_values, 6, 5))
+    yield "uneven-double", dataset(58, *header58(1, 4, 24, 0, 0, 0, 17, 12), *uneven_double(pairs))
+    yield "general", dataset(58, *header58(0, 2, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 6, 5))
+    yield "no-columns", dataset(58, *header58(1, 2, 24, 1, 0, 1 / 1280, 17, 12), *[f"{value:.4g} -1.0-101" for value in first])
+    yield "slow-one", (
+        dataset(58, *header58(1, 2, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 6, 5))
+        + dataset(58, *header58(1, 2, 12, 1, 0, 1 / 640, 17, 11), *values58(first[:12], 6, 5))
+    )
+    yield "cut-header", dataset(58, *header58(1, 2, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 6, 5)) + "    -1\n    58\nx\n"
+    yield "cut-values", dataset(58, *header58(1, 2, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 6, 5))[:-60]
     yield "two", 2 * dataset(58, *header58(1, 2, 24, 1, 0, 1 / 1280, 17, 12), *values58(first, 6, 5))
     yield "with-others", (
         dataset(151, "model", "NONE", "NONE", "14-MAR-26", "NONE", "NONE", "NONE")
@@ -136,12 +176,20 @@ def universal_series():
     )
 
 
-def binary58(function, ordinate, numbers, order):
+def binary58(function, ordinate, numbers, order, even=1, wide=False):
+    """A dataset 58b; `wide` stores the uneven abscissa in double precision, against the standard."""
     code = "f" if ordinate in (2, 5) else "d"
-    data = struct.pack(("<" if order == 1 else ">") + f"{len(numbers)}{code}", *numbers)
-    count = len(numbers) // (2 if ordinate in (5, 6) else 1)
+    mark = "<" if order == 1 else ">"
+    parts = 2 if ordinate in (5, 6) else 1
+    count = len(numbers) // parts
+    data = b""
+    for n in range(count):
+        if not even:
+            data += struct.pack(mark + ("d" if wide else "f"), n * (0.5 if function != 1 else 1 / 1280))
+        data += struct.pack(mark + f"{parts}{code}", *numbers[parts * n : parts * n + parts])
     head = f"    -1\n    58b{order:6d}{2:6d}{11:12d}{len(data):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
-    lines = header58(function, ordinate, count, 1, 0, 0.5 if function == 4 else 1 / 1280, 18 if function == 4 else 17, 12)
+    step, axis = (1 / 1280, 17) if function == 1 else (0.5, 18)
+    lines = header58(function, ordinate, count, even, 0, step if even else 0, axis, 12)
     return (head + "".join(line + "\n" for line in lines)).encode() + data + b"\n    -1\n"
 
 
@@ -152,6 +200,13 @@ def universal_functions():
     yield "single", text
     yield "double", dataset(58, *header58(4, 6, 24, 1, 0, 0.5, 18, 12), *values58(values, 4, 11))
     yield "with-coherence", text + dataset(58, *header58(6, 2, 24, 1, 0, 0.5, 18, 12), *values58(coherence, 6, 5))
+    mobility = dataset(58, *header58(4, 5, 24, 1, 0, 0.5, 18, 11), *values58(values, 6, 5))
+    yield "several", text + mobility + dataset(58, *header58(4, 5, 12, 1, 0, 1, 18, 8), *values58(values[:24], 6, 5))
+    units = dataset(164, f"{9:10d}mm (newton)          {2:10d}", "".join(f"{x:25.17e}" for x in (1e3, 1.0, 1.0)), "0.0")
+    yield "with-units", units + text.replace("m/s2", "NONE").replace(" N  ", "NONE")
+    yield "other-unit", text.replace("m/s2", "mm/s").replace(" N   ", " lbf ")
+    yield "unknown-unit", text.replace("m/s2", "ells")
+    yield "cut", text[:-200]
     yield "uneven", dataset(58, *header58(4, 5, 16, 0, 0, 0, 18, 12), *values58(values, 6, 5))
 
 
@@ -163,7 +218,95 @@ def as_bytes(cases):
 # ---------------------------------------------------------------- all
 
 
+BEAM = """[beam]
+length = "423 mm"
+width = 0.05
+thickness = "5 mm"
+modulus = "207 GPa"
+density = "7.85 g/cm3"
+poisson = 0.29
+tolerance = { length = "1 mm", modulus = "2 %", density = 50 }
+"""
+
+EVERY_KEY = """name = "every key"
+[joint]
+kind = "cantilever"
+model = "3p"
+beam = "euler"
+kt = "rigid"
+ktr = -5e4
+[hammer]
+channel = "force"
+sensitivity = "2.2 mV/N"
+[[sensor]]
+name = "A"
+channel = 2
+scale = -2000.0
+position = 0.338
+mass = "24 g"
+kind = "velocity"
+[[recording]]
+file = "low.wav"
+tap = 0.04
+level = 2
+band = [0, "200 Hz"]
+block = 2048
+at = { A = 0.20 }
+sample_rate = "5 kHz"
+torque = 12
+temperature = "20 degC"
+date = 2026-03-14
+[[recording.mass]]
+position = 0.1
+mass = "10 g"
+[[recording]]
+file = "high.uff"
+form = "accelerance"
+sensor = "A"
+[analysis]
+window = "exponential"
+reading = "fit"
+fit_modes = 4
+weights = "measured"
+sensor_mass = true
+fit = ["kr", "modulus"]
+"""
+
+LAP = """[beam.right]
+thickness = 0.007
+width = "5 cm"
+[joint]
+kind = "lap"
+position = 0.17
+overlap = { length = 0.04, mass = 0.05 }
+[measured]
+frequencies = [124, 367, 838.5, "1.354 kHz"]
+modes = [1, 2, 3, 5]
+std = [0.1, 0.1, 0.2, 0.5]
+scatter = "0.3 %"
+"""
+
+EFFECTS = """[joint]
+kind = "cantilever"
+kt = 1.4e6
+kr = "320 N m/rad"
+[[effect]]
+id = "sensor-mass"
+mass = 0.024
+[[effect]]
+id = "local-crack"
+compliance = 0.02
+position = 0.1
+[[effect]]
+id = "axial-load"
+force = "50 N"
+"""
+
+
 def descriptions():
+    for name, rest in [("every-key", EVERY_KEY), ("lap", LAP), ("effects", EFFECTS)]:
+        first, _, more = rest.partition("[") if rest.startswith("name") else ("", "", rest[1:])
+        yield name, (first + BEAM + "[" + more).encode()
     for path in sorted([*ROOT.glob("recordings/*/*.toml"), *ROOT.glob("examples/*.toml")]):
         yield f"{path.parent.name}-{path.stem}", path.read_bytes()
     guide = (ROOT / "docs/guide.md").read_text() + (ROOT / "README.md").read_text()
@@ -174,7 +317,38 @@ def descriptions():
 def truths():
     for path in sorted(ROOT.glob("recordings/*/truth.json")):
         yield path.parent.name, path.read_bytes()
-    yield "blind-check", b'{"seed": 1, "cases": [{"test": "test-0001", "truth": {"effects": [{"id": "sensor-mass", "mass": 0.024}]}}]}'
+    entries = {
+        "one": {"name": "a", "effects": ["sensor-mass"], "params": {"mass": 0.024}},
+        "none": {"name": "a", "effects": [], "parameters": {"x": 1}, "detectable": True, "refutable": None, "note": ""},
+        "two": {"name": "a", "effects": ["length", "axial-load"], "params": {"relative": 0.01, "force": 5, "length.relative": 1}},
+        "braces": {"name": "b", "effects": ["added-mass", "local-crack"], "params": {"added-mass": {"mass": 1, "position": "x"}}},
+        "outside": {"name": "c", "effects": ["sensor-mas", "none", "wind"], "params": {}, "detectable": False},
+    }
+    for name, entry in entries.items():
+        yield name, json.dumps([entry]).encode()
+    yield "twice", json.dumps([entries["one"]] * 2).encode()
+    yield "object", b'{"seed": 1, "cases": []}'
+
+
+def reports():
+    """Reports behind a byte that chooses the structure: cantilever, lap joint, free beam, and two with masses."""
+    stiffness = {"value": 1.4e6, "std": 1e4, "low": 1.2e6, "high": 1.6e6}
+    rigid = {"value": None, "std": None, "low": 1e7, "high": None}
+    scaled = stiffness | {"low_scaled": 1e6, "high_scaled": None}
+    beam = {"length": 0.42, "width": 0.05, "thickness": 0.0051, "modulus": 2.1e11, "density": 7800}
+    coupled = {"value": -5e4, "std": None, "low": None, "high": None}
+    misfit = [{"code": "misfit", "text": "the model misses the frequencies by 3 %; kx 3"}, {"code": "closure", "text": "b"}]
+    estimates = {
+        "both": {"method": "consistent", "kt": stiffness, "kr": stiffness | {"value": 320}, "ktr": None, "beam": beam},
+        "rigid": {"method": "consistent", "kt": rigid, "kr": stiffness},
+        "coupled": {"method": "pairs", "kt": scaled, "kr": stiffness, "ktr": coupled, "modulus": {"value": 2e11}},
+        "free": {"method": "free-beam", "modulus": {"value": 2.05e11}, "density": {"value": 7900}},
+        "none": None,
+    }
+    for name, estimate in estimates.items():
+        report = {"version": 2, "estimate": estimate, "prediction": [{"mode": 1, "predicted": 17.0}] * 3, "warnings": misfit}
+        for structure in (0, 1, 2, 250, 251) if name == "both" else (0, 1, 2):
+            yield f"{name}-{structure}", bytes([structure]) + json.dumps(report).encode()
 
 
 def random_bytes(lengths):
@@ -197,15 +371,29 @@ def decays():
 
 def main():
     folder = Path(sys.argv[1])
-    binary = [
-        (f"binary-{function}-{ordinate}-{order}", binary58(function, ordinate, [0.1 * n for n in range(24)], order))
-        for function, ordinate, order in [(1, 2, 1), (1, 4, 2), (4, 5, 1), (4, 6, 2)]
+    numbers = [0.1 * n for n in range(24)]
+    widths = [(1, False), (0, False), (0, True)]
+    series = [
+        (f"binary-{ordinate}-{order}-{even}-{wide}", binary58(1, ordinate, numbers, order, even, wide))
+        for ordinate in (2, 4, 5, 6)
+        for order in (1, 2)
+        for even, wide in widths
     ]
+    complex_functions = [
+        (f"binary-{ordinate}-{order}-{even}", binary58(4, ordinate, numbers, order, even))
+        for ordinate in (5, 6)
+        for order in (1, 2)
+        for even in (1, 0)
+    ]
+    both = ("binary-with-coherence", binary58(4, 5, numbers, 1) + binary58(6, 2, [0.9] * 12, 1))
     targets = {
-        "recording": [*wavs(), *texts(), *as_bytes(universal_series()), *binary[:2]],
-        "responses": [*functions_as_text(), *as_bytes(universal_functions()), *binary[2:]],
+        "wav": [*wavs()],
+        "csv": [*texts()],
+        "universal": [*as_bytes(universal_series()), *series],
+        "responses": [*functions_as_text(), *as_bytes(universal_functions()), *complex_functions, both],
         "description": [*descriptions()],
         "truths": [*truths()],
+        "reports": [*reports()],
         "identify": [*random_bytes([8, 24, 40, 64])],
         "chain": [*decays(), *random_bytes([100, 500])],
     }

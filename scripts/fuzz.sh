@@ -1,50 +1,77 @@
 #!/usr/bin/env bash
 # Feeds random bytes, guided by coverage, to everything that reads: libFuzzer on the targets in fuzz/.
 #
-#   scripts/fuzz.sh                    each target for 10 s
-#   scripts/fuzz.sh SECONDS            each target for this time
-#   scripts/fuzz.sh SECONDS TARGET...  these targets: recording responses description truths identify chain
+#   scripts/fuzz.sh                                 each target for 10 s
+#   scripts/fuzz.sh SECONDS [TARGET...]             these targets for this time
+#   scripts/fuzz.sh --executions N [TARGET...]      these targets for so many executions
 #
+# Targets: wav csv universal responses description truths reports identify chain.
 # An execution must end within 2 s and 300 MB without a panic. The bytes of one that fails are written to
-# fuzz/artifacts, beside the log of each target, and the script exits with 1. The corpus grows in fuzz/corpus. Needs a C++ compiler and Python 3 beside Rust.
+# fuzz/artifacts, beside the log of each target, and the script exits with 1. The corpus grows in fuzz/corpus.
+# Coverage is given after 4/5 of the executions and at the end: where both are equal, more time finds nothing new.
+# Needs a C++ compiler and Python 3 beside Rust.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-seconds="${1:-10}"
-shift || true
+limit="-max_total_time=10"
+if [ "${1:-}" = --executions ]; then
+    limit="-runs=$2"
+    shift 2
+elif [ "$#" -gt 0 ]; then
+    limit="-max_total_time=$1"
+    shift
+fi
 targets=("$@")
-[ "${#targets[@]}" -gt 0 ] || targets=(recording responses description truths identify chain)
+[ "${#targets[@]}" -gt 0 ] || targets=(wav csv universal responses description truths reports identify chain)
 
-# Counters at every edge and the operands of comparisons: flags of libFuzzer that a stable compiler takes.
+# Counters at every edge: flags of libFuzzer that a stable compiler takes. What readers compare is traced too.
 export RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
--Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
--Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing"
+-Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table --cfg fuzzing"
+export RUSTC_WRAPPER="$PWD/fuzz/rustc.sh"
 host="$(rustc -vV | sed -n 's/^host: //p')"
 # The target is named so that build scripts are built without the counters.
 cargo build --release --quiet --manifest-path fuzz/Cargo.toml --target "$host"
 folder="$(cargo metadata --manifest-path fuzz/Cargo.toml --format-version 1 --no-deps \
     | python3 -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')"
 
+# Prints the coverage (edges) after this part of the executions.
+coverage_after() {
+    awk -v last="$(awk -v part="$2" -v all="$3" 'BEGIN { print part * all }')" '
+        /^#[0-9]/ && substr($1, 2) + 0 <= last { for (i = 2; i < NF; i++) if ($i == "cov:") edges = $(i + 1) }
+        END { print edges + 0 }' "$1"
+}
+
 rm -rf fuzz/seeds
 python3 fuzz/seeds.py fuzz/seeds >/dev/null
 mkdir -p fuzz/artifacts
 failed=0
+printf '%-12s %12s %9s  %-15s %7s %7s %9s\n' target executions per_second coverage_4/5_end corpus MB slowest_s
 for target in "${targets[@]}"; do
     mkdir -p "fuzz/corpus/$target"
     log="fuzz/artifacts/$target.log"
-    if "$folder/$host/release/$target" "fuzz/corpus/$target" "fuzz/seeds/$target" \
-        -max_total_time="$seconds" -timeout=2 -rss_limit_mb=300 -malloc_limit_mb=300 -max_len=8192 \
+    words=()
+    [ ! -f "fuzz/$target.dict" ] || words=("-dict=fuzz/$target.dict")
+    # Small inputs run fast; a header of a universal file has 800 bytes, the chain needs samples.
+    case "$target" in
+        identify) longest=64 ;;
+        chain) longest=6004 ;;
+        universal | responses | description) longest=4096 ;;
+        *) longest=2048 ;;
+    esac
+    if "$folder/$host/release/$target" "fuzz/corpus/$target" "fuzz/seeds/$target" "${words[@]}" \
+        "$limit" -timeout=2 -rss_limit_mb=300 -malloc_limit_mb=300 -max_len="$longest" \
         -artifact_prefix="fuzz/artifacts/$target-" -print_final_stats=1 >"$log" 2>&1; then
         result="no fault"
     else
         result="FAILED, see $log"
         failed=1
     fi
-    executions="$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")"
-    coverage="$(grep -o 'cov: [0-9]*' "$log" | tail -1)" || true
-    memory="$(sed -n 's/^stat::peak_rss_mb: *//p' "$log")"
-    printf '%-12s %12s executions  %s  corpus %s  %s MB  %s\n' "$target" "$executions" "${coverage:-cov: ?}" \
-        "$(find "fuzz/corpus/$target" -type f | wc -l)" "$memory" "$result"
+    stat() { sed -n "s/^stat::$1: *//p" "$log"; }
+    executions="$(stat number_of_executed_units)"
+    executions="${executions:-0}"
+    printf '%-12s %12s %9s  %7s %7s %7s %7s %9s  %s\n' "$target" "$executions" "$(stat average_exec_per_sec)" \
+        "$(coverage_after "$log" 0.8 "$executions")" "$(coverage_after "$log" 1 "$executions")" \
+        "$(find "fuzz/corpus/$target" -type f | wc -l)" "$(stat peak_rss_mb)" "$(stat slowest_unit_time_sec)" "$result"
 done
 rm -f /dev/shm/tapjoint-fuzz-*
 exit "$failed"

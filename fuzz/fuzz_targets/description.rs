@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| tapjoint_fuzz::description(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| tapjoint_fuzz::run("description", bytes));

@@ -1,36 +1,88 @@
 //! Functions that must end without a panic, whatever the bytes: one for each fuzz target.
 //!
-//! `scripts/fuzz.sh` builds and runs them. Most functions also check a promise of the code that they call.
+//! `scripts/fuzz.sh` runs them under libFuzzer, `tests/it/corpus.rs` on the seeds. Each also checks what the code that
+//! it calls promises.
 
-use std::cell::RefCell;
-use std::fs;
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::{fs, process, thread};
 
+use serde_json::Value;
 use tapjoint::description::{ChannelRef, TestDescription};
-use tapjoint::pipeline::{IdentifySettings, run_recording, run_test};
-use tapjoint::recording::{Channel, ReadSettings, Recording, open_frequency_responses};
-use tapjoint::report::{document_of, render_json};
+use tapjoint::pipeline::{IdentifySettings, ModeResult, run_recording, run_test, tested_structure};
+use tapjoint::recording::{
+    Channel, ReadSettings, Recording, list_datasets, open_frequency_responses, read_function,
+};
+use tapjoint::report::deck::{
+    MOST_FREQUENCIES, deck_of, render_abaqus, render_nastran, source_in_report,
+};
+use tapjoint::report::document_of;
 use tapjoint::study::blind_check::parse_truths;
 
-thread_local! {
-    /// The file that all executions of this process write to.
-    static FILE: RefCell<Option<PathBuf>> = const { RefCell::new(None) };
+/// What a target does with bytes.
+type Feed = fn(&[u8]);
+
+/// Every target with its name.
+pub const TARGETS: [(&str, Feed); 9] = [
+    ("wav", recording),
+    ("csv", recording),
+    ("universal", universal),
+    ("responses", responses),
+    ("description", description),
+    ("truths", truths),
+    ("reports", reports),
+    ("identify", identify),
+    ("chain", chain),
+];
+
+/// Feeds bytes to the target of this name.
+pub fn run(target: &str, bytes: &[u8]) {
+    let found = TARGETS.iter().find(|(name, _)| *name == target);
+    let (_, feed) = found.expect("a target");
+    feed(bytes);
 }
 
-/// Puts bytes into a file and returns its path. The file lies in memory (`/dev/shm`) where the system has this folder.
-fn file_of(bytes: &[u8]) -> PathBuf {
-    let path = FILE.with_borrow_mut(|file| {
-        let name = format!("tapjoint-fuzz-{}", std::process::id());
+/// A file that is removed at the end.
+struct Scratch(PathBuf);
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+thread_local! {
+    /// The file that all executions of this thread write to. It lies in memory (`/dev/shm`) where the system has this
+    /// folder.
+    static FILE: Scratch = {
+        let name = format!("tapjoint-fuzz-{}-{:?}", process::id(), thread::current().id());
         let memory = Path::new("/dev/shm");
         let folder = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
-        file.get_or_insert_with(|| folder.join(name)).clone()
-    });
-    fs::write(&path, bytes).expect("a temporary file");
-    path
+        Scratch(folder.join(name))
+    };
+}
+
+/// Puts bytes into a file and returns its path.
+fn file_of(bytes: &[u8]) -> PathBuf {
+    FILE.with(|file| {
+        fs::write(&file.0, bytes).expect("a temporary file");
+        file.0.clone()
+    })
+}
+
+fn check_finite(values: &[f64]) {
+    assert!(values.iter().all(|value| value.is_finite()));
+}
+
+/// Checks that nowhere in a result there is a number that is none.
+fn check_numbers(result: &impl Debug) {
+    let text = format!("{result:?}");
+    assert!(!text.contains("NaN"), "{text}");
 }
 
 /// Opens a recording and reads all of it. Whatever the header states, there are no more samples than bytes.
-pub fn recording(bytes: &[u8]) {
+fn recording(bytes: &[u8]) {
     let settings = ReadSettings {
         sample_rate: Some(1000.0),
     };
@@ -39,26 +91,88 @@ pub fn recording(bytes: &[u8]) {
     };
     let channels: Vec<usize> = (0..recording.channels().len()).collect();
     assert!(recording.frames() * channels.len() as u64 <= bytes.len() as u64);
-    let samples = recording.read_channels(&channels, 0..u64::MAX).expect("an opened recording can be read");
+    assert!(recording.sample_rate() > 0.0 && recording.duration().is_finite());
+    let samples = recording
+        .read_channels(&channels, 0..u64::MAX)
+        .expect("an opened recording can be read");
     for (samples, channel) in samples.iter().zip(recording.channels()) {
         assert_eq!(samples.len() as u64, recording.frames());
-        assert!(samples.iter().all(|sample| sample.is_finite()));
-        assert!(channel.health.rms.is_finite());
+        check_finite(samples);
+        let health = &channel.health;
+        check_finite(&[
+            health.rms,
+            health.mean,
+            health.peak,
+            health.minimum,
+            health.maximum,
+            channel.scale,
+        ]);
     }
+    // From the middle on, the last channel alone.
+    let middle = recording.frames() / 2;
+    let rest = recording
+        .read(channels.len() - 1, middle..u64::MAX)
+        .expect("an opened recording can be read");
+    assert_eq!(
+        Some(&rest[..]),
+        samples.last().map(|all| &all[middle as usize..])
+    );
     for warning in recording.warnings() {
         assert!(!warning.to_string().is_empty());
     }
 }
 
+/// Reads a universal file as a recording, and every function in it.
+fn universal(bytes: &[u8]) {
+    recording(bytes);
+    let Ok(file) = list_datasets(&file_of(bytes)) else {
+        return;
+    };
+    assert!(file.datasets.len() <= bytes.len() && !file.contents().is_empty());
+    for (dataset, _) in file.functions() {
+        if let Ok(values) = read_function(&file, dataset.number) {
+            assert!(values.real.len() <= bytes.len());
+            assert!(
+                values
+                    .imaginary
+                    .is_none_or(|part| part.len() == values.real.len())
+            );
+            assert!(
+                values
+                    .abscissa
+                    .is_none_or(|part| part.len() == values.real.len())
+            );
+        }
+    }
+}
+
 /// Opens frequency response functions. All lines hold finite values.
-pub fn responses(bytes: &[u8]) {
+fn responses(bytes: &[u8]) {
     let Ok(found) = open_frequency_responses(&file_of(bytes)) else {
         return;
     };
-    assert!(!found.responses.is_empty() && found.spacing > 0.0);
+    assert!(!found.responses.is_empty() && found.spacing > 0.0 && found.lines <= bytes.len());
+    check_finite(&[
+        found.first_frequency,
+        found.spacing,
+        found.frequency(found.lines),
+    ]);
     for response in &found.responses {
         assert_eq!(response.values.len(), found.lines);
-        assert!(response.values.iter().all(|value| value.re.is_finite() && value.im.is_finite()));
+        assert!(
+            response
+                .values
+                .iter()
+                .all(|value| value.re.is_finite() && value.im.is_finite())
+        );
+        for coherence in response.coherence.iter() {
+            assert_eq!(coherence.len(), found.lines);
+            assert!(
+                coherence
+                    .iter()
+                    .all(|value| (-1e-3..=1.001).contains(value))
+            );
+        }
     }
     for warning in &found.warnings {
         assert!(!warning.to_string().is_empty());
@@ -66,19 +180,90 @@ pub fn responses(bytes: &[u8]) {
 }
 
 /// Reads a test description. An error is one line that begins with the file.
-pub fn description(bytes: &[u8]) {
+fn description(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
-    if let Err(error) = TestDescription::parse(&text, "test.toml") {
-        let message = error.to_string();
-        assert!(message.starts_with("test.toml:"), "{message}");
-        assert!(!message.chars().any(char::is_control), "{message:?}");
-        assert!(message.len() < 4000, "{} bytes", message.len());
+    match TestDescription::parse(&text, "test.toml") {
+        Ok(test) => {
+            tested_structure(&test)
+                .beam
+                .check()
+                .expect("a described beam can exist");
+            let measured = test
+                .measured
+                .iter()
+                .flat_map(|measured| &measured.frequencies);
+            assert!(
+                measured
+                    .copied()
+                    .all(|frequency| frequency.is_finite() && frequency > 0.0)
+            );
+            test.warnings.iter().for_each(check_line);
+        }
+        Err(error) => check_line(&error),
     }
 }
 
+/// Checks that a message is one line that begins with the file.
+fn check_line(message: &impl ToString) {
+    let message = message.to_string();
+    assert!(message.starts_with("test.toml:"), "{message}");
+    assert!(!message.chars().any(char::is_control), "{message:?}");
+    assert!(message.len() < 4000, "{} bytes", message.len());
+}
+
 /// Reads the truths of a blind check.
-pub fn truths(bytes: &[u8]) {
-    let _ = parse_truths(&String::from_utf8_lossy(bytes));
+fn truths(bytes: &[u8]) {
+    if let Ok(file) = parse_truths(&String::from_utf8_lossy(bytes)) {
+        assert!(file.truths.len() <= bytes.len());
+        assert!(file.doubts.iter().all(|doubt| !doubt.is_empty()));
+    }
+}
+
+/// Descriptions that a report may be of. Masses make finite elements of the last two, which take long.
+static DESCRIBED: LazyLock<[TestDescription; 5]> = LazyLock::new(|| {
+    let beam = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850\n";
+    let cantilever = "[joint]\nkind = \"cantilever\"\nmodel = \"3p\"\n";
+    let right = "[beam.right]\nthickness = 0.007\n";
+    [
+        cantilever.to_owned(),
+        format!("{right}[joint]\nkind = \"lap\"\nkt = 1e6\n"),
+        "[joint]\nkind = \"free\"\nbeam = \"euler\"\n".to_owned(),
+        format!("{cantilever}beam = \"euler\"\n[[sensor]]\nname = \"A\"\nchannel = 2\nposition = 0.4\nmass = 0.02\n"),
+        format!("{right}[joint]\nkind = \"lap\"\nbeam = \"euler\"\noverlap = {{ length = 0.04, mass = 0.05 }}\n"),
+    ]
+    .map(|rest| {
+        TestDescription::parse(&format!("{beam}{rest}"), "test.toml").expect("a description")
+    })
+});
+
+/// Makes decks of the joint in a report. The first byte chooses the structure, and seldom one with masses.
+fn reports(bytes: &[u8]) {
+    let Some((first, text)) = bytes.split_first() else {
+        return;
+    };
+    let structure = match first {
+        250.. => usize::from(first % 2) + 3,
+        _ => usize::from(first % 3),
+    };
+    let test = &DESCRIBED[structure];
+    let Ok(source) = source_in_report(&String::from_utf8_lossy(text), "report.json", test) else {
+        return;
+    };
+    assert!(source.frequencies.len() <= MOST_FREQUENCIES);
+    assert!(
+        source
+            .frequencies
+            .iter()
+            .all(|frequency| frequency.is_finite() && *frequency > 0.0)
+    );
+    let Ok(deck) = deck_of(&test.name, &source) else {
+        return;
+    };
+    for (deck, remark) in [(render_nastran(&deck), "$"), (render_abaqus(&deck), "**")] {
+        for line in deck.lines().filter(|line| !line.starts_with(remark)) {
+            assert!(!line.contains("NaN") && !line.contains("inf"), "{line}");
+        }
+    }
 }
 
 /// Numbers in a range, taken from bytes; zeros where the bytes end.
@@ -88,7 +273,10 @@ impl Numbers<'_> {
     fn next(&mut self) -> f64 {
         let (head, rest) = self.0.split_at(self.0.len().min(2));
         self.0 = rest;
-        f64::from(head.iter().fold(0_u16, |value, byte| (value << 8) | u16::from(*byte))) / 65535.0
+        f64::from(
+            head.iter()
+                .fold(0_u16, |value, byte| (value << 8) | u16::from(*byte)),
+        ) / 65535.0
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -110,7 +298,7 @@ impl Numbers<'_> {
 }
 
 /// Estimates a joint from stated frequencies, and writes the report.
-pub fn identify(bytes: &[u8]) {
+fn identify(bytes: &[u8]) {
     let mut numbers = Numbers(bytes);
     let kind = numbers.choice(&["cantilever", "lap", "free"]);
     let length = numbers.log_between(0.01, 10.0);
@@ -128,7 +316,7 @@ pub fn identify(bytes: &[u8]) {
     if kind != "free" && numbers.is() {
         text += &format!("kt = {:e}\n", numbers.log_between(1.0, 1e13));
     }
-    let count = numbers.between(1.0, 9.99) as usize;
+    let count = numbers.between(1.0, 5.99) as usize;
     let mut frequency = numbers.log_between(0.1, 5000.0);
     let mut frequencies = Vec::with_capacity(count);
     for _ in 0..count {
@@ -145,13 +333,62 @@ pub fn identify(bytes: &[u8]) {
     let Ok(test) = TestDescription::parse(&text, "test.toml") else {
         return;
     };
-    let analysis = run_test(&test, (Path::new("."), "test.toml"), &IdentifySettings::unperturbed());
+    let analysis = run_test(
+        &test,
+        (Path::new("."), "test.toml"),
+        &IdentifySettings::unperturbed(),
+    );
     let analysis = analysis.expect("stated frequencies need no file");
-    render_json(&document_of(&analysis)).expect("a report");
+    check_numbers(&analysis.identification);
+    check_modes(&analysis.modes, f64::INFINITY);
+    let document = serde_json::to_value(document_of(&analysis)).expect("a report");
+    check_intervals(&document["estimate"]);
 }
 
-/// Takes samples through the chain to modes. Every frequency is finite.
-pub fn chain(bytes: &[u8]) {
+/// Checks that every interval holds its value.
+fn check_intervals(section: &Value) {
+    let members = section.as_object().into_iter().flatten();
+    members.for_each(|(_, member)| check_intervals(member));
+    let Some(value) = section.get("value").and_then(Value::as_f64) else {
+        return;
+    };
+    // Limits and value are rounded on their own.
+    let slack = 1e-9 * value.abs();
+    for (low, high) in [("low", "high"), ("low_scaled", "high_scaled")] {
+        assert!(
+            section[low].as_f64().is_none_or(|low| low <= value + slack),
+            "{section}"
+        );
+        assert!(
+            section[high]
+                .as_f64()
+                .is_none_or(|high| high >= value - slack),
+            "{section}"
+        );
+    }
+    assert!(
+        section["std"].as_f64().is_none_or(|std| std >= 0.0),
+        "{section}"
+    );
+}
+
+/// Checks that modes are numbers, within the band that was measured.
+fn check_modes(modes: &[ModeResult], highest: f64) {
+    check_numbers(&modes);
+    for mode in modes {
+        assert!(
+            mode.frequency > 0.0 && mode.frequency <= highest,
+            "{mode:?}"
+        );
+        assert!(
+            mode.std.is_none_or(|std| std > 0.0 && std.is_finite()),
+            "{mode:?}"
+        );
+    }
+}
+
+/// Takes samples through the chain to modes.
+fn chain(bytes: &[u8]) {
     let (head, samples) = bytes.split_at(bytes.len().min(4));
     let mut numbers = Numbers(head);
     let rate = numbers.log_between(1.0, 1e6);
@@ -168,9 +405,10 @@ pub fn chain(bytes: &[u8]) {
         samples: samples[channel * frames..(channel + 1) * frames].to_vec(),
         ..Channel::default()
     });
-    let recording = Recording::from_samples("samples", rate, channels.into()).expect("finite samples");
+    let recording =
+        Recording::from_samples("samples", rate, channels.into()).expect("finite samples");
     if let Ok(analysis) = run_recording(recording, hammer.as_ref(), |_| {}) {
-        assert!(analysis.modes.iter().all(|mode| mode.frequency.is_finite()));
-        render_json(&document_of(&analysis)).expect("a report");
+        check_modes(&analysis.modes, rate / 2.0);
+        serde_json::to_value(document_of(&analysis)).expect("a report");
     }
 }

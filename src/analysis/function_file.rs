@@ -55,7 +55,7 @@ pub(super) fn measure_functions(
     }
     let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
     let warnings = functions.warnings.iter();
-    let warnings = warnings.map(|warning| Warning::about(&functions.file, warning.code(), warning));
+    let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     Ok(RecordingResult {
         file: functions.file.clone(),
         format: Format::FrequencyResponses,

@@ -15,7 +15,8 @@ use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
 use tapjoint_identify::consistent::ConsistentEstimator;
 use tapjoint_identify::perturbation::{
-    average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
+    SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly,
+    sign_pattern_estimates, spans_of,
 };
 use tapjoint_identify::{
     FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PredictedMode, Spread, Stiffnesses,
@@ -121,12 +122,8 @@ pub fn identify(
             found.predicted = Some(predicted);
         }
         Ok(None) => {}
-        Err(error) => {
-            let text = format!("the estimated joint cannot be predicted with: {error}");
-            if found.consistent.is_some() {
-                warnings.push(Warning::new("no-prediction", text));
-            }
-        }
+        Err(error) if found.consistent.is_some() => warnings.push(Warning::no_prediction(&error)),
+        Err(_) => {}
     }
     warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
@@ -262,7 +259,9 @@ pub(super) fn perturbations(
     used: &[MeasuredMode],
     settings: &IdentifySettings,
 ) -> Perturbations {
-    let frequencies = Frequencies::new(modes, used);
+    // Without a Monte Carlo nobody has given a seed.
+    let seed = settings.monte_carlo.map_or(1, |(_, seed)| seed);
+    let frequencies = Frequencies::new(modes, used, seed);
     let percents = &settings.percents;
     let mut found = Perturbations::default();
     if let Some(model) = structure.regression
@@ -360,10 +359,12 @@ struct Frequencies {
     bounds: Option<Vec<f64>>,
     /// Standard uncertainties (Hz), where every mode has one.
     stds: Option<Vec<f64>>,
+    /// Seed of the sign patterns, where these are drawn.
+    seed: u64,
 }
 
 impl Frequencies {
-    fn new(modes: &[ModeResult], used: &[MeasuredMode]) -> Self {
+    fn new(modes: &[ModeResult], used: &[MeasuredMode], seed: u64) -> Self {
         let listed = used.iter().map(|measured| {
             let mut modes = modes.iter();
             modes.find(|mode| mode.mode == Some(measured.mode))
@@ -373,6 +374,7 @@ impl Frequencies {
             values: used.iter().map(|mode| mode.frequency).collect(),
             bounds: listed.map(|mode| mode?.half_line).collect(),
             stds: used.iter().map(|mode| mode.std).collect(),
+            seed,
         }
     }
 }
@@ -405,14 +407,16 @@ fn under_bounds(
         sensitivity: sensitivities.collect(),
         ..ResolutionSpanSection::default()
     };
-    // There are no spans of more modes than can be tried.
-    let Ok(patterns) = sign_pattern_estimates(&frequencies.values, bounds, &estimator) else {
+    let patterns =
+        sign_pattern_estimates(&frequencies.values, bounds, frequencies.seed, &estimator);
+    let Ok(patterns) = patterns else {
         return section;
     };
     let spans = spans_of(Some(nominal), &patterns);
     let found: Vec<Stiffnesses> = patterns.into_iter().flatten().collect();
     ResolutionSpanSection {
         patterns: spans.patterns,
+        sampled: frequencies.values.len() > SIGN_PATTERN_MODES,
         failed: spans.failed,
         kx: spans.kx.map(|span| [span.low, span.high]),
         ky: spans.ky.map(|span| [span.low, span.high]),

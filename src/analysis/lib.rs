@@ -26,7 +26,6 @@ mod warnings;
 mod wiring;
 
 pub use amplitude::AmplitudeChange;
-use amplitude::of_amplitude;
 use checks::judge;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
@@ -36,6 +35,7 @@ pub use measurement::{MeasureError, MeasureSettings, MeasuredSpectra, Measuremen
 use modes::{modes_of_bare, modes_of_test, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
+use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{
     AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
@@ -46,15 +46,15 @@ pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
 };
-use warnings::neglected_effects;
-pub use warnings::{Warning, together};
+pub use warnings::{WARNING_CODES, Warning, together};
+use warnings::{neglected_effects, of_amplitude};
 pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
 use wiring::{finish, measure_test};
 
 use std::path::Path;
 use std::slice::from_ref;
 use tapjoint_description::{ChannelRef, TestDescription};
-use tapjoint_signal::quality::Verdict;
+use tapjoint_signal::quality::QualityVerdict;
 use tapjoint_signal::recording::{FrequencyResponses, Recording};
 
 /// A finished analysis.
@@ -75,7 +75,7 @@ pub struct Analysis {
     /// The joint or the material by the modes; `None` for a bare recording.
     pub identification: Option<Identification>,
     /// Quality of the test: good practice, check by check.
-    pub verdicts: Vec<Verdict>,
+    pub verdicts: Vec<QualityVerdict>,
     /// Everything that a reader of the results has to know.
     pub warnings: Vec<Warning>,
 }
@@ -98,9 +98,7 @@ pub fn run_test(
     let details = structure_details(test, &structure.beam);
     let mut recordings = measure_test(test, place.0, place.1)?;
     let doubts = test.warnings.iter();
-    let mut warnings: Vec<Warning> = doubts
-        .map(|doubt| Warning::new("description", doubt.to_string()))
-        .collect();
+    let mut warnings: Vec<Warning> = doubts.map(Warning::of_description).collect();
     for recording in &recordings {
         warnings.extend_from_slice(&recording.measurement.warnings);
     }
@@ -113,7 +111,7 @@ pub fn run_test(
         warnings.extend(doubts);
         modes
     };
-    warnings.extend(of_amplitude(&recordings));
+    warnings.extend(of_amplitude(amplitude_changes(&recordings)));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
         details,
@@ -187,7 +185,7 @@ fn analysis_of(mut recording: RecordingResult) -> Analysis {
     let modes = modes_of_bare(&mut recording);
     let (verdicts, doubts) = judge(from_ref(&recording));
     let mut warnings = recording.measurement.warnings.clone();
-    warnings.extend(of_amplitude(from_ref(&recording)));
+    warnings.extend(of_amplitude(amplitude_changes(from_ref(&recording))));
     warnings.extend(doubts);
     Analysis {
         name: recording.file.clone(),

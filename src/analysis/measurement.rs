@@ -1,7 +1,7 @@
 //! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
 
 use super::fits::{FreeDecays, Stabilisation};
-use super::warnings::Warning;
+use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tapjoint_description::WindowKind;
@@ -107,6 +107,15 @@ pub enum MeasureError {
     },
 }
 
+impl MeasureError {
+    fn of(recording: &Recording, problem: SpectralError) -> Self {
+        Self::Spectral {
+            file: recording.name().to_string(),
+            problem,
+        }
+    }
+}
+
 /// Finds taps, averages spectra and reads resonances.
 ///
 /// # Errors
@@ -118,10 +127,7 @@ pub fn measure(
 ) -> Result<Measurement, MeasureError> {
     // The band is judged before anything is read: it is the user's typing, not the data.
     let trial = lines_for(settings, recording.sample_rate(), recording.duration());
-    let trial = trial.map_err(|problem| MeasureError::Spectral {
-        file: recording.name().to_string(),
-        problem,
-    })?;
+    let trial = trial.map_err(|problem| MeasureError::of(recording, problem))?;
     let mut tap_settings = settings.taps;
     tap_settings.wanted = settings
         .block
@@ -142,9 +148,7 @@ pub fn measure(
                     warnings.push(Warning::not_rung_down(file, decay.remaining, window));
                 }
                 if window == Window::Hann {
-                    let text = "a Hann window suppresses the start of every record, where a tap has its \
-                                signal; it is meant for steady signals";
-                    warnings.push(Warning::about(file, "hann-on-taps", text));
+                    warnings.push(Warning::hann_on_taps(file));
                 }
                 for reading in &found.readings {
                     if let Some(label @ PeakLabel::Mains(_)) = reading.label {
@@ -153,12 +157,13 @@ pub fn measure(
                 }
                 spectra = Some(found);
             }
+            Err(problem @ SpectralError::Padded { .. }) => {
+                return Err(MeasureError::of(recording, problem));
+            }
             // The file would do, but its taps come too soon: data, not typing.
-            Err(problem) => warnings.push(Warning::about(
-                recording.name(),
-                "taps-too-short",
-                format!("the taps leave no spectrum: {problem}"),
-            )),
+            Err(problem) => {
+                warnings.push(Warning::taps_too_short(recording.name(), &problem));
+            }
         }
     }
     Ok(Measurement {
@@ -184,29 +189,6 @@ fn lines_for(
         .unwrap_or(fitting)
         .max(LEAST_BLOCK);
     Lines::zoom(band, rate, block, available)
-}
-
-/// Doubts about a recording and its taps.
-pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
-    let file = recording.name();
-    let mut warnings = Vec::new();
-    for warning in recording.warnings() {
-        warnings.push(Warning::about(file, warning.code(), warning));
-    }
-    for remark in &taps.remarks {
-        warnings.push(Warning::about(file, "taps", remark));
-    }
-    let accepted = taps.accepted().count();
-    let rejected = taps.taps.len() - accepted;
-    if rejected > 0 {
-        warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
-    }
-    if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
-        let text = "only one tap was averaged, so nothing shows how well it repeats and a \
-                    coherence would mean nothing; record three to five taps";
-        warnings.push(Warning::about(file, "single-tap", text));
-    }
-    warnings
 }
 
 /// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes

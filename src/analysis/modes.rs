@@ -14,9 +14,7 @@ use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
 use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
-use tapjoint_identify::pairing::{
-    MeasuredPeak, MissingCause, MissingMode, Pairing, PairingSettings, PeakStrength, ShapeAt,
-};
+use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, PeakStrength, ShapeAt};
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
@@ -216,36 +214,22 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
     .unwrap_or_default();
     let numbers = pair_by_ratio(&peaks, &nominal, FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE);
     if numbers.iter().any(Option::is_some) {
-        let text = "none of the free beam's natural frequencies lies near them; another direction \
-                    of bending, torsion, the supports or the room are the usual causes";
-        return apply_numbers(modes, &free, &numbers, text);
+        let unnumbered = apply_numbers(modes, &free, &numbers);
+        return Vec::from_iter(Warning::unpaired_of_free_beam(unnumbered));
     }
     number_in_order(modes);
     match free.is_empty() {
         true => Vec::new(),
-        false => vec![Warning::new(
-            "numbered-in-order",
-            "no peak lies near a natural frequency of the described free beam, so the peaks were \
-             numbered in ascending order; check the beam's dimensions and modulus",
-        )],
+        false => vec![Warning::numbered_in_order()],
     }
 }
 
-/// Gives the peaks with these indices their numbers; `text` says why some have none.
-fn apply_numbers(
-    modes: &mut [ModeResult],
-    which: &[usize],
-    numbers: &[Option<usize>],
-    text: &str,
-) -> Vec<Warning> {
+/// Gives the peaks with these indices their numbers. Returns how many have none.
+fn apply_numbers(modes: &mut [ModeResult], which: &[usize], numbers: &[Option<usize>]) -> usize {
     for (&index, &number) in which.iter().zip(numbers) {
         modes[index].mode = number;
     }
-    let count = numbers.iter().filter(|number| number.is_none()).count();
-    match count {
-        0 => Vec::new(),
-        _ => vec![Warning::unpaired(count, text)],
-    }
+    numbers.iter().filter(|number| number.is_none()).count()
 }
 
 fn number_in_order(modes: &mut [ModeResult]) {
@@ -352,12 +336,15 @@ fn number_jointed(
         number_in_order(modes);
         return Vec::new();
     };
-    let text = "as modes they would make every joint fit worse; torsion, another direction of bending, the \
-                fixture or the suspension are the usual causes";
-    let mut warnings = apply_numbers(modes, &free, &pairing.chosen.numbers, text);
-    warnings.extend(missing(&pairing.chosen.missing));
-    warnings.extend(ambiguous(&pairing, &peaks));
-    warnings
+    let unnumbered = apply_numbers(modes, &free, &pairing.chosen.numbers);
+    [
+        Warning::unpaired(unnumbered),
+        Warning::missing_modes(&pairing.chosen.missing),
+        Warning::ambiguous_pairing(&pairing, &peaks),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// A peak with its shape and its strength in each recording.
@@ -429,70 +416,6 @@ fn shape_in(recording: &RecordingResult, reading: &ModeReading, group: usize) ->
     values
 }
 
-/// The warning about modes that no peak was taken for.
-fn missing(modes: &[MissingMode]) -> Option<Warning> {
-    let mut list = Vec::with_capacity(modes.len());
-    for missing in modes {
-        let why = match missing.cause {
-            MissingCause::OutsideBand => "outside the measured band",
-            MissingCause::AtNode => "near a node of its shape at every sensor or tap",
-            MissingCause::Unknown => "within the band",
-        };
-        let frequency = missing.frequency;
-        list.push(format!(
-            "mode {} (about {frequency:.1} Hz, {why})",
-            missing.mode
-        ));
-    }
-    let text = format!(
-        "no peak was taken for {}; higher peaks keep the mode numbers of the model; tap and measure elsewhere, or from a \
-         lower frequency on, to see it",
-        list.join(", ")
-    );
-    (!list.is_empty()).then(|| Warning::new("missing-mode", text))
-}
-
-/// The warning about the most probable other numbering, with the peaks that it numbers otherwise.
-fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
-    let other = pairing.others.first()?;
-    let chosen = &pairing.chosen;
-    let times = chosen.odds / other.odds;
-    let odds = if (0.95..1.05).contains(&times) {
-        "as probable".to_owned()
-    } else if times >= 1.0 {
-        format!("{times:.1} times as probable")
-    } else {
-        format!("{:.1} times less probable", 1.0 / times)
-    };
-    let mut changes = Vec::new();
-    for ((peak, now), then) in peaks.iter().zip(&chosen.numbers).zip(&other.numbers) {
-        if now != then {
-            let [now, then] = [now, then].map(|number| match number {
-                Some(number) => format!("mode {number}"),
-                None => "no mode".to_owned(),
-            });
-            changes.push(format!(
-                "{:.2} Hz as {then} instead of {now}",
-                peak.frequency
-            ));
-        }
-    }
-    let more = changes.len().saturating_sub(MOST_CHANGES);
-    changes.truncate(MOST_CHANGES);
-    if more > 0 {
-        changes.push(format!("{more} more"));
-    }
-    let text = format!(
-        "the mode numbers are not certain: another numbering is {odds}, with {}; another sensor or tap position, or more \
-         modes, would decide",
-        changes.join(", ")
-    );
-    Some(Warning::new("ambiguous-pairing", text))
-}
-
-/// Peaks that a warning about the numbering lists.
-const MOST_CHANGES: usize = 4;
-
 /// Numbers the readings of all recordings whose fastened masses differ from those of the first. The numbers follow
 /// from the frequencies to which these masses take the reference configuration's modes. Where those are not known,
 /// the readings lose the numbers of the nearest reference modes: a heavy mass takes a mode to another's place.
@@ -523,10 +446,7 @@ fn pair_mass_loaded(
             recording.mode_numbers = own_numbers(&moved, recording.readings());
         } else {
             recording.mode_numbers.fill(None);
-            let text = "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that \
-                        it is not known where the masses fastened here take the modes; read more modes in the first \
-                        recording, or state kt and kr in [joint]";
-            warnings.push(Warning::about(&recording.file, "unnumbered", text));
+            warnings.push(Warning::unnumbered(&recording.file));
         }
     }
     warnings

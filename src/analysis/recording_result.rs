@@ -1,5 +1,6 @@
 //! One measured recording: its circumstances, its channels over time, its taps and spectra.
 
+use super::amplitude::{AmplitudeChange, AmplitudeChanges};
 use super::measurement::Measurement;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -183,6 +184,29 @@ pub(super) fn close_ups(
         });
     }
     Ok(all)
+}
+
+impl RecordingResult {
+    /// Change of a mode with its amplitude, where it is beyond the uncertainty and large enough to matter.
+    pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
+        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+        let change = AmplitudeChange::of(curve)?;
+        let response = curve.sensor.and_then(|sensor| self.responses.get(sensor));
+        let unit = response.and_then(|response| response.unit.clone());
+        Some(AmplitudeChange { unit, ..change })
+    }
+}
+
+/// Changes of the numbered modes of each recording with their amplitude.
+pub(super) fn amplitude_changes(recordings: &[RecordingResult]) -> Vec<(String, AmplitudeChanges)> {
+    let mut all = Vec::new();
+    for recording in recordings {
+        let numbered = recording.readings().iter().zip(&recording.mode_numbers);
+        let changes = numbered
+            .filter_map(|(reading, &mode)| Some((mode?, recording.amplitude_change(reading)?)));
+        all.push((recording.file.clone(), changes.collect()));
+    }
+    all
 }
 
 #[cfg(test)]

@@ -333,6 +333,9 @@ pub struct ResolutionSpanSection {
     pub method: EstimateMethod,
     /// Number of sign patterns tried.
     pub patterns: usize,
+    /// True where the patterns were drawn at random, because there are too many to try all.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub sampled: bool,
     /// Patterns that left no estimate.
     pub failed: usize,
     /// Smallest and largest Kx.

@@ -2,7 +2,7 @@
 
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
-use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, MODE_LIMIT, StructureError};
 use tapjoint_description::{
     FitParameter, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
 };
@@ -272,12 +272,15 @@ pub fn predict_described(
 /// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.
 ///
 /// # Errors
-/// [`IdentifyError::Structure`] where the structure cannot exist.
+/// [`IdentifyError::Structure`] where the structure cannot exist, and beyond [`MODE_LIMIT`] modes.
 pub fn frequencies_of(
     there: &JointedStructure,
     joint: &JointStiffness,
     count: usize,
 ) -> Result<Vec<f64>, IdentifyError> {
+    if count > MODE_LIMIT {
+        return Err(StructureError::TooManyModes { count }.into());
+    }
     let model = FrequencyModel::new(there, count)?;
     let units = StiffnessUnits::of(&there.beam);
     let mut point = model.nominal();

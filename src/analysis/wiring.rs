@@ -2,11 +2,11 @@
 
 use super::frf::form_of_kind;
 use super::function_file::{FunctionSettings, measure_functions};
-use super::measurement::{MeasureError, MeasureSettings, Measurement, measure, of_recording};
+use super::measurement::{MeasureError, MeasureSettings, Measurement, measure};
 use super::recording_result::{
     Conditions, Overview, RecordingResult, Response, close_ups, overview,
 };
-use super::warnings::Warning;
+use super::warnings::{Warning, of_recording};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -182,16 +182,7 @@ pub fn measure_bare(
         hammer.is_none() && (name.contains("hammer") || name.contains("force"))
     });
     if let Some(name) = forgotten {
-        let argument = match name.contains(char::is_whitespace) {
-            true => format!("\"{name}\""),
-            false => name.clone(),
-        };
-        let text = format!(
-            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
-             say --hammer {argument}: taps are then judged by their force, and there are frequency \
-             response functions"
-        );
-        let warning = Warning::about(&result.file, "hammer-channel", text);
+        let warning = Warning::hammer_channel(&result.file, name);
         result.measurement.warnings.push(warning);
     }
     Ok(result)

@@ -4,7 +4,8 @@
 //! largest and most exact. The lowest pairs come from Lanczos's method with full orthogonalisation
 //! (Golub & Van Loan, "Matrix Computations", 10.1). They are counted afterwards, so that none is
 //! missed. A beam's low modes are far apart in 1/lambda, so that a few steps more than modes
-//! suffice, each of them two solutions with the banded factor. All pairs come from the dense matrix.
+//! suffice, each of them two solutions with the banded factor. All pairs come from the dense matrix, whose
+//! time grows with the cube of its size: small ones only.
 //!
 //! The matrices are symmetric and of half-bandwidth 3, as beams have them. The fixed band lets the compiler
 //! unroll every inner loop.
@@ -16,6 +17,18 @@ use nalgebra::{DMatrix, SymmetricEigen};
 pub(crate) struct Eigenpairs {
     pub(crate) values: Vec<f64>,
     pub(crate) vectors: Vec<Vec<f64>>,
+}
+
+impl Eigenpairs {
+    fn sorted(self) -> Self {
+        let order = descending(&self.values).into_iter().rev();
+        let (mut values, mut vectors) = (Vec::new(), Vec::new());
+        for index in order {
+            values.push(self.values[index]);
+            vectors.push(self.vectors[index].clone());
+        }
+        Self { values, vectors }
+    }
 }
 
 /// Largest distance of a Ritz vector from an eigenvector (1). A frequency formed from the vector is
@@ -45,28 +58,117 @@ pub(crate) fn lowest_pairs(
     let factor = shifted
         .cholesky()
         .ok_or_else(|| failure("it is not stable: the axial force buckles it"))?;
-    if let Some(mut pairs) = Lanczos::new(&factor, mass, locked).lowest(count) {
-        let top = pairs.values.last().copied().unwrap_or(0.0);
+    let mut known = locked.to_vec();
+    // Of equal eigenvalues, as those of two equal beams side by side, every turn finds one.
+    for _ in 0..2 {
+        let number = known.len() + count - locked.len().min(count);
+        let Some(mut pairs) = Lanczos::new(&factor, mass, &known).lowest(number) else {
+            break;
+        };
+        if known.len() > locked.len() {
+            pairs = pairs.sorted();
+        }
+        let top = pairs.values.iter().take(count).next_back();
+        let top = top.copied().unwrap_or(0.0);
         // Two eigenvalues nearer than that are one: rounding moves each by some parts in 1e16 of
         // the highest.
-        let apart = 1e-7 * top + 1e-15 * highest;
-        if shifted.plus(-top - apart, mass).negative_eigenvalues() == Some(count) {
+        let limit = top + 1e-7 * top + 1e-15 * highest;
+        let below = pairs.values.iter().filter(|value| **value <= limit).count();
+        if shifted.plus(-limit, mass).negative_eigenvalues() == Some(below) {
+            pairs.values.truncate(count);
+            pairs.vectors.truncate(count);
             pairs.values.iter_mut().for_each(|value| *value -= shift);
             return Ok(pairs);
         }
+        known = pairs.vectors;
     }
-    // Equal eigenvalues, as those of two equal beams side by side.
     let mut pairs = all_pairs(stiffness, mass, shift)?;
     pairs.values.truncate(count);
     pairs.vectors.truncate(count);
     Ok(pairs)
 }
 
+/// Motions for each force that stand for all modes beyond some. The error of the answer is the eighth power of
+/// omega^2 over the square of the lowest mode left out.
+const MOTIONS: usize = 4;
+
+/// Returns the lowest `count` pairs, followed by pairs that stand for all higher ones in the answer to `forces`.
+/// The other arguments are those of [`lowest_pairs`].
+///
+/// The modes miss a part of the static answer to a force. This part is a motion of its own, and so is what they
+/// miss of the answer to its inertia, and so on (Krylov's sequence; MacNeal 1971, Rubin 1975).
+///
+/// # Errors
+/// As [`lowest_pairs`].
+pub(crate) fn pairs_for_forces(
+    [stiffness, mass]: [&BandedMatrix; 2],
+    shift: f64,
+    highest: f64,
+    locked: &[Vec<f64>],
+    count: usize,
+    forces: &[Vec<f64>],
+) -> Result<Eigenpairs, StructureError> {
+    if count + MOTIONS * forces.len() >= stiffness.size() {
+        return all_pairs(stiffness, mass, shift);
+    }
+    let mut pairs = lowest_pairs(stiffness, mass, shift, highest, locked, count)?;
+    let motions = motions_beyond(&pairs, [&stiffness.plus(shift, mass), mass], forces);
+    let among = DMatrix::from_fn(motions.len(), motions.len(), |row, column| {
+        dot(&stiffness.times(&motions[row]), &motions[column])
+    });
+    if motions.is_empty() || !among.iter().all(|entry| entry.is_finite()) {
+        return all_pairs(stiffness, mass, shift);
+    }
+    let eigen = SymmetricEigen::try_new(among, f64::EPSILON, 10_000)
+        .ok_or_else(|| failure("its eigenvalues did not settle"))?;
+    for i in descending(eigen.eigenvalues.as_slice()).into_iter().rev() {
+        let mut vector = vec![0.0; mass.size()];
+        for (motion, weight) in motions.iter().zip(eigen.eigenvectors.column(i).iter()) {
+            add_multiple(&mut vector, *weight, motion);
+        }
+        pairs.values.push(eigen.eigenvalues[i]);
+        pairs.vectors.push(vector);
+    }
+    Ok(pairs)
+}
+
+/// Returns motions of unit modal mass, orthogonal to each other and to the modes by their mass: the static answers to
+/// the forces, and the answers to their inertia. Empty where nothing withstands the forces.
+fn motions_beyond(
+    modes: &Eigenpairs,
+    [stiffness, mass]: [&BandedMatrix; 2],
+    forces: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let Some(factor) = stiffness.cholesky() else {
+        return Vec::new();
+    };
+    let mut motions: Vec<Vec<f64>> = Vec::new();
+    let mut loads = forces.to_vec();
+    for _ in 0..MOTIONS {
+        for load in &mut loads {
+            factor.solve_lower(load);
+            factor.solve_upper(load);
+            // Twice, for the first time leaves its own rounding.
+            for _ in 0..2 {
+                let pulled = mass.times(load);
+                for other in modes.vectors.iter().chain(&motions) {
+                    add_multiple(load, -dot(&pulled, other), other);
+                }
+            }
+            let size = dot(load, &mass.times(load)).sqrt();
+            load.iter_mut().for_each(|value| *value /= size);
+            motions.push(load.clone());
+            *load = mass.times(load);
+        }
+    }
+    motions
+}
+
 /// Returns all pairs. `shift` M is added to K where K is singular, and taken off again.
 ///
 /// # Errors
 /// [`StructureError::FiniteElements`] where K + shift M is not positive definite.
-pub(crate) fn all_pairs(
+fn all_pairs(
     stiffness: &BandedMatrix,
     mass: &BandedMatrix,
     shift: f64,
@@ -119,6 +221,9 @@ fn descending(values: &[f64]) -> Vec<usize> {
     order
 }
 
+/// Beyond so many vectors their rounding adds up: they stay orthogonal only if each is made so twice.
+const EXACT_STEPS: usize = 60;
+
 /// The growing subspace of Lanczos's recursion.
 struct Lanczos<'a> {
     factor: &'a CholeskyFactor,
@@ -166,6 +271,8 @@ impl<'a> Lanczos<'a> {
         let most = self.mass.size() - self.locked;
         // A beam's modes settle after about twice as many steps; with what is fastened to it some more.
         let first_look = (2 * wanted + 2).min(most);
+        // A look decomposes a dense matrix: as many of them for many modes as for few.
+        let between = (wanted / 8).max(2);
         while self.diagonal.len() < most {
             let last = &self.basis[self.basis.len() - 1];
             let mut half = last.clone();
@@ -174,13 +281,16 @@ impl<'a> Lanczos<'a> {
             self.factor.solve_lower(&mut next);
             self.diagonal.push(dot(&next, last));
             orthogonalise(&mut next, &self.basis);
+            if self.basis.len() > EXACT_STEPS {
+                orthogonalise(&mut next, &self.basis);
+            }
             let length = normalise(&mut next);
             self.beside.push(length);
             self.basis.push(next);
             // Otherwise only rounding was left to add.
             let goes_on = length > 1e-15 * self.diagonal[0].abs();
             let steps = self.diagonal.len();
-            let looks = steps >= first_look && (steps - first_look).is_multiple_of(2);
+            let looks = steps >= first_look && (steps - first_look).is_multiple_of(between);
             if looks || steps == most || !goes_on {
                 let pairs = self.converged(wanted);
                 if pairs.is_some() || !goes_on {

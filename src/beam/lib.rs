@@ -29,10 +29,9 @@ mod eigen;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::{Assembly, Joint, JointStiffness};
-use natural_modes::MODE_LIMIT;
 pub use natural_modes::{
-    ModeShape, NaturalMode, Symmetry, mode_shapes, natural_frequencies, natural_lambdas,
-    natural_lambdas_of_any_joint, natural_modes,
+    MEASURED_LIMIT, MODE_LIMIT, ModeShape, NaturalMode, Symmetry, mode_shapes, natural_frequencies,
+    natural_lambdas, natural_lambdas_of_any_joint, natural_modes,
 };
 
 /// Rule for a stiffness of the joint.

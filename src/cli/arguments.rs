@@ -1,6 +1,6 @@
 //! Arguments that several commands share, and the parsers of their values.
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -12,8 +12,11 @@ use tapjoint::description::{
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
-use tapjoint::spectral::FrfEstimator;
-use tapjoint::structure::JointStiffness;
+use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
+use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
+
+/// Most threads: no machine has more processors, and each thread takes memory.
+const MOST_THREADS: u64 = 1024;
 
 /// Arguments of every command.
 #[derive(Debug, Args)]
@@ -33,7 +36,7 @@ pub(super) struct CommonArguments {
     #[arg(long, global = true, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
     /// Number of threads; default: one for each processor
-    #[arg(long, global = true, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_THREADS))]
     pub(super) threads: Option<usize>,
     /// Print on standard error what each stage used and how long it took. Give it twice for
     /// every tap and peak
@@ -50,12 +53,25 @@ impl CommonArguments {
     /// Sets the number of threads for the whole program.
     ///
     /// # Errors
-    /// The system refuses to start so many.
+    /// The system refuses to start so many, or the environment asks for too many.
     pub(super) fn set_threads(&self) -> anyhow::Result<()> {
+        let name = "RAYON_NUM_THREADS";
+        let wanted = std::env::var(name).ok();
+        let wanted = wanted.filter(|_| self.threads.is_none());
+        if let Some(text) = wanted
+            && text
+                .parse()
+                .is_ok_and(|count: f64| count > MOST_THREADS as f64)
+        {
+            bail!("{name}={text}: give 0 to {MOST_THREADS}, 0 for one to each processor");
+        }
         if let Some(threads) = self.threads {
             rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
-                .build_global()?;
+                .build_global()
+                .with_context(|| {
+                    format!("--threads {threads}: the system cannot start so many; give fewer")
+                })?;
         }
         Ok(())
     }
@@ -109,10 +125,11 @@ impl RecordingArguments {
 
 fn sample_rate(text: &str) -> Result<f64, String> {
     let rate = parse_quantity(text, Dimension::Rate).map_err(|error| error.to_string())?;
-    if rate > 0.0 {
-        Ok(rate)
-    } else {
-        Err("a sample rate is greater than 0 Hz".to_owned())
+    match (1.0..=1e8).contains(&rate) {
+        true => Ok(rate),
+        false => Err(format!(
+            "{rate} Hz is no sample rate; give 1 to 1e8 samples per second, such as 5120 or \"51.2 kHz\""
+        )),
     }
 }
 
@@ -141,8 +158,11 @@ impl SpectrumSettings {
 
 /// Returns the parser of block sizes, with the limits of the test description's `block`.
 pub(super) fn block_size() -> RangedU64ValueParser<usize> {
-    RangedU64ValueParser::new().range(16..=4_000_000)
+    RangedU64ValueParser::new().range(LEAST_BLOCK as u64..=MOST_BLOCK as u64)
 }
+
+/// Highest edge of a band (Hz), that of a description's `band`.
+const HIGHEST_EDGE: f64 = 1e8;
 
 /// Parses a frequency band, `LO:HI` (Hz).
 pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
@@ -156,9 +176,9 @@ pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
             .map_err(|error| format!("{error}; {example}"))?;
     }
     let [low, high] = edges;
-    if low < 0.0 || high <= low {
+    if low < 0.0 || high <= low || high > HIGHEST_EDGE {
         return Err(format!(
-            "the edges must be ascending and not negative; {example}"
+            "the edges must be ascending, not negative and at most {HIGHEST_EDGE:e} Hz; {example}"
         ));
     }
     Ok((low, high))
@@ -170,6 +190,12 @@ pub(super) type Numbers = Vec<f64>;
 /// Parses positive ascending frequencies (Hz).
 pub(super) fn frequencies(text: &str) -> Result<Numbers, String> {
     let frequencies = positive_numbers(text, "give frequencies in Hz such as 17,118,335.6")?;
+    if frequencies.len() > MEASURED_LIMIT {
+        return Err(format!(
+            "{} frequencies are too many; give at most {MEASURED_LIMIT}, the lowest mode first",
+            frequencies.len()
+        ));
+    }
     match frequencies.windows(2).find(|pair| pair[1] <= pair[0]) {
         Some(pair) => Err(format!(
             "{} does not exceed {}; give ascending frequencies in Hz, the lowest mode first",
@@ -184,30 +210,46 @@ pub(super) fn half_lines(text: &str) -> Result<Numbers, String> {
     positive_numbers(text, "give half of the line spacing in Hz such as 0.125")
 }
 
+/// Most changes of a list: each takes two estimates by every method.
+const MOST_PERCENTS: usize = 100;
+
 /// Parses frequency changes (percent).
 pub(super) fn percents(text: &str) -> Result<Numbers, String> {
     let percents = positive_numbers(text, "give percentages such as 0.05,0.1")?;
+    if percents.len() > MOST_PERCENTS {
+        let count = percents.len();
+        return Err(format!(
+            "{count} changes are too many; give at most {MOST_PERCENTS}"
+        ));
+    }
     match percents.iter().find(|percent| **percent >= 50.0) {
         Some(large) => Err(format!("{large} % is too large; give less than 50 %")),
         None => Ok(percents),
     }
 }
 
+/// Largest number of a list, that of a description's frequencies (Hz).
+const LARGEST: f64 = 1e9;
+
 fn positive_numbers(text: &str, remedy: &str) -> Result<Numbers, String> {
     text.split(',')
         .map(|item| {
-            number(item, "not a positive number", remedy, |value| {
+            let value = number(item, "not a positive number", remedy, |value| {
                 value.is_finite() && value > 0.0
-            })
+            })?;
+            match value <= LARGEST {
+                true => Ok(value),
+                false => Err(format!("{value:e} is too large; give at most {LARGEST:e}")),
+            }
         })
         .collect()
 }
 
 /// Parses a factor from a file's units to SI units; negative if the sensor is mounted the other way.
 pub(super) fn channel_scale(text: &str) -> Result<f64, String> {
-    let remedy = "give SI units per unit of the file, such as 500; negative = the other way round";
+    let remedy = "give SI units per unit of the file, a size from 1e-15 to 1e15 such as 500; negative = the other way round";
     number(text, "no scale", remedy, |value| {
-        value.is_finite() && value != 0.0
+        (1e-15..=1e15).contains(&value.abs())
     })
 }
 
@@ -236,8 +278,14 @@ fn number(
     is_allowed: impl Fn(f64) -> bool,
 ) -> Result<f64, String> {
     match text.trim().parse() {
-        Ok(value) if is_allowed(value) => Ok(value),
-        Ok(value) => Err(format!("{value} is {what}; {remedy}")),
+        // Too many digits are read as infinity.
+        Ok(value)
+            if is_allowed(value)
+                && !(value.is_infinite() && text.contains(|c: char| c.is_ascii_digit())) =>
+        {
+            Ok(value)
+        }
+        Ok(_) => Err(format!("{} is {what}; {remedy}", text.trim())),
         Err(_) => Err(format!("\"{}\" is not a number; {remedy}", text.trim())),
     }
 }

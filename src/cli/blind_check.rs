@@ -2,8 +2,9 @@
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
-use super::output::{OutputFolder, failed, files_made_in};
+use super::output::failed;
 use super::overwrite::{CHECKSUMS, Expanded};
+use super::publication::{OutputFolder, files_made_in};
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -139,7 +140,7 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    let output = OutputFolder::prepare(&arguments.out)?;
+    let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
     let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
         _ => drawn(
@@ -164,7 +165,7 @@ pub(super) fn run(
     for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
     }
-    let folder = output.publish(terminal.files())?;
+    let folder = output.publish()?;
     terminal.say(&format!("Results: {}", folder.display()))?;
     terminal.write_json(&score_json(&scores, &conduct))?;
     Ok(Outcome::Answered)
@@ -176,8 +177,7 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<(Vec<Case>, Conduct)> {
-    let force = terminal.files().force;
-    let kept = keep.map(|name| OutputFolder::prepare_own(name, force));
+    let kept = keep.map(|name| OutputFolder::prepare_own(name, terminal.files()));
     let kept = kept.transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
@@ -229,7 +229,7 @@ fn drawn(
     };
     if let Some(kept) = kept {
         kept.add("truth.json", sealed.as_bytes())?;
-        kept.publish(terminal.files())?;
+        kept.publish()?;
     }
     Ok((diagnosed, conduct))
 }

@@ -7,7 +7,10 @@ mod arguments;
 mod input;
 mod output;
 mod overwrite;
+mod place;
 mod program;
+mod publication;
+mod staging;
 mod terminal;
 
 mod blind_check;
@@ -118,6 +121,10 @@ pub(super) fn main() -> ExitCode {
         }
     };
     let start = Instant::now();
+    if let Err(cause) = staging::watch_signals() {
+        terminal::print_error(&cause.into());
+        return ExitCode::from(2);
+    }
     let outcome = run_command(&line, &matches);
     if line.common.tells_more() {
         let seconds = start.elapsed().as_secs_f64();
@@ -132,13 +139,6 @@ pub(super) fn main() -> ExitCode {
         Ok(Outcome::Answered) => ExitCode::SUCCESS,
         Ok(Outcome::NoAnswer) => ExitCode::from(1),
         Err(error) => {
-            // The reader of the output may have closed it, as `head` does.
-            let mut causes = error
-                .chain()
-                .filter_map(|cause| cause.downcast_ref::<io::Error>());
-            if causes.any(|cause| cause.kind() == io::ErrorKind::BrokenPipe) {
-                return ExitCode::SUCCESS;
-            }
             terminal::print_error(&error);
             ExitCode::from(2)
         }
@@ -224,6 +224,39 @@ mod tests {
             let place = (command.get_name(), argument.get_id());
             assert_eq!(is_path, found == path || found == json, "{place:?}");
         }
+    }
+
+    #[test]
+    fn limit_every_numeric_argument_stands_in_the_table_of_budgets() {
+        use clap::builder::ValueParser;
+        use std::collections::BTreeSet;
+        let words = [
+            ValueParser::path_buf().type_id(),
+            ValueParser::string().type_id(),
+            ValueParser::from(clap::value_parser!(arguments::JsonDestination)).type_id(),
+        ];
+        let mut line = CommandLine::command();
+        line.build();
+        let mut numeric = BTreeSet::new();
+        let commands = line.get_subcommands();
+        for (command, argument) in commands.flat_map(|c| c.get_arguments().map(move |a| (c, a))) {
+            let is_number = argument.get_action().takes_values()
+                && argument.get_possible_values().is_empty()
+                && !words.contains(&argument.get_value_parser().type_id());
+            if is_number {
+                let own = !argument.is_global_set();
+                let command = if own { command.get_name() } else { "*" };
+                let name = argument.get_long().unwrap_or_default();
+                numeric.insert(format!("{command} --{name}"));
+            }
+        }
+        let table = include_str!("../../tests/program/budgets.tsv").lines();
+        let rows = table.filter(|line| !line.starts_with('#')).map(|line| {
+            let columns: Vec<&str> = line.split('\t').collect();
+            assert!(columns.len() == 5 && !columns.contains(&""), "{line}");
+            format!("{} {}", columns[0], columns[1])
+        });
+        assert_eq!(numeric, rows.collect());
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! A file that tapjoint made has a mark: in the file, or in a list of checksums beside it.
 
 use super::arguments::JsonDestination;
+use super::place::Place;
 use anyhow::bail;
 use clap::ArgMatches;
 use serde_json::Value;
@@ -88,10 +89,10 @@ impl Files {
     pub(super) fn check(&self) -> anyhow::Result<()> {
         let mut before: Vec<(Place, &str)> = Vec::new();
         for (option, path) in &self.outputs {
+            self.check_output(path, option)?;
             let Some(place) = Place::of(path) else {
                 continue;
             };
-            self.check_output(path, option)?;
             if let Some((_, first)) = before.iter().find(|(other, _)| other.is(&place)) {
                 bail!(
                     "{}: is the output of both {first} and {option}; give each a name of its own",
@@ -106,9 +107,14 @@ impl Files {
     /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
-    /// The output is an input, or a file that the program did not make.
+    /// The output is an input, a folder, or a file that the program did not make.
     fn check_output(&self, path: &Path, option: &str) -> anyhow::Result<()> {
         let shown = path.display();
+        if path.is_dir() {
+            bail!(
+                "{shown}: is a folder, but a file is needed ({option}); move it away, or give another name"
+            );
+        }
         if self.reads(path) {
             bail!(
                 "{shown}: is an input of this command and cannot be its output ({option}); give another name"
@@ -142,7 +148,7 @@ impl Files {
 }
 
 /// Returns true if there is no file, an empty one, or one that the program made.
-fn is_free(path: &Path) -> bool {
+pub(super) fn is_free(path: &Path) -> bool {
     match fs::metadata(path) {
         Ok(found) => !found.is_file() || found.len() == 0 || is_made_here(path),
         Err(_) => true,
@@ -180,65 +186,6 @@ pub(super) fn described(path: &Path) -> Option<TestDescription> {
     }
     let text = fs::read_to_string(path).ok()?;
     TestDescription::parse(&text, &path.display().to_string()).ok()
-}
-
-/// A file's place, the same for all its names: through links, `..`, and hard links.
-#[derive(Debug, Clone)]
-struct Place {
-    /// The path without links.
-    path: PathBuf,
-    /// Device and number of the file, if the file exists and the system gives them.
-    node: Option<(u64, u64)>,
-}
-
-impl Place {
-    /// Returns the place of a file, or the place where it would appear; `None` for a device, a pipe or a folder.
-    fn of(path: &Path) -> Option<Self> {
-        let found = fs::metadata(path).ok();
-        if found.as_ref().is_some_and(|found| !found.is_file()) {
-            return None;
-        }
-        let whole = fs::canonicalize(path).ok().or_else(|| {
-            let name = path.file_name()?;
-            let folder = path.parent().filter(|folder| *folder != Path::new(""));
-            Some(
-                fs::canonicalize(folder.unwrap_or(Path::new(".")))
-                    .ok()?
-                    .join(name),
-            )
-        });
-        let whole = whole.or_else(|| std::path::absolute(path).ok());
-        Some(Self {
-            path: whole.unwrap_or_else(|| path.to_owned()),
-            node: found.as_ref().and_then(node_of),
-        })
-    }
-
-    fn is(&self, other: &Self) -> bool {
-        let same_node = self.node.is_some() && self.node == other.node;
-        if same_node || self.path == other.path {
-            return true;
-        }
-        // Names that differ in their case only are one file if the file system ignores case: then the folder
-        // also exists in capital letters.
-        let [one, two] = [self, other].map(|place| place.path.to_string_lossy().to_lowercase());
-        let Some(folder) = self.path.parent().filter(|_| one == two) else {
-            return false;
-        };
-        let capitals = PathBuf::from(folder.to_string_lossy().to_uppercase());
-        capitals != folder && fs::canonicalize(capitals).is_ok_and(|found| found == folder)
-    }
-}
-
-#[cfg(unix)]
-fn node_of(found: &fs::Metadata) -> Option<(u64, u64)> {
-    use std::os::unix::fs::MetadataExt;
-    Some((found.dev(), found.ino()))
-}
-
-#[cfg(not(unix))]
-fn node_of(_found: &fs::Metadata) -> Option<(u64, u64)> {
-    None
 }
 
 /// Name of the list of checksums, in the format of `sha256sum`.

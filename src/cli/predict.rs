@@ -12,7 +12,7 @@ use tapjoint::identify::predict_lambdas;
 use tapjoint::pipeline::{TestedStructure, predict_described, structure_details, tested_structure};
 use tapjoint::report::document::{Document, PredictionSection};
 use tapjoint::report::{lambdas_of, prediction_of};
-use tapjoint::structure::{Assembly, JointStiffness};
+use tapjoint::structure::{Assembly, JointStiffness, MODE_LIMIT};
 use tapjoint::study::updated_model::described_frequencies;
 
 /// Predict the natural frequencies of a beam with a known joint.
@@ -39,7 +39,7 @@ pub(super) struct PredictArguments {
     #[command(flatten)]
     stiffness: StiffnessArguments,
     /// Number of modes
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = RangedU64ValueParser::<usize>::new().range(1..=MODE_LIMIT as u64))]
     modes: usize,
 }
 

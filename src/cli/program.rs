@@ -4,8 +4,8 @@
 
 use super::Outcome;
 use super::arguments::assembly;
-use super::output::OutputFolder;
 use super::overwrite::Expanded;
+use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -217,14 +217,14 @@ pub(super) fn man(
     command.build();
     let written = match &arguments.out {
         Some(folder) => {
-            let output = OutputFolder::prepare(folder)?;
+            let output = OutputFolder::prepare(folder, terminal.files())?;
             let mut names = Vec::new();
             for found in with_pages(&command) {
                 let name = file_name(found);
                 output.add(&name, &page(found)?)?;
                 names.push(name);
             }
-            let folder = output.publish(terminal.files())?;
+            let folder = output.publish()?;
             terminal.say(&format!("{} pages in {}", names.len(), folder.display()))?;
             json!({ "pages": names })
         }

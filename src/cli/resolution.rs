@@ -5,7 +5,7 @@ use super::arguments::{StiffnessArguments, band, block_size, reading, window};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
@@ -100,6 +100,9 @@ fn decibels(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Most block sizes and most bands of a study: each takes all virtual tests anew.
+const MOST_SIZES: usize = 20;
+
 fn settings(arguments: &ResolutionArguments, seed: u64) -> ResolutionSettings {
     let mut settings = ResolutionSettings {
         draws: arguments.draws,
@@ -158,6 +161,15 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
+    for (name, count) in [
+        ("--blocks", arguments.blocks.len()),
+        ("--band", arguments.bands.len()),
+    ] {
+        ensure!(
+            count <= MOST_SIZES,
+            "{name} is given {count} times; give at most {MOST_SIZES}"
+        );
+    }
     let file = read_test(&arguments.test, &terminal)?;
     let structure = tested_structure(&file.test);
     let given = arguments.stiffness.given(file.test.joint.kind)?;

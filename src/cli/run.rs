@@ -6,8 +6,8 @@ use super::arguments::{
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, is_description, read_test, stem};
-use super::output::OutputFolder;
 use super::overwrite::Expanded;
+use super::publication::OutputFolder;
 use super::recording::analyse;
 use super::terminal::Terminal;
 use anyhow::bail;
@@ -132,7 +132,7 @@ pub(super) fn run(
             stem(&arguments.file)
         }
     };
-    let output = OutputFolder::prepare(&arguments.folder(&name))?;
+    let output = OutputFolder::prepare(&arguments.folder(&name), terminal.files())?;
     let progress = terminal.progress("measuring, fitting and estimating");
     let analysis = match &described {
         Some(file) => file.analyse(&IdentifySettings {
@@ -170,7 +170,7 @@ pub(super) fn run(
     let page = output.earlier("report.html");
     let earlier = page.and(output.earlier("report.json"));
     let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
-    let (folder, left) = output.publish_without(&stale, terminal.files())?;
+    let (folder, left) = output.publish_without(stale)?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;

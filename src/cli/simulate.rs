@@ -3,8 +3,8 @@
 use super::Outcome;
 use super::arguments::{StiffnessArguments, words};
 use super::input::{effect_at, read_model};
-use super::output::OutputFolder;
 use super::overwrite::{CHECKSUMS, Expanded};
+use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
 use clap::builder::{RangedU64ValueParser, TypedValueParser};
@@ -14,14 +14,15 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::description::TestDescription;
-use tapjoint::effects::{self, Effect, EffectId};
+use tapjoint::effects::{Effect, EffectDimension, EffectId};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
 use tapjoint::report::wrapped;
 use tapjoint::simulate::{
-    AntiAlias, Damping, Laboratory, TestPlan, Tip, Truth, VirtualRecording, VirtualTest,
+    AntiAlias, Damping, Laboratory, MOST_RATE, TestPlan, Tip, Truth, VirtualRecording, VirtualTest,
     nominal_description, plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
@@ -85,14 +86,14 @@ fn parameter(id: EffectId, text: &str) -> Result<(&str, f64), String> {
     let (key, value) = (key.trim(), value.trim());
     let info = id.parameter(key).map_err(|error| error.to_string())?;
     let dimension = match info.dimension {
-        effects::Dimension::None => Dimension::Ratio,
-        effects::Dimension::Mass => Dimension::Mass,
-        effects::Dimension::Stiffness => Dimension::TranslationalStiffness,
-        effects::Dimension::Frequency => Dimension::Frequency,
-        effects::Dimension::Length => Dimension::Length,
-        effects::Dimension::Force => Dimension::Force,
+        EffectDimension::None => Dimension::Ratio,
+        EffectDimension::Mass => Dimension::Mass,
+        EffectDimension::Stiffness => Dimension::TranslationalStiffness,
+        EffectDimension::Frequency => Dimension::Frequency,
+        EffectDimension::Length => Dimension::Length,
+        EffectDimension::Force => Dimension::Force,
         // Inertias have no unit on the command line.
-        effects::Dimension::Inertia => {
+        EffectDimension::Inertia => {
             let number = value.parse();
             let number = number.map_err(|_| format!("{key}: \"{value}\" is not a number"));
             return Ok((key, number?));
@@ -134,7 +135,7 @@ pub(super) fn run(
         .with_context(|| format!("{}: cannot be read", file.name))?;
     let given = arguments.stiffness.given(file.test.joint.kind)?;
     let laboratory = arguments.laboratory.resolve()?;
-    let output = OutputFolder::prepare(&arguments.out)?;
+    let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
     let mut effects =
         described_effects(&file.test).map_err(|error| effect_at(&file.name, &error))?;
     effects.extend(arguments.effects.iter().cloned());
@@ -147,11 +148,20 @@ pub(super) fn run(
     };
     let test = plan_test(&plan).map_err(|error| anyhow!("{}: {error}", file.name))?;
     let truth = truth_of(&plan, &test);
+    check_sizes(&test, &laboratory, output.place_of(DESCRIPTION).parent())?;
+    let seconds = test.recordings.iter().map(seconds_of).sum();
+    let done = AtomicUsize::new(0);
     let clipped = test
         .recordings
         .par_iter()
         .map(|recording| {
-            write_recording(recording, &laboratory, &output.place_of(&recording.file))
+            let path = output.place_of(&recording.file);
+            let progress = Progress {
+                terminal: &terminal,
+                done: &done,
+                of: seconds,
+            };
+            write_recording(recording, &laboratory, &path, &progress)
                 .with_context(|| format!("{}: could not be written", recording.file))
         })
         .collect::<anyhow::Result<Vec<u64>>>()?;
@@ -170,20 +180,47 @@ pub(super) fn run(
             ));
         }
     }
-    let folder = output.publish(terminal.files())?;
+    let folder = output.publish()?;
     terminal.say(&summary(&truth, &test, &folder))?;
     terminal.write_json(&serde_json::json!({ "truth": truth }))?;
     Ok(Outcome::Answered)
 }
 
-/// Writes a recording and returns the number of clipped samples.
-fn write_recording(
-    recording: &VirtualRecording,
+/// Refuses recordings that do not fit into WAV files, or into a folder, before any is made.
+fn check_sizes(
+    test: &VirtualTest,
     laboratory: &Laboratory,
-    path: &Path,
-) -> anyhow::Result<u64> {
-    let mut run = recording.begin(laboratory);
-    let layout = WavLayout {
+    folder: Option<&Path>,
+) -> anyhow::Result<()> {
+    let mut bytes = 0_u64;
+    for recording in &test.recordings {
+        let layout = layout_of(recording, laboratory);
+        layout.check_size(&recording.file)?;
+        bytes = bytes.saturating_add(layout.bytes());
+    }
+    // A disk that does not tell its size may have room.
+    let free = folder.and_then(|folder| fs4::available_space(folder).ok());
+    check_room(bytes, free.unwrap_or(u64::MAX))
+}
+
+fn check_room(bytes: u64, free: u64) -> anyhow::Result<()> {
+    if bytes > free {
+        bail!(
+            "the recordings take {:.1} GB, and the disk of --out has {:.1} GB left; give fewer --taps, less --seconds, a lower --rate, or another --out",
+            bytes as f64 / 1e9,
+            free as f64 / 1e9
+        );
+    }
+    Ok(())
+}
+
+/// Returns the length of a recording in whole seconds.
+fn seconds_of(recording: &VirtualRecording) -> usize {
+    (recording.plan.frames / u64::from(recording.plan.sample_rate)) as usize
+}
+
+fn layout_of(recording: &VirtualRecording, laboratory: &Laboratory) -> WavLayout {
+    WavLayout {
         sample_rate: recording.plan.sample_rate,
         channels: recording.plan.channels.len(),
         frames: recording.plan.frames,
@@ -192,11 +229,41 @@ fn write_recording(
             24 => WavFormat::Pcm24,
             _ => WavFormat::Float32,
         },
-    };
+    }
+}
+
+/// Seconds that are recorded, of all recordings.
+struct Progress<'a> {
+    terminal: &'a Terminal,
+    done: &'a AtomicUsize,
+    of: usize,
+}
+
+impl Progress<'_> {
+    fn second(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.terminal.count("seconds recorded", done, self.of);
+    }
+}
+
+/// Writes a recording and returns the number of clipped samples.
+fn write_recording(
+    recording: &VirtualRecording,
+    laboratory: &Laboratory,
+    path: &Path,
+    progress: &Progress,
+) -> anyhow::Result<u64> {
+    let mut run = recording.begin(laboratory);
+    let layout = layout_of(recording, laboratory);
     let mut stream = WavStream::create(path, layout)?;
     let mut frame = vec![0.0; layout.channels];
+    let mut written = 0;
     while run.next_frame(&mut frame) {
         stream.write(&frame)?;
+        written += 1;
+        if written % layout.sample_rate == 0 {
+            progress.second();
+        }
     }
     Ok(stream.finish()?)
 }
@@ -353,7 +420,7 @@ pub(super) struct LaboratoryArguments {
     /// Length of each recording (s); default: long enough for the taps to ring down
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Sample rate (Hz); default: the lowest usual rate that covers the band
+    /// Sample rate (Hz), 100 to 204800; default: the lowest usual rate that covers the band
     #[arg(long, value_name = "HZ", value_parser = sample_rate)]
     rate: Option<u32>,
     /// Bits of a sample, 32 = floating point; default: 24
@@ -380,7 +447,7 @@ pub(super) struct LaboratoryArguments {
     /// Relative error of the recorder's clock, positive = frequencies are read too high; default: 5e-6
     #[arg(long, value_name = "X", value_parser = ratio, allow_negative_numbers = true)]
     clock_error: Option<f64>,
-    /// Resonance frequency of a mounted accelerometer (Hz); default: 18000
+    /// Resonance frequency of a mounted accelerometer (Hz), up to 100000, 0 = none; default: 18000
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     mounting: Option<f64>,
     /// Mains frequency (Hz); default: 50
@@ -557,11 +624,24 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 fn sample_rate(text: &str) -> Result<u32, String> {
     let rate = quantity(text, Dimension::Rate)?;
-    if rate.fract() == 0.0 && (100.0..=1e6).contains(&rate) {
+    if rate.fract() == 0.0 && (100.0..=f64::from(MOST_RATE)).contains(&rate) {
         Ok(rate as u32)
     } else {
         Err(format!(
-            "{rate} Hz is no sample rate of a WAV file; give a whole number from 100 to 1000000"
+            "{rate} Hz is no sample rate of an analyser; give a whole number from 100 to {MOST_RATE}"
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_recordings_larger_than_the_disk_are_refused() {
+        assert!(check_room(1000, 1000).is_ok());
+        let error = check_room(8_000_000_000, 1_500_000_000).unwrap_err();
+        let words = "the recordings take 8.0 GB, and the disk of --out has 1.5 GB left";
+        assert!(error.to_string().starts_with(words), "{error}");
     }
 }

@@ -1,8 +1,9 @@
 //! Output to standard output, standard error and `--json`.
 
 use super::arguments::{CommonArguments, JsonDestination};
-use super::output::OutputFile;
+use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
+use super::staging::ledger;
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -172,15 +173,15 @@ fn coloured(text: &str) -> String {
 }
 
 fn print(text: &str) -> io::Result<()> {
+    let end = if text.ends_with('\n') { "" } else { "\n" };
     let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    if !text.ends_with('\n') {
-        out.write_all(b"\n")?;
-    }
-    out.flush()
+    let printed = write!(out, "{text}{end}").and_then(|()| out.flush());
+    unless_closed(printed)
+        .map_err(|cause| io::Error::new(cause.kind(), format!("standard output: {cause}")))
 }
 
-/// Prints `error: ...` on standard error, with the causes that the message does not contain yet.
+/// Prints `error: ...` on standard error, with the causes that the message does not contain yet, and the
+/// results that are written all the same.
 pub(super) fn print_error(error: &anyhow::Error) {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
@@ -189,6 +190,15 @@ pub(super) fn print_error(error: &anyhow::Error) {
             text.push_str(": ");
             text.push_str(&cause);
         }
+    }
+    let written = &ledger().written;
+    if !written.is_empty() {
+        let names: Vec<_> = written
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        text.push_str("; written all the same: ");
+        text.push_str(&names.join(", "));
     }
     let _ = writeln!(io::stderr(), "error: {text}");
 }

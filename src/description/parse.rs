@@ -44,9 +44,9 @@ impl TestDescription {
         let hammer_table = top.optional("hammer", |entry| entry.table(&keys::HAMMER))?;
         let hammer = hammer_table.as_ref().map(read_hammer).transpose()?;
         let hammer_channel = hammer_table.and_then(|table| table.get("channel"));
-        let sensor_tables = array_of_tables(&top, "sensor", "[[sensor]]")?;
+        let sensor_tables = array_of_tables(&top, "sensor", "[[sensor]]", MOST_SENSORS)?;
         let sensors = read_sensors(&sensor_tables, hammer_channel.as_ref(), &beam)?;
-        let recordings = array_of_tables(&top, "recording", "[[recording]]")?
+        let recordings = array_of_tables(&top, "recording", "[[recording]]", MOST_RECORDINGS)?
             .iter()
             .map(|entry| read_recording(entry, &beam, &sensors))
             .collect::<Result<Vec<_>, _>>()?;
@@ -63,7 +63,7 @@ impl TestDescription {
         })?;
         let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
         let analysis = read_analysis(analysis.as_ref(), &joint)?;
-        let effects = array_of_tables(&top, "effect", "[[effect]]")?
+        let effects = array_of_tables(&top, "effect", "[[effect]]", MOST_EFFECTS)?
             .iter()
             .map(read_effect)
             .collect::<Result<Vec<_>, _>>()?;
@@ -99,13 +99,19 @@ impl TestDescription {
     }
 }
 
+// Every table costs time and memory in all commands. No test of a beam has as many.
+const MOST_SENSORS: usize = 128;
+const MOST_RECORDINGS: usize = 1000;
+const MOST_EFFECTS: usize = 100;
+
 fn array_of_tables<'t>(
     top: &Table<'t>,
     key: &str,
     header: &str,
+    most: usize,
 ) -> Result<Vec<Entry<'t>>, DescriptionError> {
     let wanted = format!("a list of tables, each under its own header {header},");
-    let entries = top.optional(key, |entry| entry.list(&wanted))?;
+    let entries = top.optional(key, |entry| entry.list_up_to(most, &wanted))?;
     Ok(entries.unwrap_or_default())
 }
 

@@ -255,7 +255,9 @@ impl<'t> Entry<'t> {
         allowed: &str,
         remedy: &str,
     ) -> DescriptionError {
-        let value = with_unit(value, unit);
+        // A share is told as it was written: "200 %" and not 2.
+        let written = self.as_text().filter(|text| text.trim_end().ends_with('%'));
+        let value = written.map_or_else(|| with_unit(value, unit), |text| text.trim().to_owned());
         self.error(format!(
             "{value} is impossible; allowed: {allowed}; {remedy}"
         ))
@@ -408,6 +410,23 @@ impl<'t> Entry<'t> {
             .collect())
     }
 
+    /// Returns the items of a list of at most so many.
+    pub(super) fn list_up_to(
+        &self,
+        most: usize,
+        wanted: &str,
+    ) -> Result<Vec<Entry<'t>>, DescriptionError> {
+        let items = self.list(wanted)?;
+        match items.get(most) {
+            None => Ok(items),
+            Some(first) => Err(first.wrong_count(
+                items.len(),
+                &format!("up to {most}"),
+                "divide the test into several descriptions",
+            )),
+        }
+    }
+
     /// Returns true if the value is a list.
     pub(super) fn is_list(&self) -> bool {
         self.value.get_ref().is_array()
@@ -512,7 +531,7 @@ impl Limits {
         Self::new(low, high, [false, true], remedy)
     }
 
-    fn contain(&self, value: f64) -> bool {
+    pub(super) fn contain(&self, value: f64) -> bool {
         let [low_open, high_open] = self.open;
         let above = value > self.low || value == self.low && !low_open;
         above && (value < self.high || value == self.high && !high_open)

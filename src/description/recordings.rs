@@ -10,7 +10,9 @@ use super::{
     RecordingDescription, ResponseForm, Scale, SensorDescription, SensorKind, keys,
 };
 use std::collections::BTreeMap;
+use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
+use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
 
 /// Words of `kind` in `[[sensor]]`.
 pub const SENSOR_KINDS: [(&str, SensorKind); 4] = [
@@ -25,8 +27,8 @@ const CHANNELS: Limits = Limits::between(
     4096.0,
     "channels count from 1, a time column does not count",
 );
-const SCALE: Limits = Limits::between(
-    -1e15,
+const SCALE_SIZE: Limits = Limits::between(
+    1e-15,
     1e15,
     "give SI units per unit of the file; a negative scale turns the direction",
 );
@@ -35,6 +37,10 @@ const SENSOR_MASS: Limits = Limits::between(
     1e3,
     "give the data sheet's mass in kg, or with its unit: \"24 g\"",
 );
+
+const BESIDE: Limits = Limits::between(-1e4, 1e4, "positions run along the beam in m");
+/// Largest mass on a beam, in masses of the beam. More of it leaves no beam to tap, and its modes are found slowly.
+const HEAVIEST: f64 = 3.0;
 
 /// Reads `[hammer]`.
 pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, DescriptionError> {
@@ -119,7 +125,7 @@ fn read_sensor(
         scale: read_scale(table, signal, sensitivity)?,
         position: table.optional("position", |entry| match kind {
             // A microphone stands beside the beam, perhaps beyond its end.
-            SensorKind::Sound => entry.quantity(Dimension::Length),
+            SensorKind::Sound => entry.within(Dimension::Length, &BESIDE),
             _ => entry.within(Dimension::Length, &along(beam.length)),
         })?,
         mass: table.within("mass", Dimension::Mass, &SENSOR_MASS)?,
@@ -129,19 +135,30 @@ fn read_sensor(
         if kind == SensorKind::Sound {
             entry.warn("has no effect; a microphone does not sit on the beam; remove `mass`");
         } else {
-            check_weight(&entry, mass, beam, "did you mean g? Write \"24 g\"");
+            check_weight(&entry, mass, beam, "did you mean g? Write \"24 g\"")?;
         }
     }
     Ok(sensor)
 }
 
-/// Warns of what weighs (kg) more than the beam itself.
-fn check_weight(entry: &Entry<'_>, mass: f64, beam: &BeamDescription, question: &str) {
+/// Warns of what weighs (kg) more than the beam itself, and refuses what weighs more than [`HEAVIEST`].
+fn check_weight(
+    entry: &Entry<'_>,
+    mass: f64,
+    beam: &BeamDescription,
+    question: &str,
+) -> Result<(), DescriptionError> {
     let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
+    if mass > HEAVIEST * beam_mass {
+        let most = with_unit(HEAVIEST * beam_mass, "kg");
+        let allowed = format!("up to {most}, {HEAVIEST} times the mass of the beam");
+        return Err(entry.impossible(mass, "kg", &allowed, question));
+    }
     if mass > beam_mass {
         let usual = format!("less than the beam's {}", with_unit(beam_mass, "kg"));
         entry.unusual(mass, "kg", &usual, question);
     }
+    Ok(())
 }
 
 /// Warns of each mass without a place in some recording, or in the description if there is no recording.
@@ -196,27 +213,26 @@ fn read_scale(
             "`scale` and `sensitivity` say the same thing twice; keep `scale` (SI units per unit of the file) or \
              `sensitivity` (files in volts)",
         )),
-        (Some(entry), None) => Ok(Some(Scale::PerUnit(nonzero(&entry, signal)?))),
+        (Some(entry), None) => Ok(Some(Scale::PerUnit(factor(&entry, signal)?))),
         (None, Some(entry)) => {
-            let volts = nonzero(&entry, sensitivity)?;
-            let scale = volts.recip();
-            if scale.abs() > 1e15 {
-                let allowed = Limits::between(-1e15, 1e15, "check the sensitivity's exponent");
-                return Err(entry.out_of_range(volts, sensitivity.si_unit(), &allowed));
-            }
-            Ok(Some(Scale::PerVolt(scale)))
+            let volts = factor(&entry, sensitivity)?;
+            Ok(Some(Scale::PerVolt(volts.recip())))
         }
         (None, None) => Ok(None),
     }
 }
 
-fn nonzero(entry: &Entry<'_>, dimension: Dimension) -> Result<f64, DescriptionError> {
-    let value = entry.within(dimension, &SCALE)?;
-    if value != 0.0 {
-        return Ok(value);
+/// Reads a scale or a sensitivity of either sign.
+fn factor(entry: &Entry<'_>, dimension: Dimension) -> Result<f64, DescriptionError> {
+    let value = entry.quantity(dimension)?;
+    match value {
+        0.0 => {
+            let remedy = "remove the key for a scale of 1";
+            Err(entry.impossible(value, dimension.si_unit(), "any number but zero", remedy))
+        }
+        _ if SCALE_SIZE.contain(value.abs()) => Ok(value),
+        _ => Err(entry.out_of_range(value.abs(), dimension.si_unit(), &SCALE_SIZE)),
     }
-    let remedy = "remove the key for a scale of 1";
-    Err(entry.impossible(value, dimension.si_unit(), "any number but zero", remedy))
 }
 
 /// Words of `form` in `[[recording]]`.
@@ -225,10 +241,9 @@ pub const FORMS: [(&str, ResponseForm); 3] = [
     ("mobility", ResponseForm::Mobility),
     ("receptance", ResponseForm::Receptance),
 ];
-/// 16 samples give six lines. 4 million samples are 78 s at 51.2 kHz and still fit into a small memory.
 const BLOCK: Limits = Limits::between(
-    16.0,
-    4e6,
+    LEAST_BLOCK as f64,
+    MOST_BLOCK as f64,
     "a block of 2048 samples shows 800 lines; leave it out to have it chosen",
 );
 const SAMPLE_RATE: Limits = Limits::between(
@@ -250,6 +265,8 @@ const TEMPERATURE: Limits = Limits::between(
     "give degrees Celsius, or a unit: \"293 K\"",
 );
 
+/// Most masses fastened for one recording.
+const MOST_MASSES: usize = 100;
 /// Largest mass that is fastened to a beam for a test; the heaviest beams take more than a kilogram.
 const FASTENED_MASS: Limits = Limits::above(
     0.0,
@@ -276,7 +293,7 @@ pub(super) fn read_recording(
     }
     let masses: Option<Vec<_>> = table.optional("mass", |entry| {
         let wanted = "a list of tables, each under its own header [[recording.mass]],";
-        let entries = entry.list(wanted)?;
+        let entries = entry.list_up_to(MOST_MASSES, wanted)?;
         entries
             .iter()
             .map(|entry| read_fastened(entry, beam))
@@ -341,7 +358,7 @@ fn read_fastened(entry: &Entry<'_>, beam: &BeamDescription) -> Result<PointMass,
     let weight = table.need("mass", "what it weighs (kg)", "mass = \"50 g\"")?;
     let position = position.within(Dimension::Length, &along(beam.length))?;
     let mass = weight.within(Dimension::Mass, &FASTENED_MASS)?;
-    check_weight(&weight, mass, beam, "did you mean g? Write \"50 g\"");
+    check_weight(&weight, mass, beam, "did you mean g? Write \"50 g\"")?;
     Ok(PointMass::new(position, mass))
 }
 
@@ -380,10 +397,9 @@ const SCATTER: Limits = Limits::inside(
     1.0,
     "give the repeatability as a share of the frequency: \"0.3 %\"",
 );
-/// Beam theory does not describe higher modes.
 const MODE: Limits = Limits::between(
     1.0,
-    1000.0,
+    MEASURED_LIMIT as f64,
     "modes count from 1; rigid-body modes do not count",
 );
 /// Repeated tests scatter less than this.
@@ -397,6 +413,10 @@ pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, De
     if items.is_empty() {
         let remedy = "list the natural frequencies in Hz, lowest first";
         return Err(entry.wrong_count(0, "at least 1", remedy));
+    }
+    if items.len() > MEASURED_LIMIT {
+        let remedy = "leave the highest out: a joint needs two to four";
+        return Err(entry.wrong_count(items.len(), &format!("1 to {MEASURED_LIMIT}"), remedy));
     }
     let frequencies = items
         .iter()

@@ -26,15 +26,16 @@ struct Property {
 }
 
 // The limits are physical (no solid is denser than 1e5 kg/m3 or stiffer than 1e13 Pa) or beyond the reach
-// of a hammer. The usual ranges are those of beams that people tap.
+// of a hammer. Within them no frequency leaves the range of numbers. The usual ranges are those of beams that
+// people tap.
 const LENGTH: Property = Property {
     key: "length",
     wanted: "a length (m)",
     example: "length = \"423 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::above(
-        0.0,
-        1e4,
+    limits: Limits::between(
+        1e-3,
+        1e3,
         "give the free length in m, or with its unit: \"423 mm\"",
     ),
     usual: [5e-3, 20.0],
@@ -45,7 +46,11 @@ const WIDTH: Property = Property {
     wanted: "a width (m)",
     example: "width = \"50 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::above(0.0, 1e3, "give the width in m, or with its unit: \"50 mm\""),
+    limits: Limits::between(
+        1e-6,
+        1e3,
+        "give the width in m, or with its unit: \"50 mm\"",
+    ),
     usual: [1e-4, 2.0],
     question: "did you mean mm? Write \"50 mm\"",
 };
@@ -54,8 +59,8 @@ const THICKNESS: Property = Property {
     wanted: "a thickness (m)",
     example: "thickness = \"5 mm\"",
     dimension: Dimension::Length,
-    limits: Limits::above(
-        0.0,
+    limits: Limits::between(
+        1e-6,
         1e3,
         "give the thickness in m, or with its unit: \"5 mm\"",
     ),
@@ -67,8 +72,8 @@ const MODULUS: Property = Property {
     wanted: "Young's modulus (Pa)",
     example: "modulus = \"207 GPa\"",
     dimension: Dimension::Pressure,
-    limits: Limits::above(
-        0.0,
+    limits: Limits::between(
+        1.0,
         1e13,
         "give Young's modulus in Pa, or with its unit: \"207 GPa\"",
     ),
@@ -80,8 +85,8 @@ const DENSITY: Property = Property {
     wanted: "a density (kg/m3)",
     example: "density = 7850",
     dimension: Dimension::Density,
-    limits: Limits::above(
-        0.0,
+    limits: Limits::between(
+        1e-3,
         1e5,
         "give the density in kg/m3, or with its unit: \"7.85 g/cm3\"",
     ),

@@ -163,16 +163,17 @@ pub struct HypothesisResult {
     pub groups: Vec<Group>,
     /// Probability (1).
     pub probability: f64,
-    /// Logarithm of its evidence over that of `none`.
-    pub log_bayes_factor: f64,
+    /// Logarithm of its evidence over that of `none`; `None` where `none` has no fit.
+    pub log_bayes_factor: Option<f64>,
     /// Effects whose best fit predicts the same data within what the data resolve.
     pub confounded_with: Vec<EffectId>,
     /// Values of its parameters.
     #[serde(serialize_with = "by_name")]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: Vec<ParameterValue>,
-    /// Root mean square error of the fitted frequencies under the nominal model with one joint for all recordings (%).
-    pub gap_before: f64,
+    /// Root mean square error of the fitted frequencies under the nominal model with one joint for all recordings (%);
+    /// `None` where it predicts nothing.
+    pub gap_before: Option<f64>,
     /// Root mean square error of the fitted frequencies under this hypothesis (%); `None` for `unknown`, which
     /// predicts nothing.
     pub gap_after: Option<f64>,

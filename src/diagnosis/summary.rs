@@ -128,7 +128,7 @@ impl<'a> Reference<'a> {
         let fit = (!candidate.is_unknown()).then_some(&candidate.fit);
         let residuals = fit.and_then(|fit| Residuals::new(dataset, fit));
         let holdout = fit.and_then(|fit| HoldoutErrors::new(dataset, fit));
-        let none = none_of(candidates).map_or(f64::NAN, |none| none.fit.log_evidence);
+        let none = none_of(candidates).map(|none| none.fit.log_evidence);
         let before = self.before.as_ref();
         let layout = dataset.layout(&candidate.fit.effects);
         let parameters = candidate.fit.parameters();
@@ -139,10 +139,10 @@ impl<'a> Reference<'a> {
             hypothesis: candidate.hypothesis.clone(),
             groups: candidate.groups(),
             probability: candidate.probability,
-            log_bayes_factor: candidate.fit.log_evidence - none,
+            log_bayes_factor: none.map(|none| candidate.fit.log_evidence - none),
             confounded_with: confounded(dataset, candidates, index),
             parameters: self.parameter_values(candidate),
-            gap_before: before.map_or(f64::NAN, |r| r.frequency_rms(dataset)),
+            gap_before: before.map(|r| r.frequency_rms(dataset)),
             gap_after: residuals.as_ref().map(|r| r.frequency_rms(dataset)),
             left_out_modes: residuals.as_ref().and_then(|r| r.left_out_rms(dataset)),
             holdout_before: self.holdout_before.as_ref().map(HoldoutErrors::rms),

@@ -78,7 +78,7 @@ impl DegreesOfFreedom {
     }
 
     /// Returns whether too few data are left to test a name with.
-    pub fn are_too_few(self) -> bool {
+    fn are_too_few(self) -> bool {
         self.data < self.parameters + SPARE_DATA
     }
 }
@@ -320,7 +320,7 @@ fn odds_against(dataset: &Dataset, candidate: &Candidate) -> f64 {
 }
 
 /// Returns the highest odds against an explanation whose misfit has the probability `p`.
-pub fn odds_by_p_value(p: f64) -> f64 {
+fn odds_by_p_value(p: f64) -> f64 {
     let p = p.clamp(SMALLEST_P_VALUE, 1.0 / E);
     -1.0 / (E * p * p.ln())
 }

@@ -104,17 +104,6 @@ pub enum IdentifyError {
         /// Its frequency (Hz) or lambda (1).
         value: f64,
     },
-    /// More sign patterns than can be tried.
-    #[error(
-        "{modes} modes have too many sign patterns to try all; at most {limit} modes, \
-         take the first {limit} or less"
-    )]
-    TooManyPatterns {
-        /// Number of modes given.
-        modes: usize,
-        /// Number allowed.
-        limit: usize,
-    },
     /// Two lists that belong together differ in length.
     #[error("{frequencies} frequencies but {bounds} bounds were given; one bound for each")]
     Bounds {

@@ -61,7 +61,7 @@ impl PairsModel {
     }
 
     /// Number of modes it needs: n modes have n - 1 independent differences.
-    pub fn modes_needed(self) -> usize {
+    fn modes_needed(self) -> usize {
         self.unknowns() + 1
     }
 

@@ -2,10 +2,10 @@
 //!
 //! Generic over the estimator, a function from frequencies (Hz) to stiffnesses that may have no
 //! answer; what is asked of it: all frequencies off by one percentage, one mode off by its own
-//! resolution bound, and every sign pattern of all bounds.
+//! resolution bound, and sign patterns of all bounds.
 
 use super::IdentifyError;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -13,9 +13,11 @@ use rayon::prelude::*;
 /// Perturbations of Ingole & Chatterjee's table 9 (%).
 pub const PAPER_PERCENTS: [f64; 2] = [0.05, 0.1];
 
-/// Beyond so many modes the sign patterns are refused: 4096 consistent estimates take some seconds, and every
-/// further mode twice as many.
-pub const SIGN_PATTERN_MODES: usize = 12;
+/// Up to so many modes all sign patterns are tried: every further mode has twice as many.
+pub const SIGN_PATTERN_MODES: usize = 10;
+
+/// Of more modes so many patterns are drawn. One more draw lies outside their span with a probability of 2/257.
+pub const DRAWN_PATTERNS: usize = 256;
 
 /// Stiffnesses of one estimate (1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,50 +178,51 @@ pub struct SignPatternSpans {
     pub failed: usize,
 }
 
-/// Spans of the estimate under each of the 2^n combinations of +bound and -bound (Hz), and
-/// unperturbed.
+/// Spans of the estimate under the combinations of +bound and -bound (Hz), and unperturbed.
 ///
 /// # Errors
 /// As [`sign_pattern_estimates`].
 pub fn sign_pattern_spans(
     frequencies: &[f64],
     bounds: &[f64],
+    seed: u64,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Result<SignPatternSpans, IdentifyError> {
-    let patterns = sign_pattern_estimates(frequencies, bounds, &estimator)?;
+    let patterns = sign_pattern_estimates(frequencies, bounds, seed, &estimator)?;
     Ok(spans_of(estimator(frequencies), &patterns))
 }
 
-/// The estimate under each of the 2^n combinations of +bound and -bound (Hz).
+/// The estimate under each of the 2^n combinations of +bound and -bound (Hz). Beyond [`SIGN_PATTERN_MODES`] modes
+/// [`DRAWN_PATTERNS`] combinations are drawn at random instead. The same seed gives the same ones.
 ///
 /// # Errors
-/// [`IdentifyError::TooManyPatterns`] beyond [`SIGN_PATTERN_MODES`] modes, and
-/// [`IdentifyError::Bounds`].
+/// [`IdentifyError::Bounds`] unless there is one bound for each frequency.
 pub fn sign_pattern_estimates(
     frequencies: &[f64],
     bounds: &[f64],
+    seed: u64,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Result<Vec<Option<Stiffnesses>>, IdentifyError> {
     check_bounds(frequencies, bounds)?;
-    if frequencies.len() > SIGN_PATTERN_MODES {
-        return Err(IdentifyError::TooManyPatterns {
-            modes: frequencies.len(),
-            limit: SIGN_PATTERN_MODES,
-        });
-    }
-    let estimates = (0..1usize << frequencies.len())
-        .into_par_iter()
-        .map(|pattern| {
-            let mut shifted = frequencies.to_vec();
-            for (index, bound) in bounds.iter().enumerate() {
-                shifted[index] += if pattern >> index & 1 == 1 {
-                    *bound
-                } else {
-                    -bound
-                };
-            }
-            estimator(&shifted)
-        });
+    let all = frequencies.len() <= SIGN_PATTERN_MODES;
+    let patterns = match all {
+        true => 1 << frequencies.len(),
+        false => DRAWN_PATTERNS,
+    };
+    let estimates = (0..patterns).into_par_iter().map(|pattern| {
+        // A stream for each pattern: the thread that draws it does not matter.
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(pattern as u64);
+        let mut shifted = frequencies.to_vec();
+        for (index, bound) in bounds.iter().enumerate() {
+            let up = match all {
+                true => pattern >> index & 1 == 1,
+                false => random.random(),
+            };
+            shifted[index] += if up { *bound } else { -bound };
+        }
+        estimator(&shifted)
+    });
     Ok(estimates.collect())
 }
 

@@ -188,7 +188,7 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
         cells.extend(values.map(number));
         cells
     });
-    write(PERTURBATION, rows.collect())
+    write(PERTURBATION, rows)
 }
 
 /// Returns one row for each line of each function: all estimators, coherence and random error, in full
@@ -197,9 +197,8 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
-    let mut rows = Vec::new();
-    for frf in frfs {
-        for line in 0..frf.lines.points() {
+    let rows = frfs.iter().flat_map(|frf| {
+        (0..frf.lines.points()).map(move |line| {
             let mut row = vec![
                 frf.recording.clone(),
                 frf.response.clone(),
@@ -215,9 +214,9 @@ pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
                 let value = values.as_ref().and_then(|values| *values.get(line)?);
                 row.push(number(value));
             }
-            rows.push(row);
-        }
-    }
+            row
+        })
+    });
     write(FUNCTIONS, rows)
 }
 
@@ -230,7 +229,10 @@ pub(super) fn number(value: Option<f64>) -> String {
 }
 
 /// Returns rows below a line of heads.
-pub(super) fn write(heads: &str, rows: Vec<Vec<String>>) -> Result<String, ReportError> {
+pub(super) fn write(
+    heads: &str,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let heads = heads.split(',');
     writer.write_record(heads).map_err(ReportError::Csv)?;
@@ -240,7 +242,8 @@ pub(super) fn write(heads: &str, rows: Vec<Vec<String>>) -> Result<String, Repor
     let bytes = writer
         .into_inner()
         .map_err(|error| ReportError::Csv(error.into_error().into()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned()))
 }
 
 /// Returns the functions, by the estimator that each is shown by, with their coherences: datasets 58 or 58b, of

@@ -8,7 +8,7 @@ use crate::short_names::ways;
 use crate::tables::{self, Column, Place, Table, listed};
 use crate::words::diagnosis::gap_story;
 use crate::words::findings::{brief, no_estimate};
-use tapjoint_study::publication::{Reproduction, Verdict};
+use tapjoint_study::publication::{Agreement, Reproduction};
 
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
@@ -155,9 +155,9 @@ pub fn render_gap_text(document: &Document) -> String {
 /// The story of the gap and the hypotheses; empty without a diagnosis.
 fn gap(document: &Document) -> String {
     let story = gap_story(document);
-    let story = story.iter().map(|sentence| wrapped(sentence, 2) + "\n");
+    let story: Vec<String> = story.iter().map(|sentence| wrapped(sentence, 2)).collect();
     let tables = [tables::hypotheses(document), tables::next_tests(document)];
-    joined([story.collect(), joined(tables.map(noted))])
+    joined([story.join("\n"), joined(tables.map(noted))])
 }
 
 /// Returns a line for each recording, the peaks and the estimate; empty where nothing was computed.
@@ -538,10 +538,10 @@ pub fn render_reproduction(reproduction: &Reproduction) -> String {
         let mut remarks: Vec<&str> = Vec::new();
         for row in &table.rows {
             let mut verdict = match row.verdict {
-                Verdict::Reproduces => "yes",
-                Verdict::WithinRounding => "rounding",
-                Verdict::DoesNotReproduce => "NO",
-                Verdict::Given => "given",
+                Agreement::Reproduces => "yes",
+                Agreement::WithinRounding => "rounding",
+                Agreement::DoesNotReproduce => "NO",
+                Agreement::Given => "given",
             }
             .to_owned();
             if let Some(remark) = row.remark {
@@ -575,10 +575,10 @@ pub fn render_reproduction(reproduction: &Reproduction) -> String {
     }
     text.push_str(&format!(
         "\n{} rows reproduce, {} within the rounding of their input, {} do not,\n{} are given.\n",
-        reproduction.count(Verdict::Reproduces),
-        reproduction.count(Verdict::WithinRounding),
-        reproduction.count(Verdict::DoesNotReproduce),
-        reproduction.count(Verdict::Given),
+        reproduction.count(Agreement::Reproduces),
+        reproduction.count(Agreement::WithinRounding),
+        reproduction.count(Agreement::DoesNotReproduce),
+        reproduction.count(Agreement::Given),
     ));
     text
 }

@@ -243,14 +243,16 @@ pub enum SimulateError {
         needed: f64,
     },
     /// A setting of the laboratory outside its range.
-    #[error("{quantity} is {value}, but must be {allowed}")]
+    #[error("{quantity} is {value}, but must lie between {lowest} and {highest}")]
     Setting {
         /// Name of the number.
         quantity: &'static str,
         /// Its value.
         value: f64,
-        /// Values that it may have.
-        allowed: &'static str,
+        /// Least possible value.
+        lowest: f64,
+        /// Largest possible value.
+        highest: f64,
     },
     /// The structure cannot exist.
     #[error("the structure cannot be simulated: {0}")]

@@ -30,7 +30,7 @@ pub use motion::{Motion, Strike};
 pub use observed_structure::{
     ObservedStructure, ReducedMode, ReducedStructure, Sensed, StruckPlace,
 };
-pub use plan::{TestPlan, VirtualRecording, VirtualTest, plan_test, wav_name};
+pub use plan::{MOST_RATE, TestPlan, VirtualRecording, VirtualTest, plan_test, wav_name};
 pub use recording_run::{
     RecordingPlan, RecordingRun, SimulatedMode, TapTest, TapTestSettings, add_noise, below,
     observed_modes, simulate_tap_test,

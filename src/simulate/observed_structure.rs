@@ -46,7 +46,7 @@ impl ObservedStructure {
         // About how many modes lie below the highest frequency: lambda grows by pi from mode to mode.
         let beams = specimen.body.beams().iter();
         let lambda: f64 = beams.map(|beam| beam.lambda_of(highest)).sum();
-        let below = (lambda / std::f64::consts::PI) as usize + 2;
+        let below = (lambda / std::f64::consts::PI).min(MOST_MODES as f64) as usize + 2;
         let count = (below + COMPLIANT_MODES).min(MOST_MODES);
         let elastic = specimen.modes(count, Mesh::SIMULATION)?;
         // Compliance of the joint by the modes that are not even computed.

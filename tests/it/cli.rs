@@ -178,7 +178,15 @@ fn regress_bad_usage_is_explained() {
             &["spectrum", "a.wav", "--zoom", "200"],
             &["there is no colon"],
         ),
-        (&["spectrum", "a.wav", "--block", "8"], &["16..=4000000"]),
+        (&["spectrum", "a.wav", "--block", "8"], &["16..=1048576"]),
+        (
+            &["spectrum", "a.wav", "--sample-rate", "1e9"],
+            &["1 to 1e8 samples per second"],
+        ),
+        (
+            &["frf", "a.wav", "--scale-hammer=1e-300"],
+            &["a size from 1e-15 to 1e15"],
+        ),
         (&["spectrum", "a.wav"], &["a.wav: cannot be read"]),
         // `run *` where files are.
         (

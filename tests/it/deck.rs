@@ -7,7 +7,9 @@ use tapjoint::pipeline::{
     Analysis, IdentifySettings, frequencies_of, jointed_structure, run_test, structure_details,
     tested_structure,
 };
-use tapjoint::report::deck::{Deck, deck_of, render_nastran, source_of};
+use tapjoint::report::deck::{
+    Deck, LONGEST_REPORT, MOST_FREQUENCIES, deck_of, render_nastran, source_in_report, source_of,
+};
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness};
@@ -133,4 +135,50 @@ fn regress_a_nastran_deck_chooses_the_set_that_holds_a_rigid_joint() {
     assert_eq!(held("kt = \"rigid\"\n"), (true, 1));
     assert_eq!(held("kt = \"rigid\"\nkr = \"rigid\"\n"), (true, 2));
     assert_eq!(held(""), (false, 0));
+}
+
+#[test]
+fn regress_reports_with_values_that_no_report_has_are_refused() {
+    let test = described(
+        &format!("{BEAM}[joint]\nkind = \"cantilever\"\n"),
+        &[17.0, 118.0],
+    );
+    let joint = "\"kt\": {\"value\": 1.4e6}, \"kr\": {\"value\": 320}";
+    let many = format!("[{}]", vec!["{}"; MOST_FREQUENCIES + 1].join(","));
+    let cases = [
+        ("nothing".to_owned(), "is no report"),
+        ("5".to_owned(), "is no report"),
+        ("{}".to_owned(), "has no estimate of the joint"),
+        (
+            "{\"estimate\": {\"kt\": {\"value\": -1}}}".to_owned(),
+            "`estimate.kt.value` is -1; allowed: a number from 0 on",
+        ),
+        (
+            format!("{{\"estimate\": {{{joint}, \"ktr\": {{\"value\": 0.0}}}}}}"),
+            "`estimate.ktr.value` is 0.0; allowed: a number but 0",
+        ),
+        (
+            format!("{{\"estimate\": {{{joint}, \"beam\": {{\"length\": \"long\"}}}}}}"),
+            "`estimate.beam.length` is \"long\"; allowed: a positive number",
+        ),
+        (
+            format!("{{\"estimate\": {{{joint}}}, \"prediction\": {many}}}"),
+            "`prediction` is a list of 41; allowed: up to 40 modes",
+        ),
+        (
+            format!("{{\"estimate\": {{{joint}, \"beam\": {{\"length\": 1e-200}}}}}}"),
+            "Hz; allowed: positive finite frequencies",
+        ),
+    ];
+    for (text, words) in cases {
+        let error = source_in_report(&text, "report.json", &test).unwrap_err();
+        assert!(error.to_string().contains(words), "{text}: {error}");
+    }
+    let long = " ".repeat(LONGEST_REPORT as usize + 1);
+    let error = source_in_report(&long, "report.json", &test).unwrap_err();
+    assert!(error.to_string().contains("has more than 64 MB"), "{error}");
+    let sound = format!("{{\"estimate\": {{{joint}}}, \"prediction\": [{{}}, {{}}]}}");
+    let source = source_in_report(&sound, "report.json", &test).unwrap();
+    assert_eq!(source.frequencies.len(), 2);
+    assert_eq!(source.origin, "from report.json");
 }

@@ -1,6 +1,7 @@
 //! Tests of what is said about bad input: the file, the line, the key, what is allowed, what to do.
 
-use crate::shared::{assert_snapshot, strip_table};
+use crate::golden::assert_snapshot;
+use crate::shared::strip_table;
 use std::fs;
 use std::path::Path;
 
@@ -140,6 +141,11 @@ fn regress_impossible_beams() {
             ("length = \"423 mm\"", "length = [1]"),
             ("modulus = \"207 GPa\"", "modulus = -207e9"),
             ("density = 7850", "density = 0"),
+            ("length = \"423 mm\"", "length = 1e-300"),
+            ("width = 0.05", "width = 1e-300"),
+            ("thickness = 0.005", "thickness = 1e-300"),
+            ("modulus = \"207 GPa\"", "modulus = 1e-300"),
+            ("density = 7850", "density = 1e-300"),
             ("poisson = 0.29", "poisson = 0.6"),
             ("poisson = 0.29", "poisson = -1"),
             ("modulus = \"2 %\"", "modulus = \"200 %\""),
@@ -197,6 +203,10 @@ fn regress_sensors_and_hammers_that_cannot_be() {
             ("position = 0.338", "position = 0.5"),
             ("position = 0.338", "position = -0.1"),
             ("mass = \"24 g\"", "mass = -1"),
+            ("mass = \"24 g\"", "mass = 24"),
+            ("kind = \"sound\"", "kind = \"sound\"\nposition = 1e300"),
+            ("\"100 mV/g\"", "1e-300"),
+            ("scale = 500.0", "scale = -1e16"),
             ("channel = 2", "channel = 1"),
             ("channel = 2", "channel = 0"),
             ("channel = 2", "channel = 2.5"),
@@ -222,6 +232,7 @@ fn regress_recordings_and_settings_that_cannot_be() {
             ("band = [0, 200]", "band = [1]"),
             ("block = 2048", "block = 15"),
             ("block = 2048", "block = -2048"),
+            ("block = 2048", "block = 1048577"),
             ("block = 2048", "block = 2048.5"),
             ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
             ("at = { tip = 0.20 }", "at = { tip = 2 }"),
@@ -235,6 +246,26 @@ fn regress_recordings_and_settings_that_cannot_be() {
             ("[analysis]", "[measured]\nfrequencies = [17]\n[analysis]"),
         ],
     );
+}
+
+#[test]
+fn regress_tables_without_end_are_refused_at_the_first_too_many() {
+    for (key, most, table) in [
+        ("sensor", 128, "[[sensor]]\nname = \"A\"\n"),
+        ("recording", 1000, "[[recording]]\nfile = \"a.wav\"\n"),
+        ("effect", 100, "[[effect]]\nid = \"added-mass\"\n"),
+    ] {
+        let described = VALID.matches(&format!("[[{key}]]")).count();
+        let text = format!("{VALID}{}", table.repeat(100_000));
+        let error = TestDescription::parse(&text, "t.toml").unwrap_err();
+        assert_eq!(error.key, format!("{key}[{}]", most + 1));
+        let line = VALID.lines().count() + 2 * (most - described) + 1;
+        assert_eq!(error.line, line, "{error}");
+        assert!(
+            error.to_string().contains(&format!("up to {most}")),
+            "{error}"
+        );
+    }
 }
 
 #[test]

@@ -5,7 +5,8 @@
 
 use crate::shared::steel_strip;
 use tapjoint::identify::perturbation::{
-    PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_spans,
+    PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates,
+    sign_pattern_spans,
 };
 use tapjoint::identify::{
     Doubt, IdentifyError, MeasuredMode, ModeLambda, PairsModel, Stiffnesses, estimate_joint,
@@ -448,7 +449,7 @@ mod perturbed {
         let beam = steel_strip();
         for model in [PairsModel::TwoParameter, PairsModel::ThreeParameter] {
             let estimator = pairs_estimator(model, &beam, &NUMBERS).unwrap();
-            let spans = sign_pattern_spans(&FREQUENCIES, &HALF_LINES, &estimator).unwrap();
+            let spans = sign_pattern_spans(&FREQUENCIES, &HALF_LINES, 1, &estimator).unwrap();
             assert_eq!((spans.patterns, spans.failed), (16, 0));
             let (kx, ky) = (spans.kx.unwrap(), spans.ky.unwrap());
             let nominal = estimator(&FREQUENCIES).unwrap();
@@ -490,7 +491,7 @@ mod perturbed {
             );
             assert!(row.of_mean.kx.abs() < 1e-10, "{row:?}");
         }
-        let spans = sign_pattern_spans(&frequencies, &[1.0, 0.5], linear).unwrap();
+        let spans = sign_pattern_spans(&frequencies, &[1.0, 0.5], 1, linear).unwrap();
         let kx = spans.kx.unwrap();
         assert!(
             (kx.low - 48.0).abs() < 1e-12 && (kx.high - 52.0).abs() < 1e-12,
@@ -511,20 +512,37 @@ mod perturbed {
     }
 
     #[test]
-    fn limit_many_modes_and_wrong_bounds_are_refused() {
+    fn prop_patterns_of_many_modes_are_drawn_by_the_seed() {
+        let sum = |f: &[f64]| {
+            Some(Stiffnesses {
+                kx: f.iter().sum(),
+                ky: f[12],
+                kz: None,
+            })
+        };
+        let (many, bounds) = ([10.0; 13], [1.0; 13]);
+        let [first, again, other] =
+            [1, 1, 2].map(|seed| sign_pattern_estimates(&many, &bounds, seed, sum).unwrap());
+        assert_eq!(first.len(), 256);
+        assert_eq!(first, again);
+        assert_ne!(first, other);
+        let ky = sign_pattern_spans(&many, &bounds, 1, sum)
+            .unwrap()
+            .ky
+            .unwrap();
+        assert_eq!((ky.low, ky.high), (9.0, 11.0));
+    }
+
+    #[test]
+    fn limit_wrong_bounds_are_refused() {
         let never = |_: &[f64]| None;
         let many = [1.0; 13];
-        let error = sign_pattern_spans(&many, &many, never).unwrap_err();
-        assert!(
-            error.to_string().contains("13") && error.to_string().contains("12"),
-            "{error}"
-        );
         let error = mode_sensitivities(&many, &[1.0], never).unwrap_err();
         assert!(
             matches!(error, IdentifyError::Bounds { bounds: 1, .. }),
             "{error}"
         );
-        let spans = sign_pattern_spans(&[1.0, 2.0], &[0.1, 0.1], never).unwrap();
+        let spans = sign_pattern_spans(&[1.0, 2.0], &[0.1, 0.1], 1, never).unwrap();
         assert!(spans.kx.is_none() && spans.failed == 4, "{spans:?}");
         // Kz that changes its sign passes through infinity.
         let swinging = |f: &[f64]| {
@@ -534,7 +552,7 @@ mod perturbed {
                 kz: Some(f[0] - 1.0),
             })
         };
-        let spans = sign_pattern_spans(&[1.05], &[0.1], swinging).unwrap();
+        let spans = sign_pattern_spans(&[1.05], &[0.1], 1, swinging).unwrap();
         assert!(spans.kz.is_none() && spans.kx.is_some(), "{spans:?}");
     }
 }

@@ -3,14 +3,14 @@
 // A test that unwraps fails as it should; the lint spares only the test functions themselves.
 #![allow(clippy::unwrap_used)]
 
-use crate::shared::steel_strip;
+use crate::shared::{estimate_consistently, steel_strip};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::identify::consistent::{
-    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
-    JointedStructure, LapLayout, Limit, Neighbourhood, PARAMETERS, Parameter, Point, Quantity,
-    Route, Verdict,
+    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FitVerdict,
+    FrequencyModel, JointedStructure, LapLayout, Limit, Neighbourhood, PARAMETERS, Parameter,
+    Point, Quantity, ResidualWeights, Route,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
 use tapjoint::structure::joint::StiffnessUnits;
@@ -50,12 +50,12 @@ fn frequencies_at(model: &FrequencyModel, point: &Point, count: usize) -> Vec<f6
         .collect()
 }
 
-fn estimate_consistently(
-    structure: &JointedStructure,
-    modes: &[MeasuredMode],
-    settings: &ConsistentSettings,
-) -> Result<ConsistentEstimate, IdentifyError> {
-    ConsistentEstimator::new(structure, modes, settings)?.estimate()
+/// The settings with equal relative weights.
+fn weighed_alike(settings: ConsistentSettings) -> ConsistentSettings {
+    ConsistentSettings {
+        weights: ResidualWeights::Relative,
+        ..settings
+    }
 }
 
 fn close(found: f64, expected: f64, relative: f64, what: &str) {
@@ -291,7 +291,7 @@ fn value(estimate: &ConsistentEstimate, quantity: Quantity) -> f64 {
 /// table 2 (lambda^2/f = 0.151681). With the 0.151888 behind table 4's lambda it is 1431.4, 4.864.
 #[test]
 fn val_two_springs_explain_table_4_to_below_one_percent() {
-    let settings = ConsistentSettings::two_parameter().with_relative_weights();
+    let settings = weighed_alike(ConsistentSettings::two_parameter());
     let modes = modes_of(&TABLE_4, |_| None);
     let estimate = estimate_consistently(&cantilever(), &modes, &settings).unwrap();
     // Half a unit in the last digit of the independent solution.
@@ -330,7 +330,7 @@ fn val_table_4_with_bounds_and_scatter() {
         1e-5,
         "chi-squared",
     );
-    assert_eq!(estimate.goodness.verdict, Verdict::Doubtful);
+    assert_eq!(estimate.goodness.verdict, FitVerdict::Doubtful);
     let kx = estimate.quantity(Quantity::Kx).unwrap();
     let factor = (15.3992f64 / 3.0).sqrt();
     close(
@@ -343,7 +343,7 @@ fn val_table_4_with_bounds_and_scatter() {
 
 #[test]
 fn val_three_parameters_reach_0_39_percent_from_anywhere() {
-    let settings = ConsistentSettings::three_parameter().with_relative_weights();
+    let settings = weighed_alike(ConsistentSettings::three_parameter());
     let modes = modes_of(&TABLE_4, |_| None);
     let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
     let model = FrequencyModel::new(&cantilever(), 5).unwrap();
@@ -375,8 +375,10 @@ fn val_clamped_beam_leaves_modulus_and_rotation_nearly_undecided() {
     };
     let structure = JointedStructure::new(BeamTheory::Euler, beam, Assembly::Cantilever);
     let modes = modes_of(&[6.57, 41.47, 117.93, 229.97, 380.33], |_| None);
-    let both =
-        ConsistentSettings::fitting(&[Parameter::Kr, Parameter::Modulus]).with_relative_weights();
+    let both = weighed_alike(ConsistentSettings::fitting(&[
+        Parameter::Kr,
+        Parameter::Modulus,
+    ]));
     let estimate = estimate_consistently(&structure, &modes, &both).unwrap();
     // Published with the frequencies: 186.6 GPa and 4.1 kN m/rad. Half of the last digit given is 0.03 %
     // and 1.2 %.
@@ -389,7 +391,7 @@ fn val_clamped_beam_leaves_modulus_and_rotation_nearly_undecided() {
     close(value(&estimate, Quantity::Kr), 4.1e3, 0.012, "kr");
     let correlation = estimate.correlations[0].value;
     assert!(correlation < -0.95, "{correlation}");
-    let alone = ConsistentSettings::fitting(&[Parameter::Kr]).with_relative_weights();
+    let alone = weighed_alike(ConsistentSettings::fitting(&[Parameter::Kr]));
     let estimate = estimate_consistently(&structure, &modes, &alone).unwrap();
     close(
         value(&estimate, Quantity::Kr),
@@ -413,13 +415,13 @@ fn val_bolted_beam_is_not_explained_by_two_springs() {
     };
     let structure = JointedStructure::new(BeamTheory::Euler, beam, Assembly::Lap);
     let modes = modes_of(&[80.47, 297.66, 580.66, 845.7], |_| None);
-    let settings = ConsistentSettings::two_parameter().with_relative_weights();
+    let settings = weighed_alike(ConsistentSettings::two_parameter());
     let estimate = estimate_consistently(&structure, &modes, &settings).unwrap();
     close(value(&estimate, Quantity::Kx), 759.0, 1e-3, "kx");
     close(value(&estimate, Quantity::Ky), 1.91, 5e-3, "ky");
     assert!((estimate.modes[1].error_percent - 5.4).abs() < 0.05);
     assert!((estimate.modes[2].error_percent + 4.5).abs() < 0.05);
-    assert_eq!(estimate.goodness.verdict, Verdict::CannotExplain);
+    assert_eq!(estimate.goodness.verdict, FitVerdict::CannotExplain);
     assert!(estimate.goodness.words().contains("cannot explain"));
 }
 
@@ -600,7 +602,7 @@ fn recover_a_joint_through_a_sensors_mass() {
         "{:?}",
         without.joint
     );
-    assert_eq!(without.goodness.verdict, Verdict::CannotExplain);
+    assert_eq!(without.goodness.verdict, FitVerdict::CannotExplain);
 }
 
 #[test]
@@ -731,7 +733,7 @@ fn limit_what_cannot_be_estimated_is_said() {
 
 #[test]
 fn limit_a_held_stiffness_stays() {
-    let mut settings = ConsistentSettings::fitting(&[Parameter::Kr]).with_relative_weights();
+    let mut settings = weighed_alike(ConsistentSettings::fitting(&[Parameter::Kr]));
     settings.held = Joint {
         kt: 2e6,
         ..Joint::RIGID

@@ -1,6 +1,6 @@
 //! The consistent estimate under errors of the frequencies and of the beam.
 
-use super::shared::steel_strip;
+use super::shared::{estimate_consistently, steel_strip};
 use tapjoint::identify::consistent::{
     BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
     JointedStructure, Parameter, Point, Quantity,
@@ -8,7 +8,7 @@ use tapjoint::identify::consistent::{
 use tapjoint::identify::perturbation::{
     PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly,
 };
-use tapjoint::identify::{IdentifyError, MeasuredMode, Stiffnesses};
+use tapjoint::identify::{MeasuredMode, Stiffnesses};
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
@@ -53,14 +53,6 @@ fn modes_of(frequencies: &[f64], std: f64) -> Vec<MeasuredMode> {
             std: Some(std * frequency),
         })
         .collect()
-}
-
-fn estimate_consistently(
-    structure: &JointedStructure,
-    modes: &[MeasuredMode],
-    settings: &ConsistentSettings,
-) -> Result<ConsistentEstimate, IdentifyError> {
-    ConsistentEstimator::new(structure, modes, settings)?.estimate()
 }
 
 fn close(found: f64, expected: f64, relative: f64, what: &str) {

@@ -7,6 +7,7 @@ mod blind_check;
 mod blind_check_draw;
 mod cli;
 mod cli_frf;
+mod corpus;
 mod deck;
 mod deck_with_effects;
 mod description;
@@ -17,6 +18,8 @@ mod gap;
 mod gap_advice;
 mod gap_decay;
 mod gap_fixture;
+#[path = "../golden/mod.rs"]
+mod golden;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;

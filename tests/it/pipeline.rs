@@ -14,6 +14,7 @@ use tapjoint::pipeline::{
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, observed_modes, simulate_tap_test};
+use tapjoint::spectral::MOST_BLOCK;
 use tapjoint::structure::specimen::{LapOverlap, PointMass};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
@@ -292,13 +293,28 @@ fn limit_a_band_too_narrow_for_the_signal_is_refused() {
 }
 
 #[test]
-fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
-    // 2100 s at 2 kHz are 4.2 million samples, more than a block may have.
+fn regress_a_block_of_zeros_for_the_most_part_is_refused() {
     let hammer = ChannelRef::Number(1);
-    let found = measure_bare(one_tap(2100.0), Some(&hammer), |_| {}).unwrap();
+    // 10,000 samples at 2 kHz; without a band the block is for 2.56/2.56 of them.
+    let error = measure_bare(one_tap(5.0), Some(&hammer), |settings| {
+        settings.block = Some(200_000);
+    });
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("the rest would be zeros"), "{error}");
+    let found = measure_bare(one_tap(5.0), Some(&hammer), |settings| {
+        settings.block = Some(100_000);
+    });
+    assert!(found.unwrap().measurement.spectra.is_some());
+}
+
+#[test]
+fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
+    // 700 s at 2 kHz are 1.4 million samples, more than a block may have.
+    let hammer = ChannelRef::Number(1);
+    let found = measure_bare(one_tap(700.0), Some(&hammer), |_| {}).unwrap();
     let lines = found.measurement.spectra.unwrap().averages.lines;
     assert!(
-        lines.block <= 4_000_000 && lines.block > 3_000_000,
+        lines.block <= MOST_BLOCK && lines.block > MOST_BLOCK / 10 * 9,
         "{}",
         lines.block
     );

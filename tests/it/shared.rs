@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 use tapjoint::gap::{Nominal, NominalSensor, PlannedConfiguration, TestPlan};
+use tapjoint::identify::consistent::{
+    ConsistentEstimate, ConsistentEstimator, ConsistentSettings, JointedStructure,
+};
+use tapjoint::identify::{IdentifyError, MeasuredMode};
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{Body, Joint, Specimen};
@@ -18,13 +22,13 @@ pub fn steel_strip() -> Beam {
     }
 }
 
-/// Compares a text with the snapshot of this name in `tests/golden`.
-pub fn assert_snapshot(name: &str, text: &str) {
-    let mut settings = insta::Settings::clone_current();
-    settings.set_prepend_module_to_snapshot(false);
-    settings.set_omit_expression(true);
-    settings.set_snapshot_path("../golden");
-    settings.bind(|| insta::assert_snapshot!(name, text));
+/// The consistent estimate of a structure from its modes.
+pub fn estimate_consistently(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> Result<ConsistentEstimate, IdentifyError> {
+    ConsistentEstimator::new(structure, modes, settings)?.estimate()
 }
 
 /// The strip's table in a description.

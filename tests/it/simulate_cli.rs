@@ -281,3 +281,38 @@ fn prop_a_described_effect_is_planted_and_not_given_away() {
         .assert()
         .code(2);
 }
+
+#[test]
+fn regress_settings_without_end_are_refused_before_any_work() {
+    let folder = folder(TEST);
+    for (argument, said) in [
+        ("--mounting=1e300", "between 0 and 100000"),
+        ("--mains=1e300", "between 0 and 100000"),
+        ("--noise=1e300", "between 0 and 1000000000"),
+        ("--level=1e-300", "the peak force (N)"),
+        ("--damping=1e308", "a damping ratio"),
+        ("--rayleigh=1e300,0", "mass-proportional damping"),
+        ("--rate=1000000", "100 to 204800"),
+        ("--taps=100000", "do not fit into a WAV file"),
+    ] {
+        tapjoint(folder.path())
+            .args(["simulate", "source.toml", "--out", "out", argument])
+            .assert()
+            .code(2)
+            .stderr(predicate::str::contains(said));
+        assert!(!folder.path().join("out").exists(), "{argument}");
+    }
+}
+
+#[test]
+fn regress_a_beam_without_frequencies_in_the_band_is_simulated() {
+    // Some million modes lie below the sample rate; only the lowest are computed.
+    let soft = TEST.replace("modulus = 207e9", "modulus = 1");
+    assert_ne!(soft, TEST);
+    let folder = folder(&soft);
+    tapjoint(folder.path())
+        .args(["simulate", "source.toml", "--out", "out"])
+        .args(["--taps", "1", "--seconds", "0.6", "--rate", "5120"])
+        .assert()
+        .code(0);
+}

@@ -3,6 +3,7 @@
 use super::{program, samples};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tapjoint::pipeline::WARNING_CODES;
 
 /// The commands of a document's `console` blocks, with the code that they end with: lines that begin
 /// with "$ ", and "# exits with 1" behind those that have no answer.
@@ -54,6 +55,21 @@ fn prop_every_command_in_the_documents_runs_as_printed() {
         }
     }
     assert!(tried >= 20, "only {tried} commands were found");
+}
+
+/// Scripts look for these codes: the guide's table and the program's list have the same rows.
+#[test]
+fn prop_the_guide_lists_every_code_of_a_warning() {
+    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide.md");
+    let guide = std::fs::read_to_string(guide).unwrap();
+    let rows = WARNING_CODES.map(|(code, when)| format!("| `{code}` | {when} |"));
+    let (_, section) = guide.split_once("## Codes of the warnings").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let listed: Vec<&str> = section
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .collect();
+    assert_eq!(listed, rows);
 }
 
 /// The number behind the first of these words after another, such as "Kt = 1.790" MN/m.

@@ -4,6 +4,7 @@
 //! `parameters.csv`, `report.json` and the text of the page. Numbers of `report.json` have six significant digits.
 //! Long lists are shortened to their length and their ends, lists of objects to the details of one. `INSTA_UPDATE=always cargo test --test program frozen` writes the snapshots anew.
 
+use super::golden::assert_snapshot;
 use super::program;
 use serde_json::Value;
 use std::fmt::Write;
@@ -259,15 +260,6 @@ fn without_inner_rows(lines: &[String]) -> String {
         }
     }
     text
-}
-
-/// Compares a text with the snapshot of this name in `tests/golden`.
-fn assert_snapshot(name: &str, text: &str) {
-    let mut settings = insta::Settings::clone_current();
-    settings.set_prepend_module_to_snapshot(false);
-    settings.set_omit_expression(true);
-    settings.set_snapshot_path("../golden");
-    settings.bind(|| insta::assert_snapshot!(name, text));
 }
 
 /// Runs a test and compares everything with its snapshots; each that differs is shown.

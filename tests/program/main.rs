@@ -3,11 +3,15 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
 mod browser;
+mod budgets;
 mod diagnose;
 mod documents;
 mod export;
+mod faults;
 mod first_steps;
 mod frozen;
+#[path = "../golden/mod.rs"]
+mod golden;
 mod leftovers;
 mod outputs;
 mod schema;

@@ -11,7 +11,7 @@ use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies, natural_lambdas,
     natural_lambdas_of_any_joint,
 };
-use tapjoint::study::publication::{Printed, Reproduction, Table, Verdict, reproduce};
+use tapjoint::study::publication::{Agreement, Printed, Reproduction, Table, reproduce};
 
 /// A printed table as (header, rows of text).
 fn read(text: &'static str) -> (Vec<&'static str>, Vec<Vec<&'static str>>) {
@@ -256,7 +256,7 @@ fn val_reproduction_covers_every_table_and_explains_what_differs() {
     assert_eq!(numbers, expected);
     for table in &reproduction.tables {
         for row in &table.rows {
-            let explained = row.verdict != Verdict::DoesNotReproduce || row.remark.is_some();
+            let explained = row.verdict != Agreement::DoesNotReproduce || row.remark.is_some();
             assert!(explained, "table {}: {row:?}", table.number);
             assert!(
                 row.ours.is_none_or(f64::is_finite),
@@ -267,12 +267,16 @@ fn val_reproduction_covers_every_table_and_explains_what_differs() {
     }
     for number in ["6", "7", "10a", "11"] {
         for row in &table(&reproduction, number).rows {
-            assert_eq!(row.verdict, Verdict::Reproduces, "table {number}: {row:?}");
+            assert_eq!(
+                row.verdict,
+                Agreement::Reproduces,
+                "table {number}: {row:?}"
+            );
         }
     }
     let misprints = table(&reproduction, "1b").rows.iter();
     let misprints = misprints
-        .filter(|row| row.label.contains("lambda") && row.verdict == Verdict::DoesNotReproduce);
+        .filter(|row| row.label.contains("lambda") && row.verdict == Agreement::DoesNotReproduce);
     assert_eq!(misprints.count(), 3);
 }
 
@@ -284,7 +288,7 @@ fn val_table_9_changes_lambdas_where_it_says_frequencies() {
         let rows = rows.filter(|row| row.label.contains(what) && !row.label.starts_with("Kz"));
         let equal = rows
             .clone()
-            .filter(|row| row.verdict == Verdict::Reproduces);
+            .filter(|row| row.verdict == Agreement::Reproduces);
         (equal.count(), rows.count())
     };
     // Kx and Ky of both signs: the frequencies give one, the printed lambdas all but one.

@@ -1,7 +1,7 @@
 //! Names, places and groups of the effects.
 
 use super::{EffectError, nearest_name};
-use Dimension as D;
+use EffectDimension as D;
 use ParameterScale::{Linear, Log};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -227,7 +227,7 @@ pub enum ParameterScale {
 
 /// Physical dimension of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dimension {
+pub enum EffectDimension {
     /// (1)
     None,
     /// (kg)
@@ -244,7 +244,7 @@ pub enum Dimension {
     Force,
 }
 
-impl Dimension {
+impl EffectDimension {
     /// Returns its SI unit; empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
@@ -265,7 +265,7 @@ pub struct ParameterInfo {
     /// Its name.
     pub name: &'static str,
     /// Its dimension.
-    pub dimension: Dimension,
+    pub dimension: EffectDimension,
     /// Description.
     pub meaning: &'static str,
     /// Lowest possible value (SI).
@@ -281,7 +281,7 @@ pub struct ParameterInfo {
 /// Returns a parameter that is a size, from 0 to `highest`.
 const fn size(
     name: &'static str,
-    dimension: Dimension,
+    dimension: EffectDimension,
     meaning: &'static str,
     highest: f64,
     typical: f64,
@@ -300,7 +300,7 @@ const fn size(
 /// Returns a parameter that may have either sign, from -`most` to `most`.
 const fn signed(
     name: &'static str,
-    dimension: Dimension,
+    dimension: EffectDimension,
     meaning: &'static str,
     most: f64,
     typical: f64,

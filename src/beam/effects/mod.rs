@@ -9,7 +9,7 @@
 mod catalogue;
 
 use crate::specimen::{Base, Hinge, PointMass, PointSpring, Specimen};
-pub use catalogue::{Dimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
+pub use catalogue::{EffectDimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
 use statrs::function::gamma::gamma;
 use std::f64::consts::PI;
 

@@ -363,7 +363,7 @@ impl Model {
     }
 
     /// Magnitude of the highest omega^2: that of an element's end alone.
-    pub(super) fn highest_square(&self) -> f64 {
+    pub(crate) fn highest_square(&self) -> f64 {
         let sections = self.runs.iter().map(|run| &run.section);
         let ratios = sections.map(|section| section.stiffness[0][0] / section.mass[0][0]);
         ratios.fold(0.0, f64::max)
@@ -447,11 +447,12 @@ impl Model {
         ends
     }
 
-    /// The load of a unit moment on the beam's end, and its opposite on what the joint fastens it to.
-    pub(super) fn joint_moment(&self) -> Vec<f64> {
+    /// The load of a unit force (component 0) or moment (1) on the beam's end, and its opposite on what the joint
+    /// fastens it to.
+    pub(crate) fn joint_load(&self, of: usize) -> Vec<f64> {
         let mut load = vec![0.0; self.numbering.size];
         for (row, component, sign) in self.joint_ends() {
-            if component == 1 && row != HELD {
+            if component == of && row != HELD {
                 load[row] += sign;
             }
         }
@@ -555,8 +556,16 @@ impl Model {
         vector
     }
 
+    /// Rigid motions that nothing withstands: their eigenvalues are equal.
+    pub(crate) fn locked_motions(&self) -> Vec<Vec<f64>> {
+        match self.rigid_motions() > 0 && !self.is_supported() {
+            true => self.rigid_vectors(),
+            false => Vec::new(),
+        }
+    }
+
     /// Unit motions without strain energy where only the joint could withstand them.
-    pub(super) fn rigid_vectors(&self) -> Vec<Vec<f64>> {
+    fn rigid_vectors(&self) -> Vec<Vec<f64>> {
         let mut motions = Vec::new();
         for kind in 0..2 {
             if self.runs.len() > 1 {

@@ -65,11 +65,7 @@ impl SpecimenModes {
         let rigid = model.rigid_motions();
         let shift = if rigid > 0 { SHIFT } else { 0.0 };
         let highest = model.highest_square();
-        let locked = if rigid > 0 && !model.is_supported() {
-            model.rigid_vectors()
-        } else {
-            Vec::new()
-        };
+        let locked = model.locked_motions();
         let Eigenpairs { values, vectors } =
             lowest_pairs(&stiffness, &mass, shift, highest, &locked, count + rigid)?;
         // Rounding moves each value by some parts in 1e16 of the highest one.
@@ -350,7 +346,7 @@ impl SpecimenModes {
         let Some(factor) = stiffness.plus(shift, &mass).cholesky() else {
             return 0.0;
         };
-        let moment = self.model.joint_moment();
+        let moment = self.model.joint_load(1);
         let mut answer = moment.clone();
         factor.solve_lower(&mut answer);
         factor.solve_upper(&mut answer);

@@ -291,7 +291,7 @@ impl Finished<'_> {
 /// also serves where one end is missing. A one-sided limit at the 90 % point covers 95 % only if it is chosen before
 /// the data are seen. Here the data decide between interval and limit, so that such a limit would cover less (Feldman
 /// & Cousins 1998).
-pub const RISE_95: f64 = 3.841_459;
+const RISE_95: f64 = 3.841_459;
 
 /// One end of a quantity's interval, looked for from the best point on.
 struct Profile<'a> {

@@ -107,12 +107,6 @@ impl ConsistentSettings {
     pub fn three_parameter() -> Self {
         Self::fitting(&[Parameter::Kt, Parameter::Kr, Parameter::Coupling])
     }
-
-    /// Returns the same settings with equal relative weights.
-    pub fn with_relative_weights(mut self) -> Self {
-        self.weights = ResidualWeights::Relative;
-        self
-    }
 }
 
 // The result, as plain data.
@@ -374,7 +368,7 @@ const LARGE_MISFIT: f64 = 0.02;
 
 /// Verdict of the misfit on the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum FitVerdict {
     /// The misfit is no larger than the uncertainties allow.
     Explains,
     /// The misfit is larger than the uncertainties allow: they are too small, or the model lacks
@@ -401,7 +395,7 @@ pub struct Goodness {
     /// Root-mean-square relative misfit per degree of freedom instead of per frequency; `None` without any.
     pub misfit_per_freedom: Option<f64>,
     /// Verdict that follows.
-    pub verdict: Verdict,
+    pub verdict: FitVerdict,
 }
 
 impl Goodness {
@@ -414,12 +408,12 @@ impl Goodness {
             .filter(|_| freedom > 0)
             .map(|chi_squared| chi_square_tail(chi_squared, freedom as f64));
         let verdict = match (probability, misfit_per_freedom) {
-            (_, None) => Verdict::Untestable,
-            (Some(p), _) if p < HOPELESS => Verdict::CannotExplain,
-            (Some(p), _) if p < DOUBTFUL => Verdict::Doubtful,
-            (None, Some(misfit)) if misfit > LARGE_MISFIT => Verdict::CannotExplain,
-            (None, Some(misfit)) if misfit > NOTABLE_MISFIT => Verdict::Doubtful,
-            _ => Verdict::Explains,
+            (_, None) => FitVerdict::Untestable,
+            (Some(p), _) if p < HOPELESS => FitVerdict::CannotExplain,
+            (Some(p), _) if p < DOUBTFUL => FitVerdict::Doubtful,
+            (None, Some(misfit)) if misfit > LARGE_MISFIT => FitVerdict::CannotExplain,
+            (None, Some(misfit)) if misfit > NOTABLE_MISFIT => FitVerdict::Doubtful,
+            _ => FitVerdict::Explains,
         };
         Self {
             chi_squared,
@@ -463,18 +457,18 @@ impl Goodness {
             _ => format!("rms misfit {misfit:.2} %"),
         };
         match self.verdict {
-            Verdict::Explains => format!("this model explains the frequencies ({test})"),
-            Verdict::Doubtful if self.chi_squared.is_none() => {
+            FitVerdict::Explains => format!("this model explains the frequencies ({test})"),
+            FitVerdict::Doubtful if self.chi_squared.is_none() => {
                 format!("the misfit is larger than a beam's dimensions usually leave open ({test})")
             }
-            Verdict::Doubtful => format!(
+            FitVerdict::Doubtful => format!(
                 "the misfit is larger than the stated uncertainties allow: they are too small, or \
                  the model lacks something ({test})"
             ),
-            Verdict::CannotExplain => {
+            FitVerdict::CannotExplain => {
                 format!("this model cannot explain the frequencies ({test})")
             }
-            Verdict::Untestable => format!(
+            FitVerdict::Untestable => format!(
                 "as many unknowns as frequencies: the model cannot be tested ({test}); \
                  measure one more mode"
             ),

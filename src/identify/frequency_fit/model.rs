@@ -14,6 +14,10 @@ use tapjoint_beam::{
     Assembly, Beam, BeamTheory, Joint, JointStiffness, StructureError, natural_modes,
 };
 
+/// Most elements of a beam. More of them would spoil the lowest modes: rounding grows with their fourth power, and
+/// is 1e-7 of the lowest frequency here.
+const MOST_ELEMENTS: usize = 500;
+
 /// Route by which frequencies are computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Route {
@@ -117,7 +121,7 @@ impl JointedStructure {
     /// 1e-6; `None` where they are known in closed form.
     ///
     /// By Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
-    /// h; with shear and rotary inertia it falls as h^2 only.
+    /// h; with shear and rotary inertia it falls as h^2 only. Above mode 13 [`MOST_ELEMENTS`] limits it.
     fn elements(&self, highest: usize, body: &Body) -> Option<usize> {
         if let Route::FiniteElements(elements) = self.route {
             return Some(elements);
@@ -135,7 +139,7 @@ impl JointedStructure {
         let lengths = body.beams().iter().map(|beam| beam.length);
         let longest = lengths.fold(0.0, f64::max);
         let wave = (highest as f64 + 0.5) * PI * longest / body.length();
-        Some(((wave / size).ceil() as usize).max(8))
+        Some(((wave / size).ceil() as usize).clamp(8, MOST_ELEMENTS))
     }
 }
 
@@ -237,7 +241,7 @@ impl FrequencyModel {
         let body = match (structure.elements(highest, &beams), &beams) {
             (Some(elements), _) => {
                 let free = structure.specimen(None);
-                JointedBody::Elements(Box::new(InterfaceModes::new(&free, elements)?))
+                JointedBody::Elements(Box::new(InterfaceModes::new(&free, elements, highest)?))
             }
             (None, Body::One(beam)) => JointedBody::Rooted(beam.slenderness(theory)),
             (None, Body::Joined([left, right])) => {

@@ -2,12 +2,12 @@
 //! measured shapes suit it.
 
 use super::{MeasuredPeak, MissingCause, MissingMode, PairingSettings, ShapeAt};
-use crate::frequency_fit::{FrequencyModel, Parameter, Point};
+use crate::frequency_fit::{FrequencyModel, Parameter, Point, joint_at};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_10, PI};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
+use tapjoint_beam::{ModeShape, mode_shapes};
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
 use tapjoint_numerics::stats::student;
 
@@ -145,20 +145,6 @@ impl<'a> JointSearch<'a> {
             }
         }
         (response.frequency.ln(), slopes)
-    }
-
-    /// Returns the joint at a place, non-dimensional.
-    pub fn joint(&self, place: [f64; 3]) -> JointStiffness {
-        let (kx, ky) = (place[0].exp(), place[1].exp());
-        JointStiffness {
-            kx,
-            ky,
-            // coupling = sqrt(Kx Ky)/Kz.
-            cross_compliance: match self.model.structure().assembly {
-                Assembly::Cantilever => place[2].tanh() / (kx * ky).sqrt(),
-                Assembly::Lap | Assembly::Free => 0.0,
-            },
-        }
     }
 
     /// Returns the joint that suits these pairs of peak and mode best, looked for downhill of `start`.
@@ -306,7 +292,7 @@ impl View {
         // The closed form has equal halves only.
         let known = structure.lap.position.is_none() && structure.lap.right.is_none();
         if known && !places.is_empty() {
-            let (beam, joint) = (&structure.beam, search.joint(fit.place));
+            let (beam, joint) = (&structure.beam, joint_at(&search.point(fit.place)));
             let found = mode_shapes(beam, structure.assembly, &joint, search.highest);
             shapes = found.unwrap_or_default();
         }

@@ -237,7 +237,7 @@ fn score(
 }
 
 /// Returns true where the peaks are numbered 1, 2, 3 and so on.
-pub fn is_plain(numbers: &[Option<usize>]) -> bool {
+fn is_plain(numbers: &[Option<usize>]) -> bool {
     let mut places = numbers.iter().enumerate();
     places.all(|(index, number)| *number == Some(index + 1))
 }

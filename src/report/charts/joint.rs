@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use crate::document::{Document, EstimateMethod, PredictionSection};
 use crate::format::{rounded_to, signed, signed_percent, significant};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
-use crate::tables::reading_bound;
+use crate::tables::{patterns_in_words, reading_bound};
 use tapjoint_analysis::SampledShape;
 use tapjoint_beam::Assembly;
 
@@ -192,8 +192,8 @@ fn trials(document: &Document, drawn: usize) -> String {
     let spans = document.resolution_span.as_deref().unwrap_or_default();
     if let Some(span) = spans.first() {
         parts.push(format!(
-            "every mode at one end of its reading's bound or the other: {} sign patterns",
-            span.patterns
+            "every mode at one end of its reading's bound or the other: {}",
+            patterns_in_words(span).trim_end_matches(',')
         ));
     }
     let failed: usize = spans.iter().map(|span| span.failed).sum();

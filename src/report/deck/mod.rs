@@ -4,6 +4,7 @@
 //! rotation about z. So every spring acts on the degrees of freedom of the theory, with its signs.
 
 mod formats;
+mod reported;
 
 use crate::text::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
@@ -14,9 +15,12 @@ use tapjoint_description::TestDescription;
 use tapjoint_identify::consistent::JointedStructure;
 
 pub use formats::{render_abaqus, render_nastran};
+pub use reported::{LONGEST_REPORT, ReportError, USUAL_FREQUENCIES, doubts_of, source_in_report};
 
 /// Elements along the beam: with cubic elements and consistent mass ten modes are then right to 1e-5.
 const ELEMENTS: usize = 120;
+/// Most predicted frequencies at the head of a deck: a mode needs three elements.
+pub const MOST_FREQUENCIES: usize = ELEMENTS / 3;
 /// Longest remark that old input formats take (characters).
 const LONGEST: usize = 72;
 /// Nodes nearer than this share of the length are one node.

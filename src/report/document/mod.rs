@@ -33,7 +33,7 @@ use tapjoint_analysis::{
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
-use tapjoint_signal::quality::Verdict;
+use tapjoint_signal::quality::QualityVerdict;
 
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
@@ -88,7 +88,7 @@ pub struct Document {
     pub gap: Option<GapSection>,
     /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub quality: Option<Vec<Verdict>>,
+    pub quality: Option<Vec<QualityVerdict>>,
     /// Everything that a reader of the results has to know.
     pub warnings: Vec<WarningSection>,
 }

@@ -55,7 +55,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
 /// Explains the columns. Also says why even the hypothesis `none` mostly leaves smaller errors than the described
 /// model, and why the errors differ from those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
-    let described = percent(Some(gap.hypotheses[0].gap_before));
+    let described = percent(gap.hypotheses[0].gap_before);
     let withheld = gap.hypotheses[0].holdout_before;
     let withheld = withheld.map_or_else(String::new, |before| {
         format!(" and {} %", significant(before, 2))

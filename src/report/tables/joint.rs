@@ -1,7 +1,9 @@
 //! Tables of the joint: parameters, the pair regression, and how far the estimate moves when the frequencies do.
 
 use super::{Cell, Table, listed, mode_of, number, page_number, words};
-use crate::document::{Document, EstimateMethod, EstimateSection, SensitivitySection, Uncertain};
+use crate::document::{
+    Document, EstimateMethod, EstimateSection, ResolutionSpanSection, SensitivitySection, Uncertain,
+};
 use crate::format::{
     MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
     rounded_to, signed, signed_percent, significant, trimmed, unit_words,
@@ -439,7 +441,17 @@ fn failures(failed: &[(EstimateMethod, usize)], consequence: &str) -> String {
     words
 }
 
-/// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
+/// "16 sign patterns".
+pub(crate) fn patterns_in_words(span: &ResolutionSpanSection) -> String {
+    let drawn = if span.sampled {
+        ", drawn at random,"
+    } else {
+        ""
+    };
+    format!("{} sign patterns{drawn}", span.patterns)
+}
+
+/// Smallest and largest estimate over the sign patterns of the bounds; `None` where not computed.
 pub fn spans(document: &Document) -> Option<Table> {
     let list = document.resolution_span.as_deref()?;
     let methods: Vec<EstimateMethod> = list.iter().map(|span| span.method).collect();
@@ -471,8 +483,8 @@ pub fn spans(document: &Document) -> Option<Table> {
     ];
     let failed = list.iter().map(|span| (span.method, span.failed));
     let note = format!(
-        "{} sign patterns tried.{}",
-        list.first().map_or(0, |span| span.patterns),
+        "{} tried.{}",
+        list.first().map_or_else(String::new, patterns_in_words),
         failures(&failed.collect::<Vec<_>>(), ": the span is open")
     );
     let caption = "Every mode at one end of its bound or the other";

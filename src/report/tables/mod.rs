@@ -6,6 +6,7 @@ mod modes;
 mod recordings;
 
 pub use diagnosis::{hypotheses, next_tests};
+pub(crate) use joint::patterns_in_words;
 pub use joint::{
     Parameter, averages, correlations, estimated, methods, monte_carlo, pairs, parameters,
     perturbation, sensitivity, spans,

@@ -7,7 +7,7 @@ use crate::document::{Document, RecordingSection, TapSection};
 use crate::format::{
     MISSING, optional, or_missing, significant, trimmed, unit_words, with_minus_signs,
 };
-use tapjoint_signal::quality::{Check, Outcome, Verdict};
+use tapjoint_signal::quality::{Check, Outcome, QualityVerdict};
 
 /// One row for each recording, with its spectra; `None` without recordings.
 pub fn recordings(document: &Document) -> Option<Table> {
@@ -252,7 +252,7 @@ pub fn datasets(document: &Document) -> Option<Table> {
     ))
 }
 
-fn verdicts(document: &Document) -> &[Verdict] {
+fn verdicts(document: &Document) -> &[QualityVerdict] {
     document.quality.as_deref().unwrap_or_default()
 }
 
@@ -312,7 +312,7 @@ pub fn quality(document: &Document) -> Option<Table> {
 /// any.
 pub fn quality_doubts(document: &Document) -> Option<Table> {
     let all = verdicts(document).iter();
-    let mut doubts: Vec<&Verdict> = all.filter(|verdict| verdict.is_doubt()).collect();
+    let mut doubts: Vec<&QualityVerdict> = all.filter(|verdict| verdict.is_doubt()).collect();
     doubts.sort_by_key(|verdict| Reverse(verdict.outcome));
     let rows = doubts.iter().map(|verdict| {
         let mut row = row(verdict);
@@ -328,7 +328,7 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
 
 /// One row for each verdict, doubts first; `None` without any.
 pub fn quality_all(document: &Document) -> Option<Table> {
-    let mut all: Vec<&Verdict> = verdicts(document).iter().collect();
+    let mut all: Vec<&QualityVerdict> = verdicts(document).iter().collect();
     all.sort_by_key(|verdict| Reverse(verdict.outcome));
     let apart = all
         .iter()
@@ -345,7 +345,7 @@ pub fn quality_all(document: &Document) -> Option<Table> {
     (!all.is_empty()).then(|| Table::of("All checks", rows, note))
 }
 
-fn row(verdict: &Verdict) -> Vec<Cell> {
+fn row(verdict: &QualityVerdict) -> Vec<Cell> {
     vec![
         words("Check", verdict.check.code()),
         words("Outcome", verdict.outcome.name()),
@@ -361,7 +361,7 @@ fn row(verdict: &Verdict) -> Vec<Cell> {
 ///
 /// A share is written in percent and a multiple with a times sign, as in the sentences. Coherence and reciprocity,
 /// which are best at 1, are known as they are.
-fn scale(verdict: &Verdict) -> (f64, &str) {
+fn scale(verdict: &QualityVerdict) -> (f64, &str) {
     match (verdict.unit, verdict.check) {
         ("1", Check::TapLevels | Check::WeakTap) => (1.0, "\u{d7}"),
         ("1", Check::Coherence | Check::Reciprocity) => (1.0, "1"),
@@ -370,7 +370,7 @@ fn scale(verdict: &Verdict) -> (f64, &str) {
     }
 }
 
-fn value(verdict: &Verdict) -> String {
+fn value(verdict: &QualityVerdict) -> String {
     let (factor, unit) = scale(verdict);
     match verdict.value.map(|value| factor * value) {
         None => MISSING.to_owned(),
@@ -387,7 +387,7 @@ fn value(verdict: &Verdict) -> String {
 const LEAST_PERCENT: f64 = 0.001;
 
 /// Limits are round numbers, whose zeros say nothing; a computed one has three digits.
-fn limit(verdict: &Verdict) -> String {
+fn limit(verdict: &QualityVerdict) -> String {
     trimmed(scale(verdict).0 * verdict.limit, 3)
 }
 
@@ -396,9 +396,9 @@ mod tests {
     use super::*;
     use tapjoint_signal::quality::Subject;
 
-    fn verdict(check: Check, outcome: Outcome, value: f64) -> Verdict {
+    fn verdict(check: Check, outcome: Outcome, value: f64) -> QualityVerdict {
         let is_doubt = matches!(outcome, Outcome::Doubtful | Outcome::Bad);
-        Verdict {
+        QualityVerdict {
             check,
             subject: Subject::Test,
             value: Some(value),
@@ -411,7 +411,7 @@ mod tests {
         }
     }
 
-    fn document(verdicts: &[Verdict]) -> Document {
+    fn document(verdicts: &[QualityVerdict]) -> Document {
         Document {
             quality: Some(verdicts.to_vec()),
             ..Document::default()

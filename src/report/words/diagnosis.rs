@@ -130,22 +130,24 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     let mut all = gap.hypotheses.iter();
     let first = all.find(|found| matches!(found.hypothesis, Hypothesis::Effects(_)));
     let found = gap.named().or(first)?;
-    let shrink = match found.gap_after {
-        Some(after) if after >= found.gap_before => "go",
+    let shrink = match (found.gap_before, found.gap_after) {
+        (Some(before), Some(after)) if after >= before => "go",
         _ => "shrink",
     };
     let mut text = format!(
         "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
         together(&found.hypothesis),
-        percent(Some(found.gap_before)),
+        percent(found.gap_before),
         left(found.gap_after, gap.noise_floor),
     );
     // The errors that are left where nothing is added. They are stated if the tolerances, and a joint's drift between
     // recordings, explain half of the errors.
     let none = gap.result(&Hypothesis::None);
-    let remains = none
-        .and_then(|none| none.gap_after)
-        .filter(|remains| *remains < 0.5 * found.gap_before);
+    let remains = none.and_then(|none| none.gap_after).filter(|remains| {
+        found
+            .gap_before
+            .is_some_and(|before| *remains < 0.5 * before)
+    });
     let without = remains.map_or_else(String::new, |remains| {
         format!(
             " Without it, {}the tolerances of the description leave {} %.",
@@ -178,7 +180,9 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         }
     }
     let floor = percent(gap.noise_floor);
-    let outside = gap.noise_floor.filter(|floor| found.gap_before < *floor);
+    let outside = gap
+        .noise_floor
+        .filter(|floor| found.gap_before.is_some_and(|before| before < *floor));
     Some(match outside {
         Some(_) => format!(
             "{text}.{without} The frequencies are uncertain by {floor} %: the cause shows elsewhere, not in the mean \
@@ -300,14 +304,14 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
     if !is_there {
         return Vec::new();
     }
-    let found = cause(gap).filter(|found| found.gap_after < Some(found.gap_before));
+    let found = cause(gap).filter(|found| found.gap_after < found.gap_before);
     let shrink = found.map(|found| {
         let joint =
             joint(found, true).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
         format!(
             "With {} the errors of the frequencies shrink from {} to {} % (rms){joint}.",
             together(&found.hypothesis),
-            percent(Some(found.gap_before)),
+            percent(found.gap_before),
             left(found.gap_after, gap.noise_floor)
         )
     });
@@ -428,7 +432,7 @@ fn no_gap(gap: &GapSection) -> String {
             // uncertainty, and the errors with a joint that may differ between recordings.
             let floor = gap.noise_floor;
             let left_over =
-                of_none.and_then(|none| Some((none.gap_before, none.gap_after?, floor?)));
+                of_none.and_then(|none| Some((none.gap_before?, none.gap_after?, floor?)));
             let moved =
                 left_over.filter(|(before, after, floor)| *before > 2.0 * after.max(*floor));
             let moved = moved.map_or_else(String::new, |(before, after, _)| format!(
@@ -483,7 +487,7 @@ fn undecided(gap: &GapSection, reason: &str, has_joint: bool) -> String {
             } else {
                 ""
             },
-            percent(Some(none.gap_before)),
+            percent(none.gap_before),
             percent(gap.noise_floor),
         )
     } else {

@@ -126,13 +126,22 @@ fn physical(estimate: &EstimateSection, words: fn(&Parameter<'_>) -> String) -> 
     physical.map(words).collect()
 }
 
+/// The unit behind a parameter's value; none behind "\u{221e} (rigid)".
+fn behind(parameter: &Parameter<'_>, unit: &str) -> String {
+    match parameter.value.value.is_infinite() {
+        true => String::new(),
+        false => format!("\u{a0}{unit}"),
+    }
+}
+
 /// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
 /// gives limits these are written, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
 fn with_bounds(parameter: &Parameter<'_>) -> String {
     let [value, _, _, _, unit] = parameter.written();
+    let unit = behind(parameter, &unit);
     let rounded = parameter.written_together();
     if let Some([low, high]) = parameter.written_scaled_limits() {
-        let own = format!("{} = {} {unit}", parameter.symbol, rounded.value);
+        let own = format!("{} = {}{unit}", parameter.symbol, rounded.value);
         let limits = format!("(95 %: {low} to {high})");
         return [own, limits]
             .map(|part| part.replace(' ', "\u{a0}"))
@@ -144,7 +153,7 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
         value
     };
     // A number stays on the line of its unit.
-    format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
+    format!("{} = {shown}{unit}", parameter.symbol).replace(' ', "\u{a0}")
 }
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -268,7 +277,7 @@ fn estimate(document: &Document) -> Option<String> {
 /// alone 1.7890 to 1.7908)": what may be trusted first.
 fn stiffness(parameter: &Parameter<'_>) -> String {
     let [exact, _, low, high, unit] = parameter.written();
-    let unit = unit.replace(' ', "\u{a0}");
+    let unit = behind(parameter, &unit.replace(' ', "\u{a0}"));
     let own = match (parameter.value.low, parameter.value.high) {
         // More digits of a stiffness than that say nothing; how narrow the interval is does.
         (Some(from), Some(to)) if low == high && to > from && parameter.value.value != 0.0 => {
@@ -297,7 +306,7 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
         (Some(_), None) => (
             parameter.written_together().value,
             format!(
-                " (standard deviation scaled by the misfit {}\u{a0}{unit}{alone})",
+                " (standard deviation scaled by the misfit {}{unit}{alone})",
                 parameter.written_scaled()
             ),
         ),
@@ -305,7 +314,7 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
         (None, _) => (exact, format!(" (95 %: {own})")),
     };
     format!(
-        "{} {}\u{a0}=\u{a0}{value}\u{a0}{unit}{interval}",
+        "{} {}\u{a0}=\u{a0}{value}{unit}{interval}",
         parameter.meaning, parameter.symbol
     )
 }

@@ -20,8 +20,8 @@ pub use peaks::{
     near_mains,
 };
 pub use reading::{
-    BandReadings, FittedReading, Interpolation, MergedMode, ModeReading, PeakLabel, ReadBy, Unfit,
-    interpolate_parabola, interpolate_pole, merge_modes, read_peaks,
+    BandReadings, FittedReading, Interpolation, MergedMode, ModeReading, NoInterpolation,
+    PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes, read_peaks,
 };
 
 use nalgebra::allocator::Allocator;

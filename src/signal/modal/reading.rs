@@ -221,8 +221,8 @@ pub fn read_peaks(
                     between = Some(found).filter(|_| is_resonance);
                     label = (!is_resonance).then_some(PeakLabel::NoResonance);
                 }
-                Err(Unfit::TooFewLines) => {}
-                Err(Unfit::PoleElsewhere) => label = Some(PeakLabel::NoResonance),
+                Err(NoInterpolation::TooFewLines) => {}
+                Err(NoInterpolation::PoleElsewhere) => label = Some(PeakLabel::NoResonance),
             }
         }
         readings.push(reading(level, peak, between, label));
@@ -293,7 +293,7 @@ impl Interpolation {
 
 /// Reason why a peak could not be read between the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unfit {
+pub enum NoInterpolation {
     /// Fewer lines than unknowns, or lines without any level: the peak remains undecided.
     TooFewLines,
     /// The pole lies elsewhere: the peak is not that of a resonance.
@@ -324,7 +324,7 @@ const REWEIGHTINGS: usize = 3;
 /// this peak alone.
 ///
 /// # Errors
-/// [`Unfit`] when there are too few lines, or the pole lies farther from the peak than a line and the
+/// [`NoInterpolation`] when there are too few lines, or the pole lies farther from the peak than a line and the
 /// half-power reach: the background of other modes pulls a weak peak that far, but not farther.
 pub fn interpolate_pole(
     lines: &Lines,
@@ -332,15 +332,15 @@ pub fn interpolate_pole(
     peak: usize,
     room: usize,
     added_decay: f64,
-) -> Result<Interpolation, Unfit> {
-    let half_width = half_power_reach(spectra, peak).ok_or(Unfit::TooFewLines)?;
+) -> Result<Interpolation, NoInterpolation> {
+    let half_width = half_power_reach(spectra, peak).ok_or(NoInterpolation::TooFewLines)?;
     let reach = (half_width + 1).max(LEAST_REACH).min(room.max(LEAST_REACH));
-    let fit = fit_pole(spectra, peak, reach).ok_or(Unfit::TooFewLines)?;
+    let fit = fit_pole(spectra, peak, reach).ok_or(NoInterpolation::TooFewLines)?;
     let narrower = fit_pole(spectra, peak, (reach / 2).max(1)).unwrap_or(fit);
     // Resolution, not line spacing, is the measure of "near": zero padding must not tighten it.
     let line = lines.resolution().max(lines.spacing) / lines.spacing;
     if !fit.pole.is_finite() || fit.pole.re.abs() > line + half_width as f64 {
-        return Err(Unfit::PoleElsewhere);
+        return Err(NoInterpolation::PoleElsewhere);
     }
     let damped = lines.frequency(peak) + fit.pole.re * lines.spacing;
     let decay = fit.pole.im * lines.spacing - added_decay / TAU;

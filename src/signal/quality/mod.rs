@@ -15,10 +15,10 @@ use crate::spectral::{DecayCheck, Lines, Window};
 use crate::taps::{Rejection, SecondHit, Tap};
 use tapjoint_numerics::stats::median;
 
-pub use verdict::{Check, Outcome, Subject, Verdict};
+pub use verdict::{Check, Outcome, QualityVerdict, Subject};
 
 /// All checks of one recording.
-pub fn judge_recording(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub fn judge_recording(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     let mut verdicts = one_recording::check_double_hit(recording);
     verdicts.extend(one_recording::check_force_ripple(recording));
     verdicts.extend(one_recording::check_overload(recording));
@@ -39,8 +39,8 @@ pub fn judge_recording(recording: &RecordingEvidence) -> Vec<Verdict> {
 }
 
 /// All checks of a test: those of each recording, then those across recordings.
-pub fn judge_test(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
-    let mut verdicts: Vec<Verdict> = recordings.iter().flat_map(judge_recording).collect();
+pub fn judge_test(recordings: &[RecordingEvidence]) -> Vec<QualityVerdict> {
+    let mut verdicts: Vec<QualityVerdict> = recordings.iter().flat_map(judge_recording).collect();
     verdicts.extend(recordings::check_reciprocity(recordings));
     verdicts.extend(recordings::check_linearity(recordings));
     verdicts.extend(recordings::check_mass_loading(recordings));
@@ -165,34 +165,34 @@ impl RecordingEvidence {
     /// One verdict for each resonance.
     fn of_modes(
         &self,
-        check: fn(&RecordingEvidence, &ResonanceEvidence) -> Verdict,
-    ) -> impl Iterator<Item = Verdict> {
+        check: fn(&RecordingEvidence, &ResonanceEvidence) -> QualityVerdict,
+    ) -> impl Iterator<Item = QualityVerdict> {
         self.resonances.iter().map(move |mode| check(self, mode))
     }
 
     /// Begins a verdict on this recording.
-    fn verdict(&self, check: Check, limit: f64) -> Verdict {
+    fn verdict(&self, check: Check, limit: f64) -> QualityVerdict {
         let file = self.file.clone();
-        Verdict::new(check, Subject::Recording { file }, limit)
+        QualityVerdict::new(check, Subject::Recording { file }, limit)
     }
 
     /// Begins a verdict on a mode of this recording.
-    fn mode_verdict(&self, check: Check, mode: &ResonanceEvidence, limit: f64) -> Verdict {
+    fn mode_verdict(&self, check: Check, mode: &ResonanceEvidence, limit: f64) -> QualityVerdict {
         let subject = Subject::Mode {
             file: self.file.clone(),
             frequency: mode.frequency,
             is_mode: mode.is_mode,
         };
-        Verdict::new(check, subject, limit)
+        QualityVerdict::new(check, subject, limit)
     }
 
     /// Begins a verdict on a sensor of this recording.
-    fn sensor_verdict(&self, check: Check, sensor: &SensorEvidence, limit: f64) -> Verdict {
+    fn sensor_verdict(&self, check: Check, sensor: &SensorEvidence, limit: f64) -> QualityVerdict {
         let subject = Subject::Sensor {
             file: self.file.clone(),
             sensor: sensor.name.clone(),
         };
-        Verdict::new(check, subject, limit)
+        QualityVerdict::new(check, subject, limit)
     }
 }
 

@@ -6,8 +6,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Check, DampingSource, Outcome, RecordingEvidence, ResonanceEvidence, Subject, TapEvidence,
-    Verdict, limits,
+    Check, DampingSource, Outcome, QualityVerdict, RecordingEvidence, ResonanceEvidence, Subject,
+    TapEvidence, limits,
 };
 use crate::spectral::{Window, random_error};
 use crate::taps::{Rejection, SecondHit};
@@ -16,7 +16,7 @@ use tapjoint_numerics::stats::times;
 const NO_HAMMER: &str = "Not applicable without a hammer: a second hit cannot be told from two modes that beat in the responses.";
 
 /// Exactly one impact in each tap, by the force in time.
-pub(super) fn check_double_hit(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_double_hit(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     let limit = limits::DOUBLE_HIT;
     of_second_hits(recording, Check::DoubleHit, limit, "One impact.", |hit| {
         let happened = format!(
@@ -31,7 +31,7 @@ pub(super) fn check_double_hit(recording: &RecordingEvidence) -> Vec<Verdict> {
 
 /// Exactly one impact in each tap, by the ripple in the force spectrum, |1 + r e^{-j omega d}|: from 1 - r to 1 + r,
 /// every 1/d.
-pub(super) fn check_force_ripple(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_force_ripple(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     let limit = decibels(SecondHit {
         delay: 0.0,
         ratio: limits::DOUBLE_HIT,
@@ -63,7 +63,7 @@ fn of_second_hits(
     limit: f64,
     none: &str,
     found: impl Fn(SecondHit) -> (f64, String),
-) -> Vec<Verdict> {
+) -> Vec<QualityVerdict> {
     if recording.force.is_none() {
         return vec![recording.verdict(check, limit).missing(NO_HAMMER)];
     }
@@ -85,8 +85,8 @@ fn of_taps(
     recording: &RecordingEvidence,
     check: Check,
     limit: f64,
-    judge: impl Fn(&TapEvidence, Verdict) -> Verdict,
-) -> Vec<Verdict> {
+    judge: impl Fn(&TapEvidence, QualityVerdict) -> QualityVerdict,
+) -> Vec<QualityVerdict> {
     if recording.taps.is_empty() {
         let verdict = recording.verdict(check, limit);
         return vec![verdict.missing("Not applicable: no tap was found.")];
@@ -95,13 +95,13 @@ fn of_taps(
     taps.map(|(number, tap)| {
         let file = recording.file.clone();
         let subject = Subject::Tap { file, tap: number };
-        judge(tap, Verdict::new(check, subject, limit))
+        judge(tap, QualityVerdict::new(check, subject, limit))
     })
     .collect()
 }
 
 /// No sample at a channel's limit.
-pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_taps(recording, Check::Overload, 0.0, |tap, verdict| {
         match &tap.rejection {
             Some(Rejection::Overload { channel, samples }) => verdict.found(
@@ -117,7 +117,7 @@ pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<Verdict> {
 }
 
 /// No tap far weaker than the others; value and limit are in units of the least accepted peak.
-pub(super) fn check_weak(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_weak(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_taps(recording, Check::WeakTap, 1.0, |tap, verdict| {
         match &tap.rejection {
             Some(Rejection::TooWeak { peak, limit }) => {
@@ -133,7 +133,7 @@ pub(super) fn check_weak(recording: &RecordingEvidence) -> Vec<Verdict> {
 }
 
 /// Largest over smallest accepted peak.
-pub(super) fn check_tap_levels(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_tap_levels(recording: &RecordingEvidence) -> QualityVerdict {
     let verdict = recording.verdict(Check::TapLevels, limits::TAP_LEVELS);
     let peaks: Vec<f64> = recording.accepted().map(|tap| tap.peak).collect();
     let smallest = peaks.iter().copied().fold(f64::INFINITY, f64::min);
@@ -155,7 +155,7 @@ const SMOOTHING: usize = 2;
 const NO_FORCE: &str = "Not applicable without a hammer: the force is not known.";
 
 /// Fall of the force spectrum over the band, largest over smallest.
-pub(super) fn check_force_fall(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_force_fall(recording: &RecordingEvidence) -> QualityVerdict {
     let verdict = recording.verdict(Check::ForceFall, limits::FORCE_FALL);
     let Some((frequencies, power)) = band_power(recording) else {
         return verdict.missing(NO_FORCE);
@@ -177,7 +177,7 @@ pub(super) fn check_force_fall(recording: &RecordingEvidence) -> Verdict {
 }
 
 /// Frequency above which the force is no longer clear of its noise.
-pub(super) fn check_force_noise(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_force_noise(recording: &RecordingEvidence) -> QualityVerdict {
     let (high, over) = (recording.lines.high, limits::FORCE_OVER_NOISE);
     let verdict = recording.verdict(Check::ForceNoise, high);
     let Some((frequencies, power)) = band_power(recording) else {
@@ -222,7 +222,7 @@ fn smoothed(amplitudes: &[f64]) -> Vec<f64> {
 }
 
 /// Enough taps.
-pub(super) fn check_averages(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_averages(recording: &RecordingEvidence) -> QualityVerdict {
     let (enough, trusted) = (limits::AVERAGES, limits::TRUSTED_AVERAGES);
     let count = recording.averages();
     let (outcome, meaning) = match count {
@@ -244,7 +244,10 @@ pub(super) fn check_averages(recording: &RecordingEvidence) -> Verdict {
 }
 
 /// Coherence at each resonance, of the sensor that sees it best.
-pub(super) fn check_coherence(recording: &RecordingEvidence, mode: &ResonanceEvidence) -> Verdict {
+pub(super) fn check_coherence(
+    recording: &RecordingEvidence,
+    mode: &ResonanceEvidence,
+) -> QualityVerdict {
     let limit = limits::COHERENCE;
     let verdict = recording.mode_verdict(Check::Coherence, mode, limit);
     let (sensor, value) = match coherence_at(recording, mode) {
@@ -268,7 +271,7 @@ pub(super) fn check_coherence(recording: &RecordingEvidence, mode: &ResonanceEvi
 pub(super) fn check_random_error(
     recording: &RecordingEvidence,
     mode: &ResonanceEvidence,
-) -> Verdict {
+) -> QualityVerdict {
     let limit = limits::RANDOM_ERROR;
     let verdict = recording.mode_verdict(Check::RandomError, mode, limit);
     let (sensor, coherence) = match coherence_at(recording, mode) {
@@ -329,7 +332,7 @@ const TIMES_NOISE: &str = "times noise";
 pub(super) fn check_frequency_scatter(
     recording: &RecordingEvidence,
     mode: &ResonanceEvidence,
-) -> Verdict {
+) -> QualityVerdict {
     let (limit, least) = (limits::FREQUENCY_SCATTER, limits::LEAST_SCATTER);
     let verdict = recording.mode_verdict(Check::FrequencyScatter, mode, limit);
     let count = mode.tap_frequencies.len();
@@ -384,7 +387,7 @@ pub(super) fn check_frequency_scatter(
 const NO_WINDOW: &str = "Not applicable: no exponential window was used.";
 
 /// Level left at the record's end, under the window.
-pub(super) fn check_decay(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_decay(recording: &RecordingEvidence) -> QualityVerdict {
     let limit = limits::REMAINING;
     let verdict = recording.verdict(Check::Decay, limit);
     let Some(decay) = recording.decay else {
@@ -414,7 +417,7 @@ pub(super) fn check_decay(recording: &RecordingEvidence) -> Verdict {
 }
 
 /// An exponential window only on records that decay far enough by themselves.
-pub(super) fn check_exponential_window(recording: &RecordingEvidence) -> Verdict {
+pub(super) fn check_exponential_window(recording: &RecordingEvidence) -> QualityVerdict {
     let limit = limits::REMAINING_FOR_WINDOW;
     let verdict = recording.verdict(Check::ExponentialWindow, limit);
     let (Window::Exponential { decay: added }, Some(decay)) = (recording.window, recording.decay)
@@ -437,7 +440,7 @@ pub(super) fn check_exponential_window(recording: &RecordingEvidence) -> Verdict
 pub(super) fn check_window_damping(
     recording: &RecordingEvidence,
     mode: &ResonanceEvidence,
-) -> Verdict {
+) -> QualityVerdict {
     let limit = limits::WINDOW_SHARE;
     let verdict = recording.mode_verdict(Check::WindowDamping, mode, limit);
     let added = recording.window.added_decay();

@@ -3,7 +3,8 @@
 use num_complex::Complex64;
 
 use super::{
-    Check, Outcome, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject, Verdict, limits,
+    Check, Outcome, QualityVerdict, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
+    limits,
 };
 use crate::recording::ResponseForm;
 use tapjoint_numerics::stats::times;
@@ -14,7 +15,7 @@ use tapjoint_numerics::stats::times;
 const LARGEST_CHANCE: f64 = 0.34;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
-pub(super) fn check_reciprocity(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
+pub(super) fn check_reciprocity(recordings: &[RecordingEvidence]) -> Vec<QualityVerdict> {
     let mut verdicts = Vec::new();
     for (first, second) in pairs(recordings) {
         // A driving point is no pair of places.
@@ -35,9 +36,14 @@ pub(super) fn check_reciprocity(recordings: &[RecordingEvidence]) -> Vec<Verdict
 }
 
 /// Returns the verdicts. Without any it returns one on the test, with the reason why the check does not apply.
-fn or_missing(mut verdicts: Vec<Verdict>, check: Check, limit: f64, why: &str) -> Vec<Verdict> {
+fn or_missing(
+    mut verdicts: Vec<QualityVerdict>,
+    check: Check,
+    limit: f64,
+    why: &str,
+) -> Vec<QualityVerdict> {
     if verdicts.is_empty() {
-        verdicts.push(Verdict::new(check, Subject::Test, limit).missing(why));
+        verdicts.push(QualityVerdict::new(check, Subject::Test, limit).missing(why));
     }
     verdicts
 }
@@ -76,7 +82,7 @@ fn compare_swapped(
     a: &SensorEvidence,
     second: &RecordingEvidence,
     b: &SensorEvidence,
-) -> Option<Verdict> {
+) -> Option<QualityVerdict> {
     let (h1, h2) = (a.frf.as_ref()?, b.frf.as_ref()?);
     let (mut cross, mut power1, mut power2) = (Complex64::ZERO, 0.0, 0.0);
     for (line, x) in h1.iter().enumerate() {
@@ -126,7 +132,7 @@ fn compare_swapped(
 }
 
 /// Frequencies at two tap levels in one arrangement agree within their uncertainty.
-pub(super) fn check_linearity(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
+pub(super) fn check_linearity(recordings: &[RecordingEvidence]) -> Vec<QualityVerdict> {
     let mut verdicts = Vec::new();
     for (first, second) in pairs(recordings) {
         let (Some(a), Some(b)) = (first.tap_level(), second.tap_level()) else {
@@ -147,7 +153,7 @@ pub(super) fn check_linearity(recordings: &[RecordingEvidence]) -> Vec<Verdict> 
 }
 
 /// Frequencies with the sensors elsewhere agree within their uncertainty.
-pub(super) fn check_mass_loading(recordings: &[RecordingEvidence]) -> Vec<Verdict> {
+pub(super) fn check_mass_loading(recordings: &[RecordingEvidence]) -> Vec<QualityVerdict> {
     let mut verdicts = Vec::new();
     // Each arrangement once, beside the first recording.
     if let Some((first, later)) = recordings.split_first() {
@@ -186,7 +192,7 @@ fn shifts(
     second: &RecordingEvidence,
     change: &str,
     levels: &[RecordingEvidence],
-) -> Vec<Verdict> {
+) -> Vec<QualityVerdict> {
     let mut verdicts = Vec::new();
     for mode in &first.resonances {
         let Some(other) = partner(mode, first, second) else {
@@ -339,7 +345,7 @@ const ABOUT: usize = 2;
 
 /// The imaginary part of accelerance and receptance (the real part of mobility) keeps one sign at all
 /// resonances: every mode answers there in phase with itself.
-pub(super) fn check_driving_point(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_driving_point(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_driving_points(recording, Check::DrivingPoint, 1, |receptance| {
         let (mut all, mut wrong) = (0, 0);
         for mode in &recording.resonances {
@@ -364,7 +370,7 @@ pub(super) fn check_driving_point(recording: &RecordingEvidence) -> Vec<Verdict>
 
 /// Between every two resonances of a driving point lies an antiresonance: the real part of the
 /// receptance, negative above one resonance and positive below the next, passes zero.
-pub(super) fn check_antiresonances(recording: &RecordingEvidence) -> Vec<Verdict> {
+pub(super) fn check_antiresonances(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     let lines = &recording.lines;
     let mut places = Vec::with_capacity(recording.resonances.len());
     for mode in &recording.resonances {
@@ -408,7 +414,7 @@ fn of_driving_points(
     check: Check,
     least_modes: usize,
     judge: impl Fn(&[Complex64]) -> (usize, Outcome, String),
-) -> Vec<Verdict> {
+) -> Vec<QualityVerdict> {
     let none = recording.verdict(check, 0.0);
     if recording.tap_position.is_none() {
         return vec![none.missing("Not applicable: the tap position is not given.")];

@@ -39,7 +39,7 @@ pub use uff::{
     Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,
     UffCoding, UniversalFile, list_datasets, read_function,
 };
-pub use units::{ResponseForm, STANDARD_GRAVITY, channel_unit};
+pub use units::{ResponseForm, channel_unit};
 pub use write::{
     UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff, encode_wav,
     write_wav,

@@ -136,6 +136,11 @@ fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingE
         name: Some(name.trim().to_owned()).filter(|name| !name.is_empty()),
         ..Point::default()
     });
+    let is_coherence = coherence.len() == frequencies.len() && all_within_coherence(coherence);
+    let doubt = (!coherence.is_empty() && !is_coherence).then(|| {
+        let message = "the column of the coherence is left out: its values are not all between 0 and 1; export it again if it is needed";
+        RecordingWarning::new("coherence-left-out", message.to_owned())
+    });
     Ok(FrequencyResponses {
         file,
         first_frequency: first_frequency * factor,
@@ -153,10 +158,15 @@ fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingE
             values: parts
                 .map(|(re, im)| Complex64::new(*re, *im) * scale)
                 .collect(),
-            coherence: (coherence.len() == frequencies.len()).then(|| coherence.clone()),
+            coherence: is_coherence.then(|| coherence.clone()),
         }],
-        warnings: Vec::new(),
+        warnings: Vec::from_iter(doubt),
     })
+}
+
+/// Returns true where all values lie between 0 and 1, but for what printing with six digits adds, and more.
+fn all_within_coherence(values: &[f64]) -> bool {
+    values.iter().all(|value| (-1e-3..=1.001).contains(value))
 }
 
 /// Words that begin the heading of a magnitude or a phase.
@@ -478,9 +488,7 @@ fn attach_coherence(
     };
     let mut values = read_function(file, dataset.number)?.real;
     values.truncate(lines);
-    // What printing with six digits adds to a coherence of 1, and more.
-    let usable = values.iter().all(|value| (-1e-3..=1.001).contains(value));
-    if values.len() < lines || !usable {
+    if values.len() < lines || !all_within_coherence(&values) {
         return Ok(Err("its values are not all between 0 and 1"));
     }
     response.coherence = Some(values);

@@ -3,9 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-
-/// Standard acceleration of free fall (m/s2), by definition: what "g" means for an acceleration.
-pub const STANDARD_GRAVITY: f64 = 9.806_65;
+use tapjoint_numerics::quantity::STANDARD_GRAVITY;
 
 /// Spellings of units, their factors to SI, and the SI units. Case counts: mN is a thousandth of a newton, MN a
 /// million.

@@ -8,7 +8,10 @@ use std::path::{Path, PathBuf};
 use super::error::RecordingError;
 use super::health::{check_finite, check_rate, check_samples};
 use super::responses::{FrequencyResponse, FrequencyResponses, not_finite};
-use super::uff::Point;
+use super::uff::{
+    ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FREQUENCY, FunctionType, HEADER_LINES, Point,
+    UNKNOWN, VELOCITY,
+};
 use super::units::ResponseForm;
 
 /// Number format of a WAV file that is written.
@@ -64,11 +67,19 @@ impl WavLayout {
         })
     }
 
-    /// Checks that a WAV file can hold so many frames.
-    fn check_size(&self, name: &str, frames: u64) -> Result<(), RecordingError> {
-        let bytes = frames
+    /// Returns the size of all samples (bytes).
+    pub fn bytes(&self) -> u64 {
+        self.frames
             .saturating_mul(self.channels as u64)
-            .saturating_mul(u64::from(self.format.bits() / 8));
+            .saturating_mul(u64::from(self.format.bits() / 8))
+    }
+
+    /// Checks that a WAV file can hold so much. `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// More than the format can hold.
+    pub fn check_size(&self, name: &str) -> Result<(), RecordingError> {
+        let (bytes, frames) = (self.bytes(), self.frames);
         // 128 bytes are more than the header takes.
         if self.channels > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
             let problem = format!(
@@ -140,7 +151,7 @@ impl WavStream {
     pub fn create(path: &Path, layout: WavLayout) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         check_rate(&name, f64::from(layout.sample_rate))?;
-        layout.check_size(&name, layout.frames)?;
+        layout.check_size(&name)?;
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
@@ -194,7 +205,7 @@ struct WavEncoder<W: Write + Seek> {
 
 impl<W: Write + Seek> WavEncoder<W> {
     fn new(name: &str, writer: W, layout: WavLayout) -> Result<Self, RecordingError> {
-        layout.check_size(name, layout.frames)?;
+        layout.check_size(name)?;
         let spec = hound::WavSpec {
             channels: layout.channels as u16,
             sample_rate: layout.sample_rate,
@@ -250,7 +261,12 @@ impl<W: Write + Seek> WavEncoder<W> {
             written.map_err(|error| unwritable(&self.name, error))?;
         }
         self.written += 1;
-        self.layout.check_size(&self.name, self.written)
+        let frames = self.written;
+        let layout = WavLayout {
+            frames,
+            ..self.layout
+        };
+        layout.check_size(&self.name)
     }
 
     /// Completes the header. Returns the bytes of all samples, and how many samples were clipped.
@@ -318,6 +334,19 @@ const SI_UNITS: &str = "    -1\n   164\n         1SI: Meter (newton)           2
      1.00000000000000000D+00  1.00000000000000000D+00  1.00000000000000000D+00\n  \
      2.73149999999999977D+02\n    -1\n";
 
+/// Ordinate data types of record 7.
+const REAL_DOUBLE: u32 = 4;
+const COMPLEX_DOUBLE: u32 = 6;
+/// Numbers of byte order and number format in the first line of dataset 58b.
+const LITTLE_ENDIAN: u32 = 1;
+const IEEE_754: u32 = 2;
+/// Characters of an identification line, of a point's name, and of an axis' label or unit.
+const ID_LINE: usize = 80;
+const POINT_NAME: usize = 10;
+const LABEL: usize = 20;
+/// Double-precision values in a line of dataset 58.
+const VALUES_IN_LINE: usize = 4;
+
 /// Encodes frequency response functions and their coherences as a universal file: units (dataset 164), then
 /// for each response a dataset 58 or 58b of function type 4 and, where there is a coherence, one of
 /// function type 6. Complex and real double precision, evenly spaced.
@@ -339,22 +368,34 @@ pub fn encode_frequency_responses_uff(
         let values: Vec<f64> = parts.collect();
         check_values(responses, number, 2, &values)?;
         // Values are in SI units where the form is known; else the unit is the file's.
-        let force = axis(13, "Force", "N");
+        let force = axis(EXCITATION_FORCE, "Force", "N");
         let axes = match response.form {
-            Some(ResponseForm::Accelerance) => axis(12, "Acceleration", "m/s2") + &force,
-            Some(ResponseForm::Mobility) => axis(11, "Velocity", "m/s") + &force,
-            Some(ResponseForm::Receptance) => axis(8, "Displacement", "m") + &force,
+            Some(ResponseForm::Accelerance) => axis(ACCELERATION, "Acceleration", "m/s2") + &force,
+            Some(ResponseForm::Mobility) => axis(VELOCITY, "Velocity", "m/s") + &force,
+            Some(ResponseForm::Receptance) => axis(DISPLACEMENT, "Displacement", "m") + &force,
             None => {
                 let unit = response.unit.as_deref().unwrap_or("NONE");
-                axis(0, "Response", unit) + &axis(0, "NONE", "NONE")
+                axis(UNKNOWN, "Response", unit) + &axis(UNKNOWN, "NONE", "NONE")
             }
         };
-        let records = header(responses, response, 4, 6, axes);
+        let records = header(
+            responses,
+            response,
+            FunctionType::FREQUENCY_RESPONSE,
+            COMPLEX_DOUBLE,
+            axes,
+        );
         write_dataset(&mut bytes, &records, &values, format);
         if let Some(coherence) = &response.coherence {
             check_values(responses, number, 1, coherence)?;
-            let axes = axis(0, "Coherence", "NONE") + &axis(0, "NONE", "NONE");
-            let records = header(responses, response, 6, 4, axes);
+            let axes = axis(UNKNOWN, "Coherence", "NONE") + &axis(UNKNOWN, "NONE", "NONE");
+            let records = header(
+                responses,
+                response,
+                FunctionType::COHERENCE,
+                REAL_DOUBLE,
+                axes,
+            );
             write_dataset(&mut bytes, &records, coherence, format);
         }
     }
@@ -386,14 +427,15 @@ fn check_values(
 fn header(
     responses: &FrequencyResponses,
     response: &FrequencyResponse,
-    function_type: u32,
+    function_type: FunctionType,
     data_type: u32,
     ordinate_axes: String,
 ) -> String {
-    let mut text = field(&response.name, 80) + "\nNONE\nNONE\nNONE\nNONE\n";
+    let mut text = field(&response.name, ID_LINE) + "\nNONE\nNONE\nNONE\nNONE\n";
     let _ = writeln!(
         text,
-        "{function_type:5}{:10}{:5}{:10}{}{}",
+        "{:5}{:10}{:5}{:10}{}{}",
+        function_type.0,
         0,
         0,
         0,
@@ -409,7 +451,7 @@ fn header(
         exponential(responses.spacing, 6),
         exponential(0.0, 6)
     );
-    text + &axis(18, "Frequency", "Hz") + &ordinate_axes + &axis(0, "NONE", "NONE")
+    text + &axis(FREQUENCY, "Frequency", "Hz") + &ordinate_axes + &axis(UNKNOWN, "NONE", "NONE")
 }
 
 /// Records 8 to 11: Format(I10,3I5,2(1X,20A1)).
@@ -419,8 +461,8 @@ fn axis(quantity: u32, label: &str, unit: &str) -> String {
         0,
         0,
         0,
-        field(label, 20),
-        field(unit, 20)
+        field(label, LABEL),
+        field(unit, LABEL)
     )
 }
 
@@ -429,7 +471,7 @@ fn point(point: &Point) -> String {
     let name = point.name.as_deref().unwrap_or("NONE");
     format!(
         " {:<10}{:>10}{:>4}",
-        field(name, 10),
+        field(name, POINT_NAME),
         point.node,
         point.direction
     )
@@ -466,7 +508,7 @@ fn write_dataset(into: &mut Vec<u8>, header: &str, values: &[f64], format: UffFo
         UffFormat::Ascii => {
             into.extend_from_slice(b"    -1\n    58\n");
             into.extend_from_slice(header.as_bytes());
-            for row in values.chunks(4) {
+            for row in values.chunks(VALUES_IN_LINE) {
                 let row: String = row
                     .iter()
                     .map(|x| format!("{:>20}", exponential(*x, 12)))
@@ -476,11 +518,10 @@ fn write_dataset(into: &mut Vec<u8>, header: &str, values: &[f64], format: UffFo
             }
         }
         UffFormat::Binary => {
-            // Little endian, IEEE 754, eleven lines of header, then this many bytes.
-            let bytes = 8 * values.len();
+            let bytes = size_of_val(values);
             let line = format!(
                 "    -1\n    58b{:6}{:6}{:12}{bytes:12}{:6}{:6}{:12}{:12}\n",
-                1, 2, 11, 0, 0, 0, 0
+                LITTLE_ENDIAN, IEEE_754, HEADER_LINES, 0, 0, 0, 0
             );
             into.extend_from_slice(line.as_bytes());
             into.extend_from_slice(header.as_bytes());

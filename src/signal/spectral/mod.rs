@@ -52,6 +52,20 @@ pub enum SpectralError {
         /// Least width of a band (Hz).
         least_width: f64,
     },
+    /// The block is much longer than the signal.
+    #[error(
+        "a block of {block} samples spans {wanted:.3} s of the band, but the signal lasts {seconds:.3} s: the rest would be zeros, which add lines and no resolution; give at most {most} samples ({MOST_PADDING} times the signal)"
+    )]
+    Padded {
+        /// Block size as given (samples).
+        block: usize,
+        /// Time that it spans (s).
+        wanted: f64,
+        /// Length of signal (s).
+        seconds: f64,
+        /// Largest possible block.
+        most: usize,
+    },
     /// The block size is unusable.
     #[error("a block of {block} samples is not usable: give {least} to {most} samples")]
     Block {
@@ -66,8 +80,10 @@ pub enum SpectralError {
 
 /// Smallest block (samples): fewer displayed lines than six show no resonance.
 pub const LEAST_BLOCK: usize = 16;
-/// Largest block (samples): a bound on memory (64 MB a channel), 78 s at 51.2 kHz.
-pub const MOST_BLOCK: usize = 4_000_000;
+/// Largest block (samples): a bound on time and memory, 20 s at 51.2 kHz. A zoom band takes longer signals.
+pub const MOST_BLOCK: usize = 1 << 20;
+/// Largest block in lengths of the signal. Zeros beyond cost time and memory, and show nothing more.
+pub const MOST_PADDING: usize = 16;
 
 /// Ratio of sample rate to displayed bandwidth: analysers show N/2.56 lines of a block of N.
 pub const DISPLAY_RATIO: f64 = 2.56;
@@ -95,7 +111,8 @@ impl Lines {
     /// # Errors
     /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,
     /// [`SpectralError::Block`] for a block outside [`LEAST_BLOCK`] to [`MOST_BLOCK`] samples,
-    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band.
+    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band,
+    /// [`SpectralError::Padded`] for a block longer than [`MOST_PADDING`] times the signal.
     pub fn zoom(
         band: (f64, f64),
         sample_rate: f64,
@@ -129,6 +146,15 @@ impl Lines {
                 seconds: available,
                 resolution: 1.0 / available,
                 least_width: LEAST_BLOCK as f64 / (DISPLAY_RATIO * available),
+            });
+        }
+        let most = (MOST_PADDING as f64 * zoomed_rate * available) as usize;
+        if block > most {
+            return Err(SpectralError::Padded {
+                block,
+                wanted: block as f64 / zoomed_rate,
+                seconds: available,
+                most,
             });
         }
         Ok(Lines {

@@ -299,7 +299,7 @@ pub struct Calibration {
 }
 
 /// Judges the probabilities of all cases with one right class.
-pub fn calibrate(cases: &[Case]) -> Calibration {
+fn calibrate(cases: &[Case]) -> Calibration {
     let cases: Vec<(Class, &Answer)> = cases
         .iter()
         .filter_map(|(truth, answer)| Some((truth.class()?, answer)))

@@ -5,7 +5,7 @@
 
 mod table;
 
-pub use table::{Printed, PublicationError, Reproduction, Row, Table, Verdict};
+pub use table::{Agreement, Printed, PublicationError, Reproduction, Row, Table};
 
 use table::{PrintedTable, estimate_from_printed, joint_label};
 use tapjoint_beam::joint::StiffnessUnits;
@@ -207,12 +207,12 @@ fn table_1b() -> Rows {
         let used = lambdas.iter().take(FIT_MODES);
         let used: Vec<Printed> = used
             .map(|row| match (row.verdict, row.ours) {
-                (Verdict::DoesNotReproduce, Some(ours)) => Printed::parse(&format!("{ours:.4}")),
+                (Agreement::DoesNotReproduce, Some(ours)) => Printed::parse(&format!("{ours:.4}")),
                 _ => Ok(row.printed.clone()),
             })
             .collect::<Result<_, _>>()?;
         let mut all = lambdas.iter();
-        let misprinted = all.any(|row| row.verdict == Verdict::DoesNotReproduce);
+        let misprinted = all.any(|row| row.verdict == Agreement::DoesNotReproduce);
         rows.extend(because(lambdas, MISPRINT_1B));
         let two = estimated(&table, row, PairsModel::TwoParameter, &used)?;
         let mut estimates = because(two, WRONG_MODEL);
@@ -250,7 +250,7 @@ fn estimated(table: &PrintedTable, row: usize, model: PairsModel, lambdas: &[Pri
             printed.unit
         };
         let label = format!("  {} by {parameters} parameters", capital(name));
-        let row = Row::within(label, printed, ours.unwrap_or(f64::NAN), tolerance);
+        let row = Row::within(label, printed, ours, tolerance);
         rows.push(row.or_within(span));
     }
     if three {
@@ -502,7 +502,7 @@ fn table_9(place: usize) -> Rows {
             for (name, ours) in named(Some(average.mean_magnitude)) {
                 let printed = averages.number(place, name)?;
                 let label = format!("{} mean error (%), {what}", capital(name));
-                let row = Row::to_last_digit(label, printed, ours.unwrap_or(f64::NAN));
+                let row = Row::to_last_digit(label, printed, ours);
                 rows.push(row.or_because(remark));
             }
         }
@@ -551,7 +551,7 @@ fn table_10a() -> Rows {
         for (index, (printed, ours)) in printed.into_iter().zip(ours).enumerate() {
             let label = format!("{}: lambda {}", joint_label(&kx, &ky), index + 1);
             let mut row = Row::to_last_digit(label, printed.clone(), ours);
-            if row.verdict == Verdict::DoesNotReproduce {
+            if row.verdict == Agreement::DoesNotReproduce {
                 // Judged by its digits without the padding.
                 let trimmed = Printed::parse(printed.text.trim_end_matches('0'))?;
                 let judged = Row::to_last_digit(row.label, trimmed, ours);
@@ -670,7 +670,7 @@ fn table_14() -> Rows {
     for (name, ours) in &named(means)[..2] {
         let label = format!("{}, mean of all high, all low", capital(name));
         let printed = table.named("perturbed", name)?;
-        let row = Row::to_last_digit(label, printed, ours.unwrap_or(f64::NAN));
+        let row = Row::to_last_digit(label, printed, *ours);
         rows.push(row.or_because(UNSTATED));
     }
     rows.extend(lap_converted(&table, "perturbed")?);

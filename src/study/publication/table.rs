@@ -34,7 +34,7 @@ pub enum PublicationError {
 /// Agreement of a printed number with ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum Agreement {
     /// Equal within the row's tolerance.
     Reproduces,
     /// Different, within the effect that rounding of the printed input has on our number.
@@ -57,31 +57,41 @@ pub struct Row {
     /// Largest difference that still counts as equal, in the unit of the numbers.
     pub tolerance: f64,
     /// Agreement of the two.
-    pub verdict: Verdict,
+    pub verdict: Agreement,
     /// Reason of a difference, or another remark.
     pub remark: Option<&'static str>,
 }
 
 impl Row {
     /// A row that reproduces within one unit in the last printed digit.
-    pub(super) fn to_last_digit(label: String, printed: Printed, ours: f64) -> Self {
+    pub(super) fn to_last_digit(
+        label: String,
+        printed: Printed,
+        ours: impl Into<Option<f64>>,
+    ) -> Self {
         // A millionth of a unit allows for the binary fraction that stands for the printed one.
         let tolerance = printed.unit * (1.0 + 1e-6);
         Self::within(label, printed, ours, tolerance)
     }
 
-    /// A row that reproduces within `tolerance`.
-    pub(super) fn within(label: String, printed: Printed, ours: f64, tolerance: f64) -> Self {
-        let equal = (ours - printed.value).abs() <= tolerance;
+    /// A row that reproduces within `tolerance`; an answer that is missing does not.
+    pub(super) fn within(
+        label: String,
+        printed: Printed,
+        ours: impl Into<Option<f64>>,
+        tolerance: f64,
+    ) -> Self {
+        let ours = ours.into();
+        let equal = ours.is_some_and(|ours: f64| (ours - printed.value).abs() <= tolerance);
         Self {
             label,
             printed,
-            ours: Some(ours),
+            ours,
             tolerance,
             verdict: if equal {
-                Verdict::Reproduces
+                Agreement::Reproduces
             } else {
-                Verdict::DoesNotReproduce
+                Agreement::DoesNotReproduce
             },
             remark: None,
         }
@@ -90,7 +100,7 @@ impl Row {
     /// A row that reproduces within a share (1) of its number.
     pub(super) fn near(label: String, printed: Printed, ours: Option<f64>, share: f64) -> Self {
         let tolerance = share * printed.value;
-        Self::within(label, printed, ours.unwrap_or(f64::NAN), tolerance)
+        Self::within(label, printed, ours, tolerance)
     }
 
     /// A row with nothing to compute.
@@ -100,7 +110,7 @@ impl Row {
             printed,
             ours: None,
             tolerance: 0.0,
-            verdict: Verdict::Given,
+            verdict: Agreement::Given,
             remark: None,
         }
     }
@@ -121,15 +131,15 @@ impl Row {
     }
 
     fn or_if(mut self, is_explained: bool) -> Self {
-        if self.verdict == Verdict::DoesNotReproduce && is_explained {
-            self.verdict = Verdict::WithinRounding;
+        if self.verdict == Agreement::DoesNotReproduce && is_explained {
+            self.verdict = Agreement::WithinRounding;
         }
         self
     }
 
     /// Adds the remark where the row does not reproduce.
     pub(super) fn or_because(mut self, remark: &'static str) -> Self {
-        if self.verdict == Verdict::DoesNotReproduce {
+        if self.verdict == Agreement::DoesNotReproduce {
             self.remark = Some(remark);
         }
         self
@@ -169,7 +179,7 @@ pub struct Reproduction {
 
 impl Reproduction {
     /// Counts the rows that have this verdict.
-    pub fn count(&self, verdict: Verdict) -> usize {
+    pub fn count(&self, verdict: Agreement) -> usize {
         let rows = self.tables.iter().flat_map(|table| &table.rows);
         rows.filter(|row| row.verdict == verdict).count()
     }
@@ -194,9 +204,9 @@ pub(super) fn estimate_from_printed(
     let values: Vec<f64> = lambdas.iter().map(|lambda| lambda.value).collect();
     let halves: Vec<f64> = lambdas.iter().map(|lambda| 0.5 * lambda.unit).collect();
     let estimate = estimate_pairs(model, &ModeLambda::numbered(&values))?;
-    let direct = sign_pattern_spans(&values, &halves, |values| stiffnesses(model, values))?;
+    let direct = sign_pattern_spans(&values, &halves, 1, |values| stiffnesses(model, values))?;
     // Through the slot of Kx, which may change its sign without harm.
-    let reciprocal = sign_pattern_spans(&values, &halves, |values| {
+    let reciprocal = sign_pattern_spans(&values, &halves, 1, |values| {
         let found = stiffnesses(model, values)?;
         Some(Stiffnesses {
             kx: found.kz?.recip(),

@@ -158,10 +158,18 @@ pub enum ResolutionError {
         /// Room that a mode needs (%).
         room: f64,
     },
+    /// A band ends where no tap excites anything.
+    #[error("a band ends at {high:e} Hz; {most:e} Hz is the limit; give a lower --band LO:HI")]
+    TooHigh {
+        /// Highest end (Hz).
+        high: f64,
+        /// Highest possible (Hz).
+        most: f64,
+    },
     /// A record would not fit into memory.
     #[error(
         "a block of {block} samples in the band {low} to {high} Hz is {seconds:.0} s at {rate:.0} samples/s, {most} \
-         samples are the limit; give smaller blocks, or wider bands"
+         samples are the limit; give smaller --blocks, or a wider --band"
     )]
     TooLong {
         /// Block (samples).

@@ -10,8 +10,11 @@ use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 /// Room between a mode and the upper end of its band, as a share of the band's end: truths vary by some
 /// lines, and a peak on the last line is none.
 const ROOM: f64 = 0.05;
-/// Longest record (samples): 17 min at 64 kHz would be more than a test has.
-const MOST_SAMPLES: usize = 1 << 24;
+/// Longest record (samples): a bound on memory, of which a virtual test takes some twenty times as much in each
+/// thread.
+const MOST_SAMPLES: usize = 1 << 21;
+/// Highest end of a band (Hz): no tap excites more. The sample rate follows it, and a virtual tap lasts 0.05 s.
+const HIGHEST: f64 = 1e6;
 /// Widest variation of the natural frequencies (1): beyond it the drawn beam is another one.
 const WIDEST: f64 = 0.2;
 
@@ -59,6 +62,12 @@ impl Layout {
         });
         bands.dedup();
         let highest = bands.iter().map(|band| band.1).fold(0.0, f64::max);
+        if highest > HIGHEST {
+            return Err(ResolutionError::TooHigh {
+                high: highest,
+                most: HIGHEST,
+            });
+        }
         let mut modes: Vec<ModePlan> = Vec::new();
         let mut omitted = Vec::new();
         for (index, &frequency) in frequencies.iter().enumerate() {

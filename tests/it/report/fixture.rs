@@ -11,7 +11,7 @@ use tapjoint::modal::{self, ModeReading, PeakLabel};
 use tapjoint::pipeline::{
     CloseUp, Conditions, MeasuredSpectra, Measurement, Overview, RecordingResult, Response,
 };
-use tapjoint::quality::{Check, Outcome, Subject, Verdict};
+use tapjoint::quality::{Check, Outcome, QualityVerdict, Subject};
 use tapjoint::recording::Format;
 use tapjoint::report::document::*;
 use tapjoint::spectral::{AveragedSpectra, Lines, SpectralAverager, Window};
@@ -71,8 +71,8 @@ pub fn recordings() -> Vec<RecordingResult> {
 }
 
 /// One good check and one doubt.
-fn quality() -> Vec<Verdict> {
-    let verdict = |outcome: Outcome, tap: usize, value: f64| Verdict {
+fn quality() -> Vec<QualityVerdict> {
+    let verdict = |outcome: Outcome, tap: usize, value: f64| QualityVerdict {
         check: Check::ForceRipple,
         subject: Subject::Tap {
             file: "full.wav".into(),
@@ -287,6 +287,7 @@ fn span() -> ResolutionSpanSection {
     ResolutionSpanSection {
         method: EstimateMethod::Pairs,
         patterns: 16,
+        sampled: false,
         failed: 0,
         kx: Some([860.0, 1090.0]),
         ky: Some([1.241, 1.261]),

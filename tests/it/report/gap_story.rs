@@ -14,7 +14,7 @@ use tapjoint::report::tables::{hypotheses, next_tests};
 use tapjoint::report::words::diagnosis::{gap_in_short, gap_story};
 use tapjoint::structure::Assembly;
 
-use crate::shared::assert_snapshot;
+use crate::golden::assert_snapshot;
 
 fn damping() -> Hypothesis {
     Hypothesis::Effects(vec![EffectId::JointDamping])
@@ -46,7 +46,7 @@ fn gap_with(verdict: Verdict) -> Document {
     let found = |hypothesis: Hypothesis, probability: f64, shift: f64| HypothesisResult {
         hypothesis,
         probability,
-        gap_before: 2.0,
+        gap_before: Some(2.0),
         gap_after: Some(0.05),
         joint_shift: JointShift {
             kx_percent: Some(shift),
@@ -153,7 +153,7 @@ fn frozen_story_of_a_group_and_of_its_members() {
     let member = |hypothesis: Hypothesis, probability: f64| HypothesisResult {
         hypothesis,
         probability,
-        gap_before: 2.0,
+        gap_before: Some(2.0),
         gap_after: Some(0.05),
         ..HypothesisResult::default()
     };

@@ -12,7 +12,7 @@ use tapjoint::report::{render_json, render_modes_csv, render_parameters_csv, ren
 use tapjoint::structure::Assembly;
 
 use super::{broken, fixture, incomplete, rendered, text_of};
-use crate::shared::assert_snapshot;
+use crate::golden::assert_snapshot;
 
 fn page(document: &Document) -> String {
     text_of(&rendered(document, &fixture::recordings()), "report.html")

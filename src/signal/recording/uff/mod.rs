@@ -217,19 +217,15 @@ const QUANTITIES: [(u32, &str); 16] = [
 ];
 
 /// Type numbers of quantities that are used here.
+pub(super) const UNKNOWN: u32 = 0;
 pub(super) const DISPLACEMENT: u32 = 8;
-
 pub(super) const REACTION_FORCE: u32 = 9;
-
 pub(super) const VELOCITY: u32 = 11;
-
 pub(super) const ACCELERATION: u32 = 12;
-
 pub(super) const EXCITATION_FORCE: u32 = 13;
-
 pub(super) const PRESSURE: u32 = 15;
-
 pub(super) const TIME: u32 = 17;
+pub(super) const FREQUENCY: u32 = 18;
 
 impl Axis {
     /// Quantity of the axis in words; `None` where the file does not say.
@@ -334,7 +330,7 @@ impl Function {
 }
 
 /// Header records of a dataset 58.
-const HEADER_LINES: usize = 11;
+pub(super) const HEADER_LINES: usize = 11;
 
 /// The line with a dataset's type, such as "    58" or "    58b     1     2          11        6408".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -53,7 +53,7 @@ fn sensor(name: &str, position: f64, residues: [f64; 3]) -> SensorEvidence {
 }
 
 /// Value and limit to 1 %, as the sentence rounds them, in the unit.
-fn assert_shown(verdict: &Verdict, [value, limit]: [f64; 2], unit: &str) {
+fn assert_shown(verdict: &QualityVerdict, [value, limit]: [f64; 2], unit: &str) {
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-2;
     assert!(
         verdict.value.is_some_and(|own| near(own, value)),
@@ -111,7 +111,7 @@ fn changed(change: impl FnOnce(&mut RecordingEvidence)) -> RecordingEvidence {
 }
 
 /// The worst verdict of a check.
-fn worst(verdicts: &[Verdict], check: Check) -> Verdict {
+fn worst(verdicts: &[QualityVerdict], check: Check) -> QualityVerdict {
     let of_check = verdicts.iter().filter(|verdict| verdict.check == check);
     of_check
         .max_by_key(|verdict| verdict.outcome)
@@ -119,12 +119,12 @@ fn worst(verdicts: &[Verdict], check: Check) -> Verdict {
         .clone()
 }
 
-fn judged(recording: &RecordingEvidence, check: Check) -> Verdict {
+fn judged(recording: &RecordingEvidence, check: Check) -> QualityVerdict {
     worst(&judge_recording(recording), check)
 }
 
 /// A doubt names its numbers, a cause and a remedy; returns its text.
-fn assert_doubt(verdict: &Verdict, outcome: Outcome, numbers: &[&str]) {
+fn assert_doubt(verdict: &QualityVerdict, outcome: Outcome, numbers: &[&str]) {
     let text = verdict.to_string();
     assert_eq!(verdict.outcome, outcome, "{text}");
     assert!(verdict.value.is_some(), "{text}");
@@ -135,7 +135,7 @@ fn assert_doubt(verdict: &Verdict, outcome: Outcome, numbers: &[&str]) {
     assert!(text.ends_with(verdict.check.remedy()), "{text}");
 }
 
-fn assert_missing(verdict: &Verdict, why: &str) {
+fn assert_missing(verdict: &QualityVerdict, why: &str) {
     let text = verdict.to_string();
     assert_eq!(verdict.outcome, Outcome::NotApplicable, "{text}");
     assert_eq!(verdict.value, None, "{text}");
@@ -566,7 +566,7 @@ fn val_two_levels_and_a_moved_sensor() {
     // No order of levels to follow: what decides is the drift, 0.5 %.
     assert_shown(&soft, [1e-2, 5e-3], "1");
     let moved_mode =
-        |v: &&Verdict| v.check == Check::Linearity && v.to_string().contains("40.00 Hz");
+        |v: &&QualityVerdict| v.check == Check::Linearity && v.to_string().contains("40.00 Hz");
     let same = judge(shifted(2e-5, harder), Check::Linearity);
     assert_eq!(same.outcome, Outcome::Good, "{same}");
     let verdicts = judge_test(&[good(), shifted(2e-5, harder)]);

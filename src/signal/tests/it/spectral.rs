@@ -74,6 +74,12 @@ fn limit_bands_and_blocks_that_do_not_fit_are_refused() {
         baseband(5120.0, 8, 1.0),
         Err(SpectralError::Block { .. })
     ));
+    // Sixteen seconds of which one is signal, and one sample more.
+    assert!(baseband(5120.0, 16 * 5120, 1.0).is_ok());
+    assert!(matches!(
+        baseband(5120.0, 16 * 5120 + 1, 1.0),
+        Err(SpectralError::Padded { .. })
+    ));
 }
 
 #[test]

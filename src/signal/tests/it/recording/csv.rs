@@ -1,8 +1,10 @@
 //! CSV files as people and programs write them.
 
 use tapjoint_signal::recording::{
-    Format, ReadSettings, Recording, STANDARD_GRAVITY, Separator, Timing, channel_unit,
+    Format, ReadSettings, Recording, Separator, Timing, channel_unit,
 };
+
+use tapjoint_numerics::quantity::STANDARD_GRAVITY;
 
 use super::{TestFile, assert_message, file, open, open_error, read_all};
 
@@ -45,7 +47,7 @@ fn channels() -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn every_separator_and_decimal_mark_is_found() {
+fn prop_every_separator_and_decimal_mark_is_found() {
     let cases = [
         (",", ".", Separator::Comma),
         (", ", ".", Separator::Comma),
@@ -77,7 +79,7 @@ fn every_separator_and_decimal_mark_is_found() {
 }
 
 #[test]
-fn what_surrounds_the_numbers_does_not_matter() {
+fn prop_what_surrounds_the_numbers_does_not_matter() {
     let plain = table("time,force,response", ",", ".", "\n");
     let quoted = table("time,force,response", ",", ".", "\n").replace(',', "\",\"");
     let quoted = quoted.trim_end().replace('\n', "\"\n\"");
@@ -118,7 +120,7 @@ fn what_surrounds_the_numbers_does_not_matter() {
 }
 
 #[test]
-fn units_in_the_header_become_si() {
+fn prop_units_in_the_header_become_si() {
     let cases = [
         ("force (kN)", 1e3, Some("N"), "force"),
         ("force [mN]", 1e-3, Some("N"), "force"),
@@ -150,7 +152,7 @@ fn units_in_the_header_become_si() {
 }
 
 #[test]
-fn latin_1_bytes_are_understood() {
+fn prop_latin_1_bytes_are_understood() {
     let text = table("t,acc (m/s?),\u{fc}ber", ",", ".", "\n");
     let bytes: Vec<u8> = text
         .chars()
@@ -163,7 +165,7 @@ fn latin_1_bytes_are_understood() {
 }
 
 #[test]
-fn an_unknown_unit_is_kept_with_a_warning() {
+fn limit_an_unknown_unit_is_kept_with_a_warning() {
     let (_file, recording) = open(table("t,force [tons],b", ",", ".", "\n"));
     let recording = recording.unwrap();
     assert_eq!(recording.channels()[0].scale, 1.0);
@@ -175,7 +177,7 @@ fn an_unknown_unit_is_kept_with_a_warning() {
 }
 
 #[test]
-fn a_scale_beside_a_unit_wins_with_a_warning() {
+fn prop_a_scale_beside_a_unit_wins_with_a_warning() {
     let (_file, recording) = open(table("t,force (kN),b", ",", ".", "\n"));
     let mut recording = recording.unwrap();
     recording.set_scale(0, 2.0).unwrap();
@@ -214,7 +216,7 @@ fn regress_a_scale_that_turns_the_sign_overrules_no_unit() {
 }
 
 #[test]
-fn units_are_told_apart() {
+fn prop_units_are_told_apart() {
     let known = [
         ("N", 1.0, "N"),
         ("mN", 1e-3, "N"),
@@ -238,7 +240,7 @@ fn units_are_told_apart() {
 }
 
 #[test]
-fn the_time_column_is_found_by_name_and_in_its_unit() {
+fn prop_the_time_column_is_found_by_name_and_in_its_unit() {
     // The factor from the printed time to seconds, printed steps of 0.001.
     let cases = [
         ("t", 1000.0),
@@ -282,7 +284,7 @@ fn the_time_column_is_found_by_name_and_in_its_unit() {
 }
 
 #[test]
-fn without_a_time_column_the_rate_must_be_given() {
+fn limit_without_a_time_column_the_rate_must_be_given() {
     let text = table("x,force,response", ",", ".", "\n");
     let message = open_error(&text);
     assert_message(
@@ -308,7 +310,7 @@ fn without_a_time_column_the_rate_must_be_given() {
 }
 
 #[test]
-fn a_given_rate_gives_way_to_the_time_column() {
+fn prop_a_given_rate_gives_way_to_the_time_column() {
     let (_file, recording) = with_rate(table("t,a,b", ",", ".", "\n"), 5120.0);
     assert_eq!(recording.sample_rate(), 1000.0);
     let warnings = recording.warnings();
@@ -320,7 +322,7 @@ fn a_given_rate_gives_way_to_the_time_column() {
 }
 
 #[test]
-fn bad_cells_are_named_by_line_column_and_value() {
+fn limit_bad_cells_are_named_by_line_column_and_value() {
     let good = "time,force,response\n0.000,2,3\n0.001,5,7\n0.002,11,13\n0.003,17,19\n";
     let cases = [
         (
@@ -401,7 +403,7 @@ fn bad_cells_are_named_by_line_column_and_value() {
 }
 
 #[test]
-fn decimal_marks_are_not_mixed() {
+fn limit_decimal_marks_are_not_mixed() {
     let text = "time;a\n0,000;1,5\n0,001;2,5\n0,002;1.234,5\n0,003;2,5\n";
     assert_message(&open_error(text), "tested.dat:4: ", &["\"1.234,5\""]);
     let text = "time;a\n0,000;1,5\n0,001;2,5\n0,002;1.5\n0,003;2,5\n";
@@ -419,7 +421,7 @@ fn decimal_marks_are_not_mixed() {
 }
 
 #[test]
-fn what_holds_no_table_is_refused() {
+fn limit_what_holds_no_table_is_refused() {
     assert_message(
         &open_error("once upon a time\nthere was 1 beam\n"),
         "tested.dat:2: no line of numbers",
@@ -457,7 +459,7 @@ fn what_holds_no_table_is_refused() {
 }
 
 #[test]
-fn a_line_without_end_is_refused_and_not_kept() {
+fn limit_a_line_without_end_is_refused_and_not_kept() {
     let mut text = b"time,a\n0,1\n1,2\n2,3\n".to_vec();
     text.extend(std::iter::repeat_n(b'1', 3 << 20));
     assert_message(
@@ -476,7 +478,7 @@ fn timed(rows: usize, rate: f64, print: impl Fn(f64) -> String) -> String {
 }
 
 #[test]
-fn rounded_times_give_the_exact_rate() {
+fn prop_rounded_times_give_the_exact_rate() {
     let six_digits = |t: f64| {
         // Six significant digits, as many programs print by default.
         let leading = if t > 0.0 { t.log10().floor() as i32 } else { 0 };
@@ -513,7 +515,7 @@ fn rounded_times_give_the_exact_rate() {
 }
 
 #[test]
-fn uneven_sampling_is_named_where_it_happens() {
+fn limit_uneven_sampling_is_named_where_it_happens() {
     let print = |t: f64| format!("{t:.6}");
     let even = timed(3000, 1000.0, print);
     assert_eq!(read_all(&even, "even")[0].len(), 3000);
@@ -548,7 +550,7 @@ fn uneven_sampling_is_named_where_it_happens() {
 }
 
 #[test]
-fn lost_rows_are_counted() {
+fn limit_lost_rows_are_counted() {
     // With three decimals the step is one unit of the last digit, which rounding must not excuse.
     for decimals in [3, 6] {
         let even = timed(3000, 1000.0, |t| format!("{t:.decimals$}"));
@@ -570,7 +572,7 @@ fn lost_rows_are_counted() {
 }
 
 #[test]
-fn rounding_does_not_excuse_what_it_cannot_explain() {
+fn limit_rounding_does_not_excuse_what_it_cannot_explain() {
     // Four decimals at 100 Hz: 0.0001 is 1 % of the step, but no rounding moves one time alone.
     let even = timed(500, 100.0, |t| format!("{t:.4}"));
     let message = open_error(even.replace("\n2.0000,", "\n2.0001,"));
@@ -624,7 +626,7 @@ fn prop_a_range_is_a_slice_of_all_and_blocks_join() {
 }
 
 #[test]
-fn names_that_miss_are_answered_with_what_exists() {
+fn limit_names_that_miss_are_answered_with_what_exists() {
     let (_file, recording) = open(table("time,force (N),response", ",", ".", "\n"));
     let recording = recording.unwrap();
     let error = recording.channel_by_name("forse").expect_err("unknown");

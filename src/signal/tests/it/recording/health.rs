@@ -42,7 +42,7 @@ fn ring_down() -> Vec<f64> {
 }
 
 #[test]
-fn moments_are_those_of_the_definition() {
+fn val_moments_are_those_of_the_definition() {
     // Four numbers: mean 4, deviations -2, -1, 0, 3, squares 14.
     let four = health(vec![2.0, 3.0, 4.0, 7.0]);
     assert_eq!(four.mean, 4.0);
@@ -62,7 +62,7 @@ fn limit_a_large_offset_does_not_spoil_the_rms() {
 }
 
 #[test]
-fn a_clean_ring_down_gives_no_warning() {
+fn prop_a_clean_ring_down_gives_no_warning() {
     let recording = record(ring_down());
     assert!(codes(&recording).is_empty(), "{:?}", recording.warnings());
     let health = &recording.channels()[0].health;
@@ -70,7 +70,7 @@ fn a_clean_ring_down_gives_no_warning() {
 }
 
 #[test]
-fn clipping_is_found_with_place_and_count() {
+fn prop_clipping_is_found_with_place_and_count() {
     let mut samples = ring_down();
     for sample in &mut samples {
         *sample = sample.clamp(-0.8, 2.0);
@@ -101,7 +101,7 @@ fn clipping_is_found_with_place_and_count() {
 }
 
 #[test]
-fn the_list_of_places_is_capped_and_the_count_is_not() {
+fn limit_the_list_of_places_is_capped_and_the_count_is_not() {
     let samples = (0..40_300).map(|at| (TAU * at as f64 / 40.3).sin().clamp(-0.9, 0.9));
     let health = health(samples.collect());
     // A thousand periods with a crest and a trough each. A few may be missed at the beginning, as
@@ -128,7 +128,7 @@ fn limit_a_slow_crest_in_coarse_steps_is_no_clipping() {
 }
 
 #[test]
-fn full_scale_samples_of_an_integer_file_are_counted() {
+fn prop_full_scale_samples_of_an_integer_file_are_counted() {
     let file = file("loud.wav", b"");
     let samples: Vec<f64> = ring_down().iter().map(|x| 1.5 * x).collect();
     let beyond = |x: &&f64| !(-32_767.5 / 32_768.0..32_766.5 / 32_768.0).contains(*x);
@@ -144,7 +144,7 @@ fn full_scale_samples_of_an_integer_file_are_counted() {
 }
 
 #[test]
-fn lost_samples_are_found_as_zeros_and_as_repeated_values() {
+fn prop_lost_samples_are_found_as_zeros_and_as_repeated_values() {
     for held in [None, Some(0.123)] {
         let mut samples = ring_down();
         let value = held.unwrap_or(0.0);
@@ -184,7 +184,7 @@ fn limit_silence_is_no_loss() {
 }
 
 #[test]
-fn a_channel_that_never_moves_is_said_to_be_dead_and_nothing_else() {
+fn limit_a_channel_that_never_moves_is_said_to_be_dead_and_nothing_else() {
     for value in [0.0, 0.25] {
         let recording = record(vec![value; 500]);
         let health = &recording.channels()[0].health;
@@ -195,7 +195,7 @@ fn a_channel_that_never_moves_is_said_to_be_dead_and_nothing_else() {
 }
 
 #[test]
-fn an_offset_is_reported() {
+fn prop_an_offset_is_reported() {
     let samples: Vec<f64> = ring_down().iter().map(|x| x + 0.5).collect();
     let recording = record(samples);
     assert_eq!(codes(&recording), ["offset"]);

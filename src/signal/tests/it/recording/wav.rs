@@ -105,7 +105,7 @@ fn expected(full_scale: f64) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn every_coding_is_read_exactly() {
+fn prop_every_coding_is_read_exactly() {
     let unsigned: Vec<u8> = PRIMES.iter().map(|p| (p + 128) as u8).collect();
     let floats: Vec<u8> = PRIMES
         .iter()
@@ -220,7 +220,7 @@ fn has(warnings: &[RecordingWarning], code: &str, words: &str) -> bool {
 }
 
 #[test]
-fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
+fn prop_integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
     let mut parts = Parts::new(1, 32, integers(4, 0));
     parts.valid = Some(24);
     assert_eq!(
@@ -234,7 +234,7 @@ fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
 }
 
 #[test]
-fn odd_chunks_are_skipped_with_and_without_their_pad_byte() {
+fn prop_odd_chunks_are_skipped_with_and_without_their_pad_byte() {
     for (name, pad) in [("padded", &b"\0"[..]), ("unpadded", b"")] {
         let mut parts = pcm16();
         parts.between = chunk(b"LIST", b"odd");
@@ -244,7 +244,7 @@ fn odd_chunks_are_skipped_with_and_without_their_pad_byte() {
 }
 
 #[test]
-fn chunks_before_and_behind_are_no_samples() {
+fn prop_chunks_before_and_behind_are_no_samples() {
     let mut bytes = pcm16().bytes();
     bytes.extend(chunk(b"LIST", b"INFOsoftware"));
     assert_eq!(read_all(&bytes, "LIST behind"), expected(32768.0));
@@ -272,7 +272,7 @@ fn rf64(magic: &[u8; 4], size: u64) -> Vec<u8> {
 }
 
 #[test]
-fn sixty_four_bit_sizes_are_read() {
+fn prop_sixty_four_bit_sizes_are_read() {
     for magic in [b"RF64", b"BW64"] {
         let bytes = rf64(magic, 24);
         assert_eq!(read_all(&bytes, "RF64"), expected(32768.0));
@@ -282,7 +282,7 @@ fn sixty_four_bit_sizes_are_read() {
 }
 
 #[test]
-fn a_size_left_open_by_a_crash_is_read_to_the_end_with_a_warning() {
+fn prop_a_size_left_open_by_a_crash_is_read_to_the_end_with_a_warning() {
     for size in [0, u32::MAX] {
         let mut parts = pcm16();
         parts.size = Some(size);
@@ -299,7 +299,7 @@ fn a_size_left_open_by_a_crash_is_read_to_the_end_with_a_warning() {
 }
 
 #[test]
-fn a_truncated_file_is_read_as_far_as_it_goes_with_a_warning() {
+fn limit_a_truncated_file_is_read_as_far_as_it_goes_with_a_warning() {
     let bytes = pcm16().bytes();
     // Two bytes of the third frame are left.
     let cut = &bytes[..bytes.len() - 10];
@@ -313,7 +313,7 @@ fn a_truncated_file_is_read_as_far_as_it_goes_with_a_warning() {
 }
 
 #[test]
-fn a_promise_of_terabytes_costs_nothing() {
+fn limit_a_promise_of_terabytes_costs_nothing() {
     let bytes = rf64(b"RF64", 1 << 45);
     let (_file, recording) = open(&bytes);
     let recording = recording.unwrap();
@@ -323,7 +323,7 @@ fn a_promise_of_terabytes_costs_nothing() {
 }
 
 #[test]
-fn what_cannot_be_read_says_why() {
+fn limit_what_cannot_be_read_says_why() {
     let mut a_law = Parts::new(6, 8, vec![0; 12]);
     assert_message(
         &open_error(a_law.bytes()),
@@ -378,7 +378,7 @@ fn what_cannot_be_read_says_why() {
 }
 
 #[test]
-fn a_sample_that_is_no_number_is_named() {
+fn limit_a_sample_that_is_no_number_is_named() {
     let mut data: Vec<u8> = PRIMES
         .iter()
         .flat_map(|p| (*p as f32).to_le_bytes())
@@ -394,7 +394,7 @@ fn a_sample_that_is_no_number_is_named() {
 }
 
 #[test]
-fn other_formats_are_named() {
+fn limit_other_formats_are_named() {
     let cases: [(&str, &[u8]); 7] = [
         ("HDF5", b"\x89HDF\r\n\x1a\n\0\0\0\0"),
         ("MATLAB", b"MATLAB 5.0 MAT-file, Platform: PCWIN64"),
@@ -421,7 +421,7 @@ fn other_formats_are_named() {
 }
 
 #[test]
-fn a_missing_file_is_named() {
+fn limit_a_missing_file_is_named() {
     let error = Recording::open(Path::new("nowhere/tap.wav"), &ReadSettings::default())
         .expect_err("there is no such file");
     assert_message(
@@ -493,7 +493,7 @@ fn prop_blocks_join_to_the_whole() {
 }
 
 #[test]
-fn a_file_that_shrank_is_an_error_and_no_panic() {
+fn limit_a_file_that_shrank_is_an_error_and_no_panic() {
     let (file, _) = long_file();
     let recording = Recording::open(&file.path, &ReadSettings::default()).unwrap();
     let shortened = std::fs::OpenOptions::new()
@@ -533,7 +533,7 @@ fn prop_what_is_written_is_read() {
 }
 
 #[test]
-fn clipped_samples_are_counted_and_stay_at_full_scale() {
+fn prop_clipped_samples_are_counted_and_stay_at_full_scale() {
     let file = file("clipped.wav", b"");
     let channels = vec![vec![1.0, 0.999, -1.0, -1.5, 2.0]];
     // 1.0 is one step above the largest 16-bit integer.
@@ -548,7 +548,7 @@ fn clipped_samples_are_counted_and_stay_at_full_scale() {
 }
 
 #[test]
-fn odd_data_is_padded_to_even_length() {
+fn prop_odd_data_is_padded_to_even_length() {
     let mut cursor = std::io::Cursor::new(Vec::new());
     let samples = vec![vec![0.5, 0.25, 0.125]];
     encode_wav("memory", &mut cursor, 1000, &samples, WavFormat::Pcm24).unwrap();
@@ -560,7 +560,7 @@ fn odd_data_is_padded_to_even_length() {
 }
 
 #[test]
-fn what_cannot_be_written_says_why() {
+fn limit_what_cannot_be_written_says_why() {
     let file = file("bad.wav", b"kept");
     let write = |channels: &[Vec<f64>], rate: u32| {
         write_wav(&file.path, rate, channels, WavFormat::Pcm16)
@@ -581,7 +581,7 @@ fn what_cannot_be_written_says_why() {
 }
 
 #[test]
-fn memory_is_checked_like_a_file() {
+fn prop_memory_is_checked_like_a_file() {
     let channel = |samples: &[f64]| Channel {
         name: Some("force".to_owned()),
         unit: Some("N".to_owned()),
@@ -611,7 +611,7 @@ fn memory_is_checked_like_a_file() {
 }
 
 #[test]
-fn a_given_rate_that_differs_is_ignored_with_a_warning() {
+fn prop_a_given_rate_that_differs_is_ignored_with_a_warning() {
     let file = file("rate.wav", pcm16().bytes());
     let settings = |rate| ReadSettings {
         sample_rate: Some(rate),
@@ -629,7 +629,7 @@ fn a_given_rate_that_differs_is_ignored_with_a_warning() {
 }
 
 #[test]
-fn a_scale_multiplies_samples_and_health() {
+fn prop_a_scale_multiplies_samples_and_health() {
     let (_file, recording) = open(pcm16().bytes());
     let recording = recording.unwrap();
     let before = recording.channels()[1].health.clone();
@@ -656,7 +656,7 @@ fn a_scale_multiplies_samples_and_health() {
 }
 
 #[test]
-fn unknown_channels_are_refused_with_what_exists() {
+fn limit_unknown_channels_are_refused_with_what_exists() {
     let (_file, recording) = open(pcm16().bytes());
     let recording = recording.unwrap();
     assert_eq!(recording.channel_by_number(3).unwrap(), 2);

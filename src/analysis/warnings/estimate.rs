@@ -1,55 +1,20 @@
-//! Warnings: doubts about a measurement, an estimate and what it leaves out of the described test. Each is a sentence
-//! with event, likely cause and remedy.
+//! Doubts about an estimate, its prediction, and what it leaves out of the described test.
 
-use super::results::{
+use super::Warning;
+use crate::results::{
     BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult, exceeds_noise,
 };
-use super::structure::TestedStructure;
+use crate::structure::TestedStructure;
 use std::fmt;
-use std::mem::{swap, take};
 use tapjoint_beam::BeamTheory;
 use tapjoint_description::{FitParameter, SensorDescription, SensorKind, TestDescription, Weights};
 use tapjoint_identify::consistent::{
-    ConsistentEstimate, EstimatedQuantity, Limit, NOTABLE_MISFIT, Quantity, Verdict,
+    ConsistentEstimate, EstimatedQuantity, FitVerdict, Limit, NOTABLE_MISFIT, Quantity,
 };
 use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
 use tapjoint_numerics::stats::times;
-use tapjoint_signal::modal::PeakLabel;
-use tapjoint_signal::spectral::Window;
-
-/// A warning that travels with the result. Displays as event, likely cause and remedy.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Warning {
-    /// Short code that scripts may look for.
-    pub code: &'static str,
-    /// True if it concerns the pair regression alone.
-    pub of_pairs: bool,
-    sentence: String,
-    /// Kind of a doubt that recordings may share: of one kind the worst stands for all. `None` of all else.
-    shared: Option<&'static str>,
-    /// Size by which the worst is chosen.
-    severity: f64,
-    /// The recording and its number, "a.wav: 4.5 %", of a doubt that may be shared.
-    about: String,
-    /// The other recordings and their numbers.
-    others: Vec<String>,
-}
 
 impl Warning {
-    /// A doubt with a short code for scripts.
-    pub fn new(code: &'static str, sentence: impl Into<String>) -> Self {
-        Warning {
-            code,
-            sentence: sentence.into(),
-            ..Warning::default()
-        }
-    }
-
-    /// A doubt about a recording or its search for taps.
-    pub(super) fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
-        Warning::new(code, format!("{file}: {sentence}"))
-    }
-
     /// A doubt about the pair regression alone.
     fn about_pairs(code: &'static str, sentence: impl Into<String>) -> Self {
         Warning {
@@ -66,89 +31,11 @@ impl Warning {
         }
     }
 
-    /// Taps of a recording were rejected.
-    pub(super) fn rejected_taps(file: &str, rejected: usize, total: usize) -> Self {
-        let were = if rejected == 1 { "was" } else { "were" };
-        let text = format!("{rejected} of {total} taps {were} rejected; the list of taps says why");
-        Warning::about(file, "rejected-taps", text)
+    /// The estimated joint has no prediction.
+    pub(crate) fn no_prediction(error: &impl fmt::Display) -> Self {
+        let text = format!("the estimated joint cannot be predicted with: {error}");
+        Warning::new("no-prediction", text)
     }
-
-    /// The response does not ring down in the record: a level relative to the start remains at its end.
-    pub(super) fn not_rung_down(file: &str, remaining: f64, window: Window) -> Self {
-        let percent = 100.0 * remaining;
-        let advice = match window {
-            Window::Exponential { decay } => format!(
-                "an exponential window with a decay of {decay:.3} 1/s was applied to force and response, \
-                 and taken out of every damping read from the spectra (fits take the decays without it); a longer \
-                 block, or taps farther apart where the block reaches to the next tap, need no window"
-            ),
-            _ => "readings on lines suffer from it; leave the window to the program, or give a longer block"
-                .to_owned(),
-        };
-        let text = format!(
-            "at the end of the block the response still has {percent:.1} % of its level (1.0 % is wanted); {advice}"
-        );
-        Warning {
-            shared: Some(window.name()),
-            severity: remaining,
-            about: format!("{file}: {percent:.1} %"),
-            ..Warning::about(file, "not-rung-down", text)
-        }
-    }
-
-    /// A peak was taken for mains hum.
-    pub(super) fn mains(file: &str, frequency: f64, label: PeakLabel) -> Self {
-        let text = format!(
-            "the peak at {frequency:.2} Hz was there before the tap and is taken for {label}, not for a mode; check \
-             the grounding of the sensor cables"
-        );
-        Warning {
-            shared: Some("hum"),
-            about: format!("{file}: {frequency:.2} Hz"),
-            ..Warning::about(file, "mains", text)
-        }
-    }
-
-    /// Peaks were left without a mode; `text` says why.
-    pub(super) fn unpaired(count: usize, text: &str) -> Self {
-        let belong = match count {
-            1 => "peak belongs",
-            _ => "peaks belong",
-        };
-        Warning::new("unpaired", format!("{count} {belong} to no mode: {text}"))
-    }
-}
-
-impl fmt::Display for Warning {
-    /// Writes "... (the same of b.wav: 4.5 %, c.wav: 8.8 %)".
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.sentence)?;
-        match self.others.is_empty() {
-            true => Ok(()),
-            false => write!(f, " (the same of {})", self.others.join(", ")),
-        }
-    }
-}
-
-/// Warnings that differ in their recording and a number alone become one, in the place of the first.
-pub fn together(warnings: Vec<Warning>) -> Vec<Warning> {
-    let mut kept: Vec<Warning> = Vec::new();
-    for mut warning in warnings {
-        let shared = warning.shared;
-        let mut earlier = kept.iter_mut().filter(|_| shared.is_some());
-        let same = earlier.find(|one| (one.code, one.shared) == (warning.code, shared));
-        let Some(earlier) = same else {
-            kept.push(warning);
-            continue;
-        };
-        // The worst stands in front.
-        if warning.severity > earlier.severity {
-            swap(earlier, &mut warning);
-            earlier.others = take(&mut warning.others);
-        }
-        earlier.others.push(warning.about);
-    }
-    kept
 }
 
 /// Another possible cause of a misfit where modes come from several recordings.
@@ -159,7 +46,7 @@ const ALLOWED: &str =
     ": the diagnosis of what is missing allows for a joint that drifts between them";
 
 /// Doubts about the estimates of all methods.
-pub(super) fn of_estimate(
+pub(crate) fn of_estimate(
     structure: &TestedStructure,
     found: &Identification,
     modes: &[ModeResult],
@@ -232,7 +119,7 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
         }
         warnings.push(Warning::new("misfit", text));
     }
-    if found.goodness.verdict == Verdict::Untestable {
+    if found.goodness.verdict == FitVerdict::Untestable {
         warnings.push(Warning::new("untestable", found.goodness.words()));
     }
     for text in found.quantities.iter().filter_map(open_end) {
@@ -274,7 +161,7 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
 /// Returns a warning about the largest notable misfit of a prediction. A notable misfit exceeds the usual effect of a
 /// beam's stated dimensions on its frequencies, and three standard deviations of its reading. A coarse reading may
 /// miss by more than a sharp one and mean less.
-pub(super) fn of_prediction(
+pub(crate) fn of_prediction(
     prediction: &[PredictedMode],
     measured: &[MeasuredMode],
 ) -> Option<Warning> {
@@ -314,7 +201,10 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
     let goodness = &found.goodness;
     let percent = 100.0 * goodness.relative_misfit;
     if goodness.chi_squared.is_none() {
-        let doubtful = matches!(goodness.verdict, Verdict::Doubtful | Verdict::CannotExplain);
+        let doubtful = matches!(
+            goodness.verdict,
+            FitVerdict::Doubtful | FitVerdict::CannotExplain
+        );
         return doubtful.then(|| goodness.words());
     }
     let factor = goodness.uncertainty_factor()?;
@@ -407,7 +297,7 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
 
 /// Effects that estimate and prediction leave out. The pair regression stands beside the consistent
 /// estimate in every report, so that its limits are always listed.
-pub(super) fn neglected_effects(
+pub(crate) fn neglected_effects(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
@@ -576,53 +466,6 @@ fn grams(mass: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn regress_one_is_not_many() {
-        let rejected = |rejected: usize| Warning::rejected_taps("a.wav", rejected, 5);
-        assert!(rejected(1).to_string().contains("1 of 5 taps was rejected"));
-        assert!(
-            rejected(2)
-                .to_string()
-                .contains("2 of 5 taps were rejected")
-        );
-        let unpaired = |count: usize| Warning::unpaired(count, "");
-        assert!(unpaired(1).to_string().starts_with("1 peak belongs to"));
-        assert!(unpaired(4).to_string().starts_with("4 peaks belong to"));
-    }
-
-    #[test]
-    fn regress_what_differs_in_recording_and_number_alone_is_one_warning() {
-        let rings = |file: &str, remaining| {
-            Warning::not_rung_down(file, remaining, Window::Exponential { decay: remaining })
-        };
-        let hum =
-            |file: &str, frequency| Warning::mains(file, frequency, PeakLabel::Mains(frequency));
-        let alone = Warning::about("a.wav", "single-tap", "only one tap was averaged");
-        let all = vec![
-            rings("a.wav", 0.04),
-            hum("a.wav", 50.0),
-            rings("b.wav", 0.10),
-            alone.clone(),
-            hum("b.wav", 150.0),
-            rings("c.wav", 0.05),
-        ];
-        let found = together(all);
-        assert_eq!(found.len(), 3, "{found:?}");
-        let text = found[0].to_string();
-        assert!(
-            text.starts_with("b.wav: ") && text.contains("10.0 %"),
-            "{text}"
-        );
-        assert!(text.contains("0.100 1/s"), "{text}");
-        assert!(
-            text.ends_with("(the same of a.wav: 4.0 %, c.wav: 5.0 %)"),
-            "{text}"
-        );
-        let text = found[1].to_string();
-        assert!(text.ends_with("(the same of b.wav: 150.00 Hz)"), "{text}");
-        assert_eq!(found[2], alone);
-    }
 
     #[test]
     fn regress_no_probability_is_nothing() {

@@ -1,0 +1,233 @@
+//! Warnings: every doubt of the analysis. Each is a sentence with event, likely cause and remedy. The type, the list of
+//! codes and what joins warnings stand here, the sentences in two files: doubts about the measurement and about the
+//! estimate. A new warning is a code in [`WARNING_CODES`], a row of the guide's table, and a constructor.
+
+mod estimate;
+mod measurement;
+
+pub(super) use estimate::{neglected_effects, of_estimate, of_prediction};
+pub(super) use measurement::{of_amplitude, of_quality, of_recording};
+use std::fmt;
+use std::mem::{swap, take};
+
+/// The code of every warning, and when it is given. docs/guide.md shows the same table.
+pub const WARNING_CODES: [(&str, &str); 59] = [
+    // Of the description and of files, by their readers.
+    (
+        "description",
+        "a key or value of the description is doubtful",
+    ),
+    (
+        "right-aligned",
+        "samples of a WAV file fill the low bits of their containers",
+    ),
+    (
+        "unknown-length",
+        "the header of a WAV file gives no valid length",
+    ),
+    ("truncated", "a file holds less than its header promises"),
+    ("header-cut", "a UFF file ends within a header"),
+    (
+        "repeated-place",
+        "two channels of a UFF file have the same place and quantity",
+    ),
+    ("dataset-left-out", "a dataset of a UFF file is left out"),
+    (
+        "rate-rounded",
+        "the steps of a time column scatter around the sample rate",
+    ),
+    (
+        "sample-rate-ignored",
+        "a given sample rate differs from the file's own",
+    ),
+    (
+        "unknown-unit",
+        "the unit of a channel or function is not known",
+    ),
+    (
+        "units-disagree",
+        "label and unit system of a channel do not agree",
+    ),
+    (
+        "scale-over-unit",
+        "a given scale is used instead of the file's unit",
+    ),
+    ("forms-disagree", "axes and unit of a function do not agree"),
+    ("constant-channel", "all samples of a channel are equal"),
+    ("full-scale", "samples lie at full scale"),
+    ("flat-tops", "a channel is flat at its extreme level"),
+    (
+        "dropped-samples",
+        "samples are repeated inside the moving signal",
+    ),
+    ("offset", "the mean of a channel is large beside its peak"),
+    (
+        "hammer-channel",
+        "by its name a response may be the hammer's channel",
+    ),
+    // Of taps and spectra.
+    ("taps", "the search for taps has a remark"),
+    ("rejected-taps", "taps were rejected"),
+    ("single-tap", "only one tap was averaged"),
+    ("taps-too-short", "the taps leave no spectrum"),
+    ("hann-on-taps", "a Hann window was chosen for taps"),
+    (
+        "not-rung-down",
+        "the response does not come to rest within the block",
+    ),
+    ("mains", "a peak was taken for mains hum"),
+    // Of the checks of good practice.
+    (
+        "force-ripple",
+        "the force spectrum ripples, as two blows make it",
+    ),
+    ("tap-levels", "the taps have different levels"),
+    (
+        "force-fall",
+        "the force spectrum falls too far within the band",
+    ),
+    (
+        "force-noise",
+        "the force sinks into its noise within the band",
+    ),
+    ("coherence", "the coherence at a resonance is low"),
+    ("random-error", "the random error at a resonance is large"),
+    (
+        "exponential-window",
+        "the exponential window ends the record, not the structure",
+    ),
+    ("window-damping", "a damping is mostly the window's"),
+    ("frequency-scatter", "a frequency scatters from tap to tap"),
+    (
+        "driving-point",
+        "resonances at the driving point differ in sign",
+    ),
+    (
+        "antiresonance",
+        "antiresonances at the driving point are missing",
+    ),
+    (
+        "reciprocity",
+        "tap and sensor exchanged give another response",
+    ),
+    ("linearity", "a frequency depends on the tap's level"),
+    ("mass-loading", "a frequency depends on the sensors' places"),
+    // Of the numbers of the modes.
+    ("amplitude-dependent", "a mode changes with its amplitude"),
+    ("unpaired", "peaks belong to no mode"),
+    ("missing-mode", "no peak was taken for a mode"),
+    (
+        "ambiguous-pairing",
+        "another numbering of the modes is nearly as probable",
+    ),
+    (
+        "numbered-in-order",
+        "no peak of a free beam lies where one is expected",
+    ),
+    (
+        "unnumbered",
+        "the modes of a recording with other masses have no numbers",
+    ),
+    // Of the estimate.
+    ("neglected", "estimate or prediction leave out an effect"),
+    (
+        "fallback",
+        "a closed form stands in the place of the consistent estimate",
+    ),
+    ("closure", "the pair regression fails its own check"),
+    (
+        "unphysical",
+        "the stiffnesses of the pair regression belong to no joint",
+    ),
+    (
+        "coupling-not-established",
+        "the frequencies do not show a cross coupling",
+    ),
+    ("misfit", "the model does not explain the frequencies"),
+    ("untestable", "nothing can test whether the model fits"),
+    (
+        "at-limit",
+        "a stiffness is at the end of its range, or its interval is open",
+    ),
+    (
+        "flat-direction",
+        "the frequencies leave a combination of parameters open",
+    ),
+    (
+        "other-minimum",
+        "another joint comes near the same frequencies",
+    ),
+    ("not-converged", "the search for the best joint did not end"),
+    ("no-prediction", "the estimated joint has no prediction"),
+    ("prediction-error", "the prediction misses a mode notably"),
+];
+
+/// A warning that travels with the result. Displays as event, likely cause and remedy.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Warning {
+    /// Short code that scripts may look for.
+    pub code: &'static str,
+    /// True if it concerns the pair regression alone.
+    pub of_pairs: bool,
+    sentence: String,
+    /// Kind of a doubt that recordings may share: of one kind the worst stands for all. `None` of all else.
+    shared: Option<&'static str>,
+    /// Size by which the worst is chosen.
+    severity: f64,
+    /// The recording and its number, "a.wav: 4.5 %", of a doubt that may be shared.
+    about: String,
+    /// The other recordings and their numbers.
+    others: Vec<String>,
+}
+
+impl Warning {
+    /// A doubt with a code of [`WARNING_CODES`].
+    pub fn new(code: &'static str, sentence: impl Into<String>) -> Self {
+        debug_assert!(
+            WARNING_CODES.iter().any(|(known, _)| *known == code),
+            "the list of codes lacks {code}"
+        );
+        Warning {
+            code,
+            sentence: sentence.into(),
+            ..Warning::default()
+        }
+    }
+
+    /// A doubt about a recording or its search for taps.
+    fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
+        Warning::new(code, format!("{file}: {sentence}"))
+    }
+}
+
+impl fmt::Display for Warning {
+    /// Writes "... (the same of b.wav: 4.5 %, c.wav: 8.8 %)".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.sentence)?;
+        match self.others.is_empty() {
+            true => Ok(()),
+            false => write!(f, " (the same of {})", self.others.join(", ")),
+        }
+    }
+}
+
+/// Warnings that differ in their recording and a number alone become one, in the place of the first.
+pub fn together(warnings: Vec<Warning>) -> Vec<Warning> {
+    let mut kept: Vec<Warning> = Vec::new();
+    for mut warning in warnings {
+        let shared = warning.shared;
+        let mut earlier = kept.iter_mut().filter(|_| shared.is_some());
+        let same = earlier.find(|one| (one.code, one.shared) == (warning.code, shared));
+        let Some(earlier) = same else {
+            kept.push(warning);
+            continue;
+        };
+        // The worst stands in front.
+        if warning.severity > earlier.severity {
+            swap(earlier, &mut warning);
+            earlier.others = take(&mut warning.others);
+        }
+        earlier.others.push(warning.about);
+    }
+    kept
+}

@@ -78,9 +78,12 @@ impl OutputFile {
     /// The file cannot be written.
     pub(super) fn prepare(path: &Path) -> anyhow::Result<Self> {
         // A link stays a link: what it points to is replaced, or made.
-        let folder = folder_of(path);
-        let path = resolved(path).map_err(|cause| not_writable(path, folder, &cause))?;
-        let (folder, shown) = (folder_of(&path), path.display());
+        let given = path;
+        let path =
+            resolved(given).map_err(|cause| not_writable(given, folder_of(given), &cause))?;
+        // A message speaks of the name as it was given; of a link, of what it leads to.
+        let named = if given.is_symlink() { &path } else { given };
+        let (folder, shown) = (folder_of(&path), named.display());
         let target = match fs::metadata(&path) {
             Ok(found) if found.is_dir() => {
                 bail!("{shown}: is a folder, but a file is needed; choose another name")
@@ -95,7 +98,7 @@ impl OutputFile {
             Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(cause),
             _ => TemporaryFile::make_in(folder).map(|file| Target::Aside(file, state_of(&path))),
         };
-        let target = target.map_err(|cause| not_writable(&path, folder, &cause))?;
+        let target = target.map_err(|cause| not_writable(named, folder_of(named), &cause))?;
         Ok(Self { path, target })
     }
 

@@ -245,9 +245,12 @@ impl OutputFolder {
     fn write_journal(&self, stale: Vec<String>) -> io::Result<Journal> {
         let stale = stale.into_iter().map(PathBuf::from);
         let stale = stale.filter(|name| !self.filled().join(name).exists());
+        let mut moves = moves(&self.staging.path().join(NEW), &self.target.base)?;
+        // The old list of checksums stays until the last, since it says which old files may be replaced.
+        moves.sort_by_key(|name| name.ends_with(CHECKSUMS));
         let journal = Journal {
             stale: stale.map(|name| self.target.rest.join(name)).collect(),
-            moves: moves(&self.staging.path().join(NEW), &self.target.base)?,
+            moves,
         };
         journal.write(self.staging.path())?;
         Ok(journal)

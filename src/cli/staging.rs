@@ -186,15 +186,17 @@ impl Staging {
     /// # Errors
     /// The folder cannot be made, or belongs to another user.
     pub(super) fn make(path: &Path) -> io::Result<Option<Self>> {
+        let mut last = Ok(None);
         for _ in 0..TRIALS {
-            match Self::try_make(path) {
+            last = Self::try_make(path);
+            match &last {
                 // Another process has it, or has just swept it.
                 Ok(None) => thread::sleep(PAUSE),
                 Err(cause) if cause.kind() == io::ErrorKind::NotFound && folder_is_there(path) => {}
-                found => return found,
+                _ => break,
             }
         }
-        Ok(None)
+        last
     }
 
     fn try_make(path: &Path) -> io::Result<Option<Self>> {

@@ -302,7 +302,7 @@ fn regress_a_block_of_zeros_for_the_most_part_is_refused() {
     let error = error.unwrap_err().to_string();
     assert!(error.contains("the rest would be zeros"), "{error}");
     let found = measure_bare(one_tap(5.0), Some(&hammer), |settings| {
-        settings.block = Some(100_000);
+        settings.block = Some(10_000);
     });
     assert!(found.unwrap().measurement.spectra.is_some());
 }

@@ -26,7 +26,7 @@ ADDRESS_SPACE = 100 << 30
 
 def expanded(value):
     """The value that a word of the table stands for."""
-    value = value.replace("@digits", "9" * 309)
+    value = value.removeprefix("~").replace("@digits", "9" * 309)
     for word, divided in (("@ascending:", False), ("@fractions:", True)):
         if value.startswith(word):
             count = int(value.removeprefix(word))
@@ -48,7 +48,10 @@ def rows():
 
 
 def measured(program, words, folder):
-    """Seconds, megabytes and exit code of one run; its process alone is measured."""
+    """Seconds, megabytes and exit code of one run; its process alone is measured.
+
+    The seconds are the smaller of wall time and processor time: on a busy machine the wall time is that of others.
+    """
     start = time.monotonic()
     process = subprocess.Popen(
         [program, *words],
@@ -69,7 +72,8 @@ def measured(program, words, folder):
         else:
             time.sleep(0.002)
     process.returncode = os.waitstatus_to_exitcode(status)
-    return time.monotonic() - start, used.ru_maxrss / 1000, process.returncode
+    seconds = min(time.monotonic() - start, used.ru_utime + used.ru_stime)
+    return seconds, used.ru_maxrss / 1000, process.returncode
 
 
 def main():

@@ -111,16 +111,38 @@ pub(super) struct RecordingArguments {
 }
 
 impl RecordingArguments {
-    /// Opens a recording.
+    /// Opens a recording that has the hammer's channel.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
         let settings = ReadSettings {
             sample_rate: self.sample_rate,
         };
         let recording = Recording::open(path, &settings)?;
+        if let Some(hammer) = &self.hammer {
+            channel_of(&recording, "--hammer", hammer)?;
+        }
         // Errors name the whole path, tables the file.
         let name = path.file_name().unwrap_or(path.as_os_str());
         Ok(recording.renamed(name.to_string_lossy()))
     }
+}
+
+/// Returns the channel (0-based) that an option names.
+///
+/// # Errors
+/// No such channel, or several of that name. The message names the option.
+pub(super) fn channel_of(
+    recording: &Recording,
+    option: &str,
+    channel: &ChannelRef,
+) -> Result<usize, RecordingError> {
+    let found = match channel {
+        ChannelRef::Number(number) => recording.channel_by_number(*number),
+        ChannelRef::Name(name) => recording.channel_by_name(name),
+    };
+    found.map_err(|problem| RecordingError::Unusable {
+        place: option.to_owned(),
+        problem: problem.to_string(),
+    })
 }
 
 fn sample_rate(text: &str) -> Result<f64, String> {
@@ -290,6 +312,10 @@ fn number(
     }
 }
 
+/// Least stiffness of a joint that holds a beam (non-dimensional). Below it, the lowest modes are those of a free
+/// body, and their frequencies drown in rounding.
+const LEAST_STIFFNESS: f64 = 1e-6;
+
 /// A joint that replaces the described one.
 #[derive(Debug, Args)]
 pub(super) struct StiffnessArguments {
@@ -332,6 +358,29 @@ impl StiffnessArguments {
             ));
         }
         Ok(Some(JointStiffness::three_parameter(kx, ky, kz)))
+    }
+
+    /// As [`Self::given`], of a joint that holds the beam.
+    ///
+    /// # Errors
+    /// Those of [`Self::given`]; a stiffness below [`LEAST_STIFFNESS`] or above `most`.
+    pub(super) fn given_within(
+        &self,
+        kind: Assembly,
+        most: f64,
+    ) -> anyhow::Result<Option<JointStiffness>> {
+        for (name, value) in [("--kx", self.kx), ("--ky", self.ky)] {
+            let Some(value) = value.filter(|value| *value < LEAST_STIFFNESS || *value > most)
+            else {
+                continue;
+            };
+            let end = match most.is_finite() {
+                true => "and finite",
+                false => "or \"inf\"",
+            };
+            bail!("{name} {value:?}: give a number from {LEAST_STIFFNESS:?} on, {end}");
+        }
+        self.given(kind)
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::Outcome;
 use super::arguments::{
-    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form, sensor_kind,
+    RecordingArguments, SpectrumSettings, channel_of, channel_scale, estimator, response_form,
+    sensor_kind,
 };
 use super::input::{TestFile, check_file, is_description, read_test, stem};
 use super::output::OutputFile;
@@ -16,7 +17,7 @@ use tapjoint::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDe
 use tapjoint::pipeline::{
     Analysis, Frf, FrfSettings, IdentifySettings, Response, Wiring, frfs_of, run_wired, si_unit,
 };
-use tapjoint::recording::{Recording, RecordingError, UffFormat};
+use tapjoint::recording::{Recording, UffFormat};
 use tapjoint::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
 use tapjoint::spectral::FrfEstimator;
 
@@ -242,7 +243,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
 /// Channels that do not exist or are named twice, scales that do not fit them, an impossible analysis.
 fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::Result<Analysis> {
     let mut recording = arguments.recording.open(&arguments.file)?;
-    let hammer = channel_index(&recording, hammer)?;
+    let hammer = channel_of(&recording, "--hammer", hammer)?;
     let channels = sensor_channels(&recording, hammer, &arguments.sensor)?;
     let scales = &arguments.scale_sensor;
     if !matches!(scales.len(), 0 | 1) && scales.len() != channels.len() {
@@ -290,13 +291,6 @@ fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::R
     })?)
 }
 
-fn channel_index(recording: &Recording, channel: &ChannelRef) -> Result<usize, RecordingError> {
-    match channel {
-        ChannelRef::Number(number) => recording.channel_by_number(*number),
-        ChannelRef::Name(name) => recording.channel_by_name(name),
-    }
-}
-
 /// Returns the channels of the sensors; without any, all channels but the hammer's.
 fn sensor_channels(
     recording: &Recording,
@@ -305,7 +299,7 @@ fn sensor_channels(
 ) -> anyhow::Result<Vec<usize>> {
     let mut channels: Vec<usize> = Vec::new();
     for sensor in sensors {
-        let channel = channel_index(recording, sensor)?;
+        let channel = channel_of(recording, "--sensor", sensor)?;
         if channel == hammer || channels.contains(&channel) {
             bail!(
                 "{}: channel {sensor} is named twice; give the hammer and every sensor a channel of its own",

@@ -172,7 +172,9 @@ pub(super) fn run(
     }
     let file = read_test(&arguments.test, &terminal)?;
     let structure = tested_structure(&file.test);
-    let given = arguments.stiffness.given(file.test.joint.kind)?;
+    let given = arguments
+        .stiffness
+        .given_within(file.test.joint.kind, f64::INFINITY)?;
     let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
     let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
     let joint = match given {

@@ -430,35 +430,35 @@ pub(super) struct LaboratoryArguments {
     #[arg(long, value_parser = tip())]
     tip: Option<Tip>,
     /// Peak force of a tap (N), multiplied by each recording's `level`; default: 20
-    #[arg(long, value_name = "N", value_parser = force)]
+    #[arg(long, value_name = "N", value_parser = within(Dimension::Force, 1e-6, 1e6))]
     level: Option<f64>,
     /// Noise of sensors and hammer relative to that of good ones; default: 1
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = within(Dimension::Ratio, 0.0, 1e9))]
     noise: Option<f64>,
     /// Share of the taps that strike twice; default: 0
-    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    #[arg(long, value_name = "SHARE", value_parser = within(Dimension::Ratio, 0.0, 1.0))]
     double_hits: Option<f64>,
     /// Share of the taps that are far too weak; default: 0
-    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    #[arg(long, value_name = "SHARE", value_parser = within(Dimension::Ratio, 0.0, 1.0))]
     weak_hits: Option<f64>,
     /// Quiet time before the first tap (s); default: 0.5
     #[arg(long, value_name = "S", value_parser = seconds)]
     lead: Option<f64>,
     /// Relative error of the recorder's clock, positive = frequencies are read too high; default: 5e-6
-    #[arg(long, value_name = "X", value_parser = ratio, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = within(Dimension::Ratio, -0.5, 0.5), allow_negative_numbers = true)]
     clock_error: Option<f64>,
     /// Resonance frequency of a mounted accelerometer (Hz), up to 100000, 0 = none; default: 18000
-    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    #[arg(long, value_name = "HZ", value_parser = within(Dimension::Frequency, 0.0, 1e5))]
     mounting: Option<f64>,
     /// Mains frequency (Hz); default: 50
-    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    #[arg(long, value_name = "HZ", value_parser = within(Dimension::Frequency, 0.0, 1e5))]
     mains: Option<f64>,
     /// Damping ratio of each mode. The last one applies to all higher modes; default:
     /// 0.4%,0.3%,0.25%,0.2%
-    #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = ratio, conflicts_with = "rayleigh")]
+    #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = within(Dimension::Ratio, 0.0, 1.0), conflicts_with = "rayleigh")]
     damping: Vec<f64>,
     /// Damping proportional to mass (1/s) and stiffness (s), instead of --damping
-    #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',')]
+    #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',', value_parser = within(Dimension::Ratio, 0.0, 1e6))]
     rayleigh: Vec<f64>,
 }
 
@@ -600,16 +600,19 @@ fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
     parse_quantity(text, dimension).map_err(|error| error.to_string())
 }
 
-fn ratio(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Ratio)
-}
-
-fn force(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Force)
-}
-
-fn frequency(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Frequency)
+/// Returns the parser of a quantity between these limits (SI).
+fn within(
+    dimension: Dimension,
+    lowest: f64,
+    highest: f64,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let value = quantity(text, dimension)?;
+        match (lowest..=highest).contains(&value) {
+            true => Ok(value),
+            false => Err(format!("give a number from {lowest} to {highest}")),
+        }
+    }
 }
 
 /// Parses a time of at most a day.

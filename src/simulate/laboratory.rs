@@ -243,7 +243,7 @@ pub enum SimulateError {
         needed: f64,
     },
     /// A setting of the laboratory outside its range.
-    #[error("{quantity} is {value}, but must lie between {lowest} and {highest}")]
+    #[error("{quantity} is {value:?}, but must lie between {lowest} and {highest}")]
     Setting {
         /// Name of the number.
         quantity: &'static str,

@@ -56,7 +56,8 @@ fn limit_every_numeric_argument_is_bounded() {
         let columns: Vec<&str> = line.split('\t').collect();
         let [command, argument, rest, accepted, refused] = columns.try_into().unwrap();
         for (values, is_accepted) in [(accepted, true), (refused, false)] {
-            let values = values.split(' ');
+            // Values with a tilde take seconds: scripts/budgets.py tries them.
+            let values = values.split(' ').filter(|value| !value.starts_with('~'));
             runs.extend(values.map(|value| (command, argument, rest, value, is_accepted)));
         }
     }

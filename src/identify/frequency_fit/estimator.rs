@@ -2,8 +2,8 @@
 
 use super::model::{FrequencyModel, JointedStructure, Parameter, Point};
 use super::problem::{
-    Covariance, Datum, Evaluation, FULL, MISFIT, Minimum, Prior, Problem, ROUGH, along, everywhere,
-    promising, within_bounds,
+    Covariance, Datum, Evaluation, FOLLOWED, FULL, MISFIT, Minimum, Prior, Problem, REPEATED,
+    ROUGH, along, everywhere, promising, within_bounds,
 };
 use super::{ConsistentSettings, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use tapjoint_beam::interface::LAST_STEP;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_numerics::least_squares::StopReason;
+use tapjoint_numerics::least_squares::{Settings, StopReason};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
@@ -49,6 +49,8 @@ pub struct PointFit {
 pub struct Neighbourhood {
     pub(super) model: Option<FrequencyModel>,
     pub(super) starts: Vec<Point>,
+    /// Norm of the standardised residuals at each start, the smallest first; all zero where it is not known.
+    norms: Vec<f64>,
 }
 
 impl Neighbourhood {
@@ -57,7 +59,21 @@ impl Neighbourhood {
         Self {
             model: None,
             starts: starts.to_vec(),
+            norms: vec![0.0; starts.len()],
         }
+    }
+
+    /// Returns the starts that can lead to the deepest minimum once the data have moved by this norm (standard
+    /// deviations).
+    ///
+    /// The norm of the residuals changes nowhere by more than the data move. Of two minima that are more than twice
+    /// as far apart, the deeper one stays the deeper. A valley without a floor has minima without number: the
+    /// deepest [`FOLLOWED`] stand for them.
+    fn starts_after(&self, moved: f64) -> Vec<Point> {
+        let least = self.norms.first().copied().unwrap_or(0.0);
+        let starts = self.starts.iter().zip(&self.norms);
+        let near = starts.filter(|(_, norm)| **norm <= least + 2.0 * moved);
+        near.map(|(point, _)| *point).take(FOLLOWED).collect()
     }
 }
 
@@ -182,6 +198,10 @@ impl ConsistentEstimator {
         Neighbourhood {
             model,
             starts: minima.iter().map(|minimum| minimum.state.point).collect(),
+            norms: minima
+                .iter()
+                .map(|minimum| minimum.state.cost.sqrt())
+                .collect(),
         }
     }
 
@@ -189,7 +209,17 @@ impl ConsistentEstimator {
     /// neighbourhood, renewed where the beam moves far from it.
     pub fn refit(&self, frequencies: &[f64], near: &Neighbourhood) -> PointFit {
         let model = near.model.as_ref().unwrap_or(&self.model);
-        let minima = self.minima(&self.problem(model, frequencies), &near.starts);
+        let moved = match self.settings.weights {
+            ResidualWeights::Measured => {
+                let read = self.modes.iter().zip(frequencies);
+                let moves = read.filter_map(|(mode, f)| Some((f - mode.frequency) / mode.std?));
+                moves.map(|moved| moved * moved).sum::<f64>().sqrt()
+            }
+            // The weights move with the data: no norm says how far the minima do.
+            ResidualWeights::Relative => f64::INFINITY,
+        };
+        let starts = near.starts_after(moved);
+        let minima = self.minima(&self.problem(model, frequencies), &starts, &REPEATED);
         self.deepest(self.renew(model, frequencies, minima).1)
     }
 
@@ -296,7 +326,7 @@ impl ConsistentEstimator {
         let problem = self.problem(&self.model, frequencies);
         let mut starts = promising(&problem, &self.base, &self.settings.fit);
         starts.extend(self.pairs_guess(&problem));
-        let mut minima = self.minima(&problem, &starts);
+        let mut minima = self.minima(&problem, &starts, &FULL);
         // A fit this good leaves no room for another minimum: below three times the expected misfit or, without
         // stated uncertainties, below the error of any reading.
         const READING: f64 = 1e-4;
@@ -308,7 +338,7 @@ impl ConsistentEstimator {
         if minima.first().is_none_or(|best| best.state.cost >= enough) {
             let mut all = everywhere(&self.base, &self.settings.fit);
             all.extend(minima.iter().map(|minimum| minimum.state.point));
-            minima = self.minima(&problem, &all);
+            minima = self.minima(&problem, &all, &FULL);
         }
         self.renew(&self.model, frequencies, minima)
     }
@@ -334,7 +364,7 @@ impl ConsistentEstimator {
                 break;
             };
             let starts: Vec<Point> = minima.iter().map(|minimum| minimum.state.point).collect();
-            minima = self.minima(&self.problem(&built, frequencies), &starts);
+            minima = self.minima(&self.problem(&built, frequencies), &starts, &FULL);
             renewed = Some(built);
         }
         (renewed, minima)
@@ -369,8 +399,8 @@ impl ConsistentEstimator {
         usable.then(|| within_bounds(guess))
     }
 
-    /// Follows every start down roughly, keeps different minima, and finishes each.
-    fn minima(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
+    /// Follows every start down roughly, keeps different minima, and finishes each by these settings.
+    fn minima(&self, problem: &Problem<'_>, starts: &[Point], settings: &Settings) -> Vec<Minimum> {
         let directions = self.directions();
         // A last step of 1e-4 leaves 1e-8: enough to tell minima apart, and half the work.
         let rough = Problem {
@@ -387,7 +417,7 @@ impl ConsistentEstimator {
         let mut minima: Vec<Minimum> = Vec::new();
         for rough in found {
             let guesses = rough.guesses_at(&rough.point);
-            let end = problem.minimise(&rough.point, &guesses, &directions, &FULL);
+            let end = problem.minimise(&rough.point, &guesses, &directions, settings);
             let Some(end) = end else { continue };
             let known = (minima.iter_mut()).find(|known| self.is_same(&known.state, &end.state));
             match known {
@@ -495,17 +525,21 @@ impl ConsistentEstimator {
         let mut found = Vec::with_capacity(count);
         for _ in 0..count {
             let mut problem = stated.clone();
+            let mut moved: f64 = 0.0;
             let read = problem.data.iter_mut().zip(errors);
             for ((datum, (mean, std)), error) in read.zip(&mut normal) {
                 let error: f64 = error;
                 datum.frequency = mean + std * error;
+                moved = moved.hypot(std * error / datum.std);
             }
             // A stated property of the beam is a reading too, with its own error.
             for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {
                 prior.value += prior.std * error;
+                moved = moved.hypot(error);
             }
             if problem.data.iter().all(|datum| datum.frequency > 0.0) {
-                let best = self.minima(&problem, &near.starts).into_iter().next();
+                let starts = near.starts_after(moved);
+                let best = self.minima(&problem, &starts, &REPEATED).into_iter().next();
                 let converged = best.filter(|best| best.stop.converged());
                 found.extend(converged.map(|best| self.stiffnesses_at(&best.state.point)));
             }

@@ -29,6 +29,10 @@ pub(super) const FULL: Settings = Settings {
     polish: false,
 };
 
+/// Settings of repetitions, which start beside their end: a dozen steps do. More lead along a valley without a floor,
+/// and such a repetition counts as one without an answer.
+pub(super) const REPEATED: Settings = Settings { steps: 50, ..FULL };
+
 /// Settings where only the size of the misfit is wanted: its error is the gain.
 pub(super) const MISFIT: Settings = Settings {
     steps: 60,
@@ -322,7 +326,7 @@ const COUPLINGS: [f64; 3] = [-1.0, 0.0, 1.0];
 /// Factors of the stiffness or mass of the beam where one of them is estimated.
 const BEAM_FACTORS: [f64; 3] = [1.0, 0.75, 1.33];
 /// So many of the most promising joints are followed down.
-const FOLLOWED: usize = 4;
+pub(super) const FOLLOWED: usize = 4;
 
 /// Joints that are tried on one beam.
 struct Grid {

@@ -109,6 +109,8 @@ pub(super) fn check_file(path: &Path) -> anyhow::Result<()> {
 fn readable_file(path: &Path) -> Result<(), String> {
     match fs::metadata(path) {
         Ok(found) if found.is_dir() => Err("it is a folder".to_owned()),
+        // A pipe that is opened and closed would lose its writer.
+        Ok(found) if !found.is_file() => Ok(()),
         Ok(_) => fs::File::open(path)
             .map(drop)
             .map_err(|error| error.to_string()),

@@ -115,8 +115,7 @@ pub(super) fn main() -> ExitCode {
         Ok(parsed) => parsed,
         Err(usage) => {
             let usage = program::with_suggestion(usage, &CommandLine::command());
-            // Help whose reader stops early (`tapjoint --help | head`) is no error.
-            let _ = usage.print();
+            terminal::print_usage(&usage);
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
         }
     };

@@ -54,10 +54,7 @@ impl Terminal {
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             return Ok(());
         }
-        // Any value of NO_COLOR (no-color.org) turns colours off, and so does a terminal without them.
-        let unwanted = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-        let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        if io::stdout().is_terminal() && !unwanted && !dumb {
+        if io::stdout().is_terminal() && has_colours() {
             return print(&coloured(text));
         }
         print(text)
@@ -172,6 +169,13 @@ fn coloured(text: &str) -> String {
     lines.collect()
 }
 
+/// Any value of NO_COLOR (no-color.org) turns colours off, and so does a terminal without them.
+fn has_colours() -> bool {
+    let unwanted = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+    !unwanted && !dumb
+}
+
 fn print(text: &str) -> io::Result<()> {
     let end = if text.ends_with('\n') { "" } else { "\n" };
     let mut out = io::stdout().lock();
@@ -200,7 +204,41 @@ pub(super) fn print_error(error: &anyhow::Error) {
         text.push_str("; written all the same: ");
         text.push_str(&names.join(", "));
     }
-    let _ = writeln!(io::stderr(), "error: {text}");
+    let _ = writeln!(io::stderr(), "error: {}", shortened(&text));
+}
+
+/// Prints the error of a wrong command line, or the help that was asked for.
+pub(super) fn print_usage(usage: &clap::Error) {
+    if !usage.use_stderr() {
+        // Help whose reader stops early (`tapjoint --help | head`) is no error.
+        let _ = usage.print();
+        return;
+    }
+    let text = usage.render();
+    let text = match io::stderr().is_terminal() && has_colours() {
+        true => text.ansi().to_string(),
+        false => text.to_string(),
+    };
+    let _ = write!(io::stderr(), "{}", shortened(&text));
+}
+
+/// Replaces numbers of more than 40 digits by their beginning and the count of their digits.
+fn shortened(text: &str) -> String {
+    const MOST_DIGITS: usize = 40;
+    const KEPT: usize = 8;
+    let mut short = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
+        let tail = &rest[start..];
+        let digits = tail.bytes().take_while(u8::is_ascii_digit).count();
+        let kept = if digits > MOST_DIGITS { KEPT } else { digits };
+        short.push_str(&rest[..start + kept]);
+        if kept < digits {
+            short.push_str(&format!("... ({digits} digits)"));
+        }
+        rest = &tail[digits..];
+    }
+    short + rest
 }
 
 /// Time before the line appears: shorter work shows nothing.
@@ -258,6 +296,15 @@ fn show(doing: &str, ended: &Receiver<()>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn limit_long_numbers_are_shortened() {
+        let nines = "9".repeat(309);
+        let text = format!("a {nines} b 1{} c 12", "0".repeat(39));
+        let short = format!("a 99999999... (309 digits) b 1{} c 12", "0".repeat(39));
+        assert_eq!(shortened(&text), short);
+        assert_eq!(shortened("no number"), "no number");
+    }
 
     #[test]
     fn prop_colours_change_no_word() {

@@ -228,7 +228,12 @@ pub(super) fn number(value: Option<f64>) -> String {
         .unwrap_or_default()
 }
 
-/// Returns rows below a line of heads.
+/// Returns true for a cell that a spreadsheet would take for a formula. Numbers may begin with a sign.
+fn is_formula(cell: &str) -> bool {
+    cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err()
+}
+
+/// Returns rows below a line of heads. A text that a spreadsheet would take for a formula gets an apostrophe before it.
 pub(super) fn write(
     heads: &str,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -237,6 +242,10 @@ pub(super) fn write(
     let heads = heads.split(',');
     writer.write_record(heads).map_err(ReportError::Csv)?;
     for row in rows {
+        let row = row.into_iter().map(|cell| match is_formula(&cell) {
+            true => format!("'{cell}"),
+            false => cell,
+        });
         writer.write_record(row).map_err(ReportError::Csv)?;
     }
     let bytes = writer
@@ -292,5 +301,45 @@ fn point(name: &str, node: i64) -> Point {
         name: Some(name.to_owned()),
         node,
         direction: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limit_no_cell_is_a_formula() {
+        let cells = [
+            "=HYPERLINK(1)",
+            "+A1",
+            "-A1",
+            "@A1",
+            "-1.5",
+            "+2",
+            "A=1",
+            "",
+        ];
+        let text = write(
+            "name,other",
+            cells.map(|cell| vec![cell.to_owned(), String::new()]),
+        )
+        .unwrap();
+        let first: Vec<&str> = text
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').next().unwrap())
+            .collect();
+        let expected = [
+            "'=HYPERLINK(1)",
+            "'+A1",
+            "'-A1",
+            "'@A1",
+            "-1.5",
+            "+2",
+            "A=1",
+            "",
+        ];
+        assert_eq!(first, expected);
     }
 }

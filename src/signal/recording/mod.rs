@@ -223,6 +223,12 @@ impl Recording {
         if let Some(value) = settings.sample_rate {
             check_rate(&file, value)?;
         }
+        // Reading starts anew several times, which only a file allows; and a pipe without a writer would wait for ever.
+        let kind = std::fs::metadata(path).map(|found| found.file_type());
+        if kind.is_ok_and(|kind| !kind.is_file() && !kind.is_dir()) {
+            let problem = "is a pipe or a device; save its contents to a file and give that file";
+            return Err(RecordingError::new(&file, problem));
+        }
         match recognise(path, &file)? {
             FileType::Wav => wav::open_wav(path, file, settings),
             FileType::Text => csv::open_csv(path, file, settings),

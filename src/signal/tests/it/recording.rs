@@ -7,6 +7,7 @@ mod real;
 mod wav;
 
 use crate::written::{TestFile, file};
+use std::path::Path;
 use tapjoint_signal::recording::{ReadSettings, Recording, RecordingError};
 
 /// Opens bytes as a recording.
@@ -52,4 +53,14 @@ pub fn assert_message(message: &str, start: &str, parts: &[&str]) {
     for part in parts {
         assert!(message.contains(part), "{message:?} should hold {part:?}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn limit_pipes_and_devices_are_no_recordings() {
+    let opened = Recording::open(Path::new("/dev/null"), &ReadSettings::default());
+    assert_eq!(
+        opened.unwrap_err().to_string(),
+        "/dev/null: is a pipe or a device; save its contents to a file and give that file"
+    );
 }

@@ -11,7 +11,7 @@ use tapjoint::description::{
 };
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
 use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::recording::{ReadSettings, Recording, RecordingError};
+use tapjoint::recording::{ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns};
 use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
 
@@ -108,15 +108,27 @@ pub(super) struct RecordingArguments {
     /// Sample rate of a CSV file without a time column, such as 5120 or "51.2 kHz" (Hz)
     #[arg(long, value_name = "HZ", value_parser = sample_rate)]
     pub(super) sample_rate: Option<f64>,
+    /// Unit of a time column without a unit in its heading; default: s
+    #[arg(long, value_name = "UNIT", value_parser = time_unit())]
+    pub(super) time_unit: Option<f64>,
+    /// Columns of a text file of functions; default: by headings and numbers
+    #[arg(long, value_name = "COLUMNS", value_parser = value_columns())]
+    pub(super) values: Option<ValueColumns>,
 }
 
 impl RecordingArguments {
+    /// Returns the settings of the readers.
+    pub(super) fn settings(&self) -> ReadSettings {
+        ReadSettings {
+            sample_rate: self.sample_rate,
+            time_unit: self.time_unit,
+            values: self.values,
+        }
+    }
+
     /// Opens a recording.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
-        let settings = ReadSettings {
-            sample_rate: self.sample_rate,
-        };
-        let recording = Recording::open(path, &settings)?;
+        let recording = Recording::open(path, &self.settings())?;
         // Errors name the whole path, tables the file.
         let name = path.file_name().unwrap_or(path.as_os_str());
         Ok(recording.renamed(name.to_string_lossy()))
@@ -373,6 +385,20 @@ pub(super) fn reading() -> impl TypedValueParser<Value = ReadBy> {
         "Take the highest spectral line, with the half-line bound",
     ];
     words(READINGS, help)
+}
+
+fn time_unit() -> impl TypedValueParser<Value = f64> {
+    let help = ["Seconds", "Milliseconds", "Microseconds", "Nanoseconds"];
+    words(TIME_UNITS, help)
+}
+
+fn value_columns() -> impl TypedValueParser<Value = ValueColumns> {
+    let help = [
+        "Real and imaginary part",
+        "Magnitude and phase, or the magnitude alone",
+        "Level in dB and phase in degrees, or the level alone",
+    ];
+    words(ValueColumns::WORDS, help)
 }
 
 pub(super) fn sensor_kind() -> impl TypedValueParser<Value = SensorKind> {

@@ -12,12 +12,13 @@ use crate::recording::assert_message;
 use crate::written::file;
 
 fn responses(path: &std::path::Path) -> FrequencyResponses {
-    open_frequency_responses(path).unwrap_or_else(|error| panic!("{error}"))
+    open_frequency_responses(path, &ReadSettings::default())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn error(bytes: impl AsRef<[u8]>) -> String {
     let tested = file("tested.frf", bytes);
-    let message = open_frequency_responses(&tested.path)
+    let message = open_frequency_responses(&tested.path, &ReadSettings::default())
         .expect_err("unusable")
         .to_string();
     message[message.find("tested.frf").unwrap()..].to_owned()

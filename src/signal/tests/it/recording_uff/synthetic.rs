@@ -497,7 +497,9 @@ fn read_everything(bytes: &[u8]) -> Result<(), TestCaseError> {
             }
         }
     }
-    if let Ok(found) = tapjoint_signal::recording::open_frequency_responses(&tested.path) {
+    if let Ok(found) =
+        tapjoint_signal::recording::open_frequency_responses(&tested.path, &ReadSettings::default())
+    {
         for response in &found.responses {
             prop_assert_eq!(response.values.len(), found.lines);
         }

@@ -85,6 +85,7 @@ fn check_numbers(result: &impl Debug) {
 fn recording(bytes: &[u8]) {
     let settings = ReadSettings {
         sample_rate: Some(1000.0),
+        ..ReadSettings::default()
     };
     let Ok(recording) = Recording::open(&file_of(bytes), &settings) else {
         return;

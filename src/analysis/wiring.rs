@@ -59,6 +59,7 @@ fn measure_described(
         sample_rate: description.sample_rate,
         time_unit: description.time_unit,
         values: description.values,
+        variables: description.variables.clone(),
     };
     if let Some(form) = description.form {
         let mut functions = open_frequency_responses(&path, &read)?;

@@ -11,7 +11,9 @@ use tapjoint::description::{
 };
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
 use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::recording::{ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns};
+use tapjoint::recording::{
+    ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns, VariableRole, Variables,
+};
 use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
 
@@ -114,15 +116,24 @@ pub(super) struct RecordingArguments {
     /// Columns of a text file of functions; default: by headings and numbers
     #[arg(long, value_name = "COLUMNS", value_parser = value_columns())]
     pub(super) values: Option<ValueColumns>,
+    /// Variable of a MATLAB file, such as frf=yspec or rate=fs; repeat it. Roles: frf, spectrum, coherence,
+    /// frequency, samples, time, rate, points
+    #[arg(long, value_name = "ROLE=NAME", value_parser = variable)]
+    pub(super) variable: Vec<(VariableRole, String)>,
 }
 
 impl RecordingArguments {
     /// Returns the settings of the readers.
     pub(super) fn settings(&self) -> ReadSettings {
+        let mut variables = Variables::new();
+        for (role, name) in &self.variable {
+            variables.entry(*role).or_default().push(name.clone());
+        }
         ReadSettings {
             sample_rate: self.sample_rate,
             time_unit: self.time_unit,
             values: self.values,
+            variables,
         }
     }
 
@@ -132,6 +143,21 @@ impl RecordingArguments {
         // Errors name the whole path, tables the file.
         let name = path.file_name().unwrap_or(path.as_os_str());
         Ok(recording.renamed(name.to_string_lossy()))
+    }
+}
+
+/// Parses the use of a variable and its name.
+fn variable(text: &str) -> Result<(VariableRole, String), String> {
+    let words = VariableRole::WORDS;
+    let allowed = words.map(|(word, _)| word).join(", ");
+    let (word, name) = text
+        .split_once('=')
+        .ok_or_else(|| format!("there is no equals sign; give ROLE=NAME; roles: {allowed}"))?;
+    let found = words.iter().find(|(known, _)| *known == word.trim());
+    let (_, role) = found.ok_or_else(|| format!("\"{word}\" is no role; roles: {allowed}"))?;
+    match name.trim() {
+        "" => Err("the name is empty; give ROLE=NAME".to_owned()),
+        name => Ok((*role, name.to_owned())),
     }
 }
 

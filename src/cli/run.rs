@@ -89,7 +89,7 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     let bare = &arguments.recording;
     if bare.hammer.is_some() || bare.settings() != ReadSettings::default() {
         bail!(
-            "--hammer, --sample-rate, --time-unit and --values are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
+            "--hammer, --sample-rate, --time-unit, --values and --variable are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
     let mut file = read_test(&arguments.file, terminal)?;

@@ -19,7 +19,7 @@ pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, la
 pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
-pub use tapjoint_signal::recording::{ResponseForm, ValueColumns};
+pub use tapjoint_signal::recording::{ResponseForm, ValueColumns, VariableRole, Variables};
 pub use template::{runnable_template, template, template_of};
 
 use std::collections::BTreeMap;
@@ -252,6 +252,8 @@ pub struct RecordingDescription {
     pub form: Option<FunctionForm>,
     /// Columns of the values of such a file.
     pub values: Option<ValueColumns>,
+    /// Variables of a MATLAB file.
+    pub variables: Variables,
     /// The sensor of such a file.
     pub sensor: Option<String>,
     /// Carried to the outputs: tightening torque (N m).

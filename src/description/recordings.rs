@@ -8,7 +8,7 @@ use super::structure::along;
 use super::{
     BeamDescription, ChannelPlace, ChannelRef, FunctionForm, HammerDescription,
     MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm, Scale, SensorDescription,
-    SensorKind, ValueColumns, keys,
+    SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
 use std::collections::BTreeMap;
 use tapjoint_beam::MEASURED_LIMIT;
@@ -356,11 +356,42 @@ pub(super) fn read_recording(
         time_unit: table.choice("time_unit", &TIME_UNITS)?,
         form,
         values,
+        variables: table
+            .optional("variables", read_variables)?
+            .unwrap_or_default(),
         sensor,
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
     })
+}
+
+/// Reads the names of variables, each a text or a list of texts, by what they are for.
+fn read_variables(entry: &Entry<'_>) -> Result<Variables, DescriptionError> {
+    let table = entry.free_table("a table such as { frf = \"yspec\", rate = \"freq\" }")?;
+    let mut variables = Variables::new();
+    for (word, entry) in table.all() {
+        let words = VariableRole::WORDS;
+        let Some((_, role)) = words.iter().find(|(known, _)| *known == word) else {
+            let known = words.map(|(known, _)| known);
+            let meant = did_you_mean(word, &known);
+            return Err(entry.error(format!(
+                "\"{word}\" is no use of a variable; allowed: {}{meant}",
+                quoted(&known)
+            )));
+        };
+        let wanted = "the name of a variable, or a list of names";
+        let names = match entry.is_list() {
+            true => entry
+                .list(wanted)?
+                .iter()
+                .map(|item| item.text(wanted))
+                .collect::<Result<_, _>>()?,
+            false => vec![entry.text(wanted)?],
+        };
+        variables.insert(*role, names);
+    }
+    Ok(variables)
 }
 
 fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {

@@ -282,7 +282,7 @@ impl FunctionTable {
                 Ok(pairs.map(|(at, phase)| polar(*at, Some(*phase))).collect())
             }
             ([], [], [real, imaginary]) => {
-                self.check_parts(*real)?;
+                self.check_parts(*real, *imaginary)?;
                 Ok(vec![Arrangement::Parts {
                     real: *real,
                     imaginary: *imaginary,
@@ -298,15 +298,24 @@ impl FunctionTable {
         }
     }
 
-    /// Refuses to take a column without a heading for a real part where it never changes its sign: that of a response
-    /// changes it at every resonance, a level or a magnitude does not.
-    fn check_parts(&self, real: usize) -> Result<(), RecordingError> {
-        let signs = |sign: f64| self.columns[real].iter().any(|value| value * sign > 0.0);
-        match signs(1.0) && signs(-1.0) {
-            true => Ok(()),
-            false => Err(self.wrong(&format!(
-                "column {} has no heading and never changes its sign, which a real part does at resonances",
-                real + 2
+    /// Refuses to take columns without headings for real and imaginary part where they look like magnitude and phase.
+    fn check_parts(&self, real: usize, imaginary: usize) -> Result<(), RecordingError> {
+        let has = |sign: f64| self.columns[real].iter().any(|value| value * sign > 0.0);
+        let one_sign = !(has(1.0) && has(-1.0));
+        let ends = self.columns[imaginary]
+            .iter()
+            .fold((0.0, 0.0), |(low, high): (f64, f64), x| {
+                (low.min(*x), high.max(*x))
+            });
+        // Half a turn of phase at least, within one turn, in degrees or in radians; a little for printed digits.
+        let is_turn =
+            |half: f64| ends.1 - ends.0 > 0.99 * half && ends.1.max(-ends.0) <= 1.01 * half;
+        match one_sign && (is_turn(180.0) || is_turn(PI)) {
+            false => Ok(()),
+            true => Err(self.wrong(&format!(
+                "columns {} and {} have no headings and look like magnitude and phase: the one never changes its sign, the other spans half a turn",
+                real + 2,
+                imaginary + 2
             ))),
         }
     }

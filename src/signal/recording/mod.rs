@@ -26,6 +26,7 @@ mod error;
 mod function_text;
 mod health;
 mod lvm;
+mod mat;
 mod resample;
 mod responses;
 mod text;
@@ -36,6 +37,7 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
+pub use mat::{VariableRole, Variables};
 pub use responses::{
     FrequencyResponse, FrequencyResponses, ValueColumns, open_frequency_responses,
 };
@@ -69,6 +71,8 @@ pub struct ReadSettings {
     pub time_unit: Option<f64>,
     /// Columns of a text file of functions. Default: by headings and numbers.
     pub values: Option<ValueColumns>,
+    /// Variables of a MATLAB file. Without them opening it is an error that lists what there is.
+    pub variables: Variables,
 }
 
 impl ReadSettings {
@@ -109,6 +113,8 @@ pub enum Format {
     },
     /// Text by LabVIEW (.lvm).
     Lvm,
+    /// MATLAB file of level 5.
+    Mat,
     /// Universal file, datasets 58 or 58b.
     Uff58 {
         /// Text or binary, of the first channel.
@@ -146,6 +152,7 @@ impl fmt::Display for Format {
             } => f.write_str("UFF 58, text"),
             Self::Uff58 { .. } => f.write_str("UFF 58b, binary"),
             Self::Lvm => f.write_str("LabVIEW text"),
+            Self::Mat => f.write_str("MATLAB 5"),
             Self::FrequencyResponses => f.write_str("frequency response functions"),
             Self::Memory => f.write_str("samples in memory"),
         }
@@ -262,6 +269,7 @@ impl Recording {
             FileType::Wav => wav::open_wav(path, file, settings),
             FileType::Text => csv::open_csv(path, file, settings),
             FileType::Lvm => lvm::open_lvm(path, file, settings),
+            FileType::Mat => mat::open_mat(path, file, settings),
             FileType::Universal => uff::open_uff(path, file, settings),
         }
     }
@@ -698,6 +706,7 @@ enum FileType {
     Wav,
     Text,
     Lvm,
+    Mat,
     Universal,
 }
 
@@ -705,7 +714,6 @@ enum FileType {
 const UNREAD: &[(usize, &[u8], &str)] = &[
     (0, b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
     (512, b"\x89HDF\r\n\x1a\n", "a MATLAB 7.3 (HDF5) file"),
-    (0, b"MATLAB 5.0", "a MATLAB file"),
     (0, b"MATLAB 7.3", "a MATLAB 7.3 (HDF5) file"),
     (0, b"fLaC", "FLAC audio"),
     (0, b"OggS", "Ogg audio"),
@@ -751,6 +759,9 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
         .any(|mark| head.starts_with(*mark));
     if riff && stands_at(&head, 8, b"WAVE") {
         return Ok(FileType::Wav);
+    }
+    if head.starts_with(b"MATLAB 5.0") {
+        return Ok(FileType::Mat);
     }
     let mut unread = UNREAD.iter();
     if let Some((.., format)) = unread.find(|(at, bytes, _)| stands_at(&head, *at, bytes)) {

@@ -18,7 +18,7 @@ use super::uff::{
     list_datasets, read_function,
 };
 use super::units::{ResponseForm, quotient, response_unit};
-use super::{FileType, ReadSettings, lvm, recognise};
+use super::{FileType, ReadSettings, lvm, mat, recognise};
 
 /// Frequency response functions on the same lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +86,8 @@ impl ValueColumns {
     ];
 }
 
-/// Reads the frequency response functions or spectra of a file: a universal file, text, or text by LabVIEW.
+/// Reads the frequency response functions or spectra of a file: a universal file, text, text by LabVIEW, or a
+/// MATLAB file.
 ///
 /// # Errors
 /// Files that cannot be read or understood, that hold time series instead, or whose lines are not
@@ -100,6 +101,7 @@ pub fn open_frequency_responses(
         FileType::Universal => open_uff(path),
         FileType::Text => open_text(path, file, settings),
         FileType::Lvm => lvm::open_functions(path, file, settings),
+        FileType::Mat => mat::open_functions(path, file, settings),
         FileType::Wav => Err(time_series(&file, "a WAV file, a time series")),
     }
 }

@@ -12,6 +12,7 @@ fn with_rate(bytes: impl AsRef<[u8]>, sample_rate: f64) -> (TestFile, Recording)
     let file = file("tested.dat", bytes);
     let settings = ReadSettings {
         sample_rate: Some(sample_rate),
+        ..ReadSettings::default()
     };
     let recording = Recording::open(&file.path, &settings);
     let recording = recording.unwrap_or_else(|error| panic!("{error}"));
@@ -446,6 +447,7 @@ fn limit_what_holds_no_table_is_refused() {
     let file = file("tested.dat", "a,b\n1,2\n\n3,4\n5,6\n");
     let settings = ReadSettings {
         sample_rate: Some(100.0),
+        ..ReadSettings::default()
     };
     let error = Recording::open(&file.path, &settings).expect_err("a blank line");
     assert!(

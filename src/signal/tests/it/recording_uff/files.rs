@@ -1,7 +1,7 @@
 //! Universal files that analysers and other programs wrote.
 
 use tapjoint_signal::recording::{
-    Abscissa, FunctionType, ResponseForm, list_datasets, open_frequency_responses,
+    Abscissa, FunctionType, ReadSettings, ResponseForm, list_datasets, open_frequency_responses,
 };
 
 use super::{data, function, open, samples};

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use proptest::prelude::*;
 use tapjoint_signal::recording::{
-    FrequencyResponse, FrequencyResponses, Point, ResponseForm, UffFormat,
+    FrequencyResponse, FrequencyResponses, Point, ReadSettings, ResponseForm, UffFormat,
     encode_frequency_responses_uff, open_frequency_responses,
 };
 
@@ -262,6 +262,7 @@ fn made(values: Vec<Complex64>, coherence: Option<Vec<f64>>) -> FrequencyRespons
         first_frequency: 0.5,
         spacing: 0.3125,
         lines: values.len(),
+        has_phase: true,
         responses: vec![FrequencyResponse {
             name: "tip 3:+Z / 1:-RY".to_owned(),
             response: point(Some("tip"), 3, 3),

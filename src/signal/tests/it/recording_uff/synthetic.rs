@@ -1,7 +1,7 @@
 //! Time series and the eight cases, from files that the tests write.
 
 use proptest::prelude::*;
-use tapjoint_signal::recording::{Format, UffCoding, list_datasets, read_function};
+use tapjoint_signal::recording::{Format, ReadSettings, UffCoding, list_datasets, read_function};
 
 use super::{Made, Store, file_of, function, open, response, samples, series};
 use crate::recording::assert_message;

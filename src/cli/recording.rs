@@ -86,7 +86,9 @@ pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> an
 fn is_no_time_series(problem: &RecordingError) -> bool {
     matches!(
         problem,
-        RecordingError::FrequencyColumn { .. } | RecordingError::NoTimeSeries { .. }
+        RecordingError::FrequencyColumn { .. }
+            | RecordingError::Functions { .. }
+            | RecordingError::NoTimeSeries { .. }
     )
 }
 

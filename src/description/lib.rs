@@ -20,7 +20,9 @@ pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
 pub use tapjoint_signal::recording::{ResponseForm, ValueColumns, VariableRole, Variables};
-pub use template::{runnable_template, template, template_of};
+pub use template::{
+    FoundChannel, FoundContent, FoundRecording, runnable_template, template, template_of,
+};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

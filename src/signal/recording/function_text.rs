@@ -7,11 +7,12 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use num_complex::Complex64;
+use tapjoint_numerics::stats::median;
 
 use super::csv::{CsvSource, joined_brackets, split_texts};
 use super::error::{RecordingError, RecordingWarning};
 use super::responses::{FrequencyResponse, FrequencyResponses, ValueColumns, time_series};
-use super::text::{Separator, TimeCheck, check_even, shown};
+use super::text::{Printed, Separator, check_even, shown};
 use super::uff::Point;
 use super::units::{ResponseForm, response_unit};
 use super::{ReadSettings, read_head};
@@ -41,13 +42,15 @@ pub(super) fn open_text(
     // Cells of the lines above the first row, the last line first.
     let length = usize::try_from(source.layout.start).unwrap_or(HEADER_BYTES);
     let bytes = read_head(path, &file, length.min(HEADER_BYTES))?;
-    let separator = source.layout.separator;
+    let (separator, count) = (source.layout.separator, columns.len());
     let lines = bytes.rsplit(|byte| *byte == source.layout.line_end);
     let header = lines.map(|line| {
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         let cells = split_texts(line, separator);
+        // "force (N)" falls into two under blanks.
+        let joined = joined_brackets(cells.clone());
         match separator {
-            Separator::Blanks => joined_brackets(cells),
+            Separator::Blanks if cells.len() != count && joined.len() == count => joined,
             _ => cells,
         }
     });
@@ -300,20 +303,18 @@ impl FunctionTable {
 
     /// Refuses to take columns without headings for real and imaginary part where they look like magnitude and phase.
     fn check_parts(&self, real: usize, imaginary: usize) -> Result<(), RecordingError> {
-        let has = |sign: f64| self.columns[real].iter().any(|value| value * sign > 0.0);
-        let one_sign = !(has(1.0) && has(-1.0));
-        let ends = self.columns[imaginary]
-            .iter()
-            .fold((0.0, 0.0), |(low, high): (f64, f64), x| {
-                (low.min(*x), high.max(*x))
-            });
-        // Half a turn of phase at least, within one turn, in degrees or in radians; a little for printed digits.
-        let is_turn =
-            |half: f64| ends.1 - ends.0 > 0.99 * half && ends.1.max(-ends.0) <= 1.01 * half;
-        match one_sign && (is_turn(180.0) || is_turn(PI)) {
+        let mut sizes: Vec<f64> = self.columns[imaginary].iter().map(|x| x.abs()).collect();
+        let middle = median(&mut sizes);
+        let largest = sizes.iter().fold(0.0, |most: f64, x| most.max(*x));
+        // A phase reaches a quarter to half a turn, and most lines lie far from 0. An imaginary part has peaks: most
+        // lines lie far below the largest. The hundredth is for printed digits.
+        let is_phase = [180.0, PI]
+            .into_iter()
+            .any(|half| (0.47 * half..1.01 * half).contains(&largest) && middle > 0.25 * largest);
+        match is_phase {
             false => Ok(()),
             true => Err(self.wrong(&format!(
-                "columns {} and {} have no headings and look like magnitude and phase: the one never changes its sign, the other spans half a turn",
+                "columns {} and {} have no headings and look like magnitude and phase: the numbers of the second are angles within half a turn",
                 real + 2,
                 imaginary + 2
             ))),
@@ -452,8 +453,7 @@ impl FunctionTable {
     /// Returns first frequency and spacing (the column's unit).
     fn even_lines(&self) -> Result<(f64, f64), RecordingError> {
         let lines = self.lines.iter().copied();
-        let check = TimeCheck::of_values(&self.frequencies);
-        let uneven = check_even(&self.frequencies, lines, check).err();
+        let uneven = check_even(&self.frequencies, lines, Printed::Shortest, false).err();
         if let Some(uneven) = uneven {
             let problem = format!(
                 "uneven lines: {}; allowed: 0.1 % of the step, or what rounding of the printed frequency explains; export evenly spaced lines",

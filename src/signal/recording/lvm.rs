@@ -15,7 +15,7 @@ use super::function_text::{FunctionTable, is_function_heading};
 use super::resample::resample;
 use super::responses::{FrequencyResponses, time_series};
 use super::text::{
-    CellProblem, Separator, TimeCheck, check_even, decode_text, parse_number, shown, split_cells,
+    CellProblem, Printed, Separator, check_even, decode_text, parse_number, shown, split_cells,
 };
 use super::units::split_unit;
 use super::{Format, ReadSettings, Recording, SAME_RATE};
@@ -34,9 +34,9 @@ pub(super) fn open_lvm(
 ) -> Result<Recording, RecordingError> {
     let mut segments = read_segments(path, &file)?;
     if let Some(name) = segments.iter().find_map(Segment::function_name) {
-        return Err(RecordingError::FrequencyColumn {
+        return Err(RecordingError::Functions {
             place: format!("{file}:{}", segments[0].first_line()),
-            column: name,
+            found: format!("\"{name}\" is named here"),
         });
     }
     let mut warnings = Vec::new();
@@ -141,7 +141,7 @@ pub(super) fn open_functions(
 }
 
 /// A segment: its header and its numbers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Segment {
     /// Cells of its header's lines by their key.
     header: Vec<Vec<String>>,
@@ -151,6 +151,8 @@ struct Segment {
     columns: Vec<Vec<f64>>,
     /// Line of each row (1-based).
     lines: Vec<u64>,
+    /// Digits of the column of X.
+    printed: Printed,
 }
 
 /// Even times of a segment (s).
@@ -160,6 +162,16 @@ struct EvenTimes {
 }
 
 impl Segment {
+    fn new(header: Vec<Vec<String>>) -> Self {
+        Self {
+            header,
+            names: Vec::new(),
+            columns: Vec::new(),
+            lines: Vec::new(),
+            printed: Printed::Decimals(0),
+        }
+    }
+
     fn first_line(&self) -> u64 {
         self.lines.first().copied().unwrap_or(1)
     }
@@ -223,8 +235,7 @@ impl Segment {
                 step,
             });
         };
-        let check = TimeCheck::of_values(&x).for_resampling();
-        let check = check_even(&x, self.lines.iter().copied(), check).map_err(|uneven| {
+        let check = check_even(&x, self.lines.iter().copied(), self.printed, true).map_err(|uneven| {
             let problem = format!(
                 "uneven sampling: X {}{}; allowed: 2 % of the step, or what rounding of the printed X explains; export without gaps",
                 uneven.words(1.0, "s", "row"),
@@ -337,7 +348,7 @@ fn read_segments(path: &Path, file: &str) -> Result<Vec<Segment>, RecordingError
         decimal: b'.',
     };
     let mut segments: Vec<Segment> = Vec::new();
-    let mut segment = Segment::default();
+    let mut segment = Segment::new(Vec::new());
     let (mut part, mut after_special) = (Part::FileHeader, Part::FileHeader);
     let mut line = Vec::new();
     for number in 1_u64.. {
@@ -388,10 +399,7 @@ fn read_segments(path: &Path, file: &str) -> Result<Vec<Segment>, RecordingError
             // Another segment begins.
             Part::Rows if is_key(first) => {
                 let header = vec![cells.iter().map(|cell| decode_text(cell)).collect()];
-                let next = Segment {
-                    header,
-                    ..Segment::default()
-                };
+                let next = Segment::new(header);
                 segments.push(std::mem::replace(&mut segment, next));
                 part = Part::SegmentHeader;
             }
@@ -458,6 +466,18 @@ impl Segment {
         Ok(())
     }
 
+    /// Notes the digits of an X: the most decimals, or all digits where one has an exponent.
+    fn note_digits(&mut self, cell: &[u8], decimal: u8) {
+        let mark = cell.iter().position(|byte| *byte == decimal);
+        let decimals = mark.map_or(0, |mark| cell.len() - mark - 1);
+        self.printed = match self.printed {
+            Printed::Decimals(most) if !cell.iter().any(|byte| b"eE".contains(byte)) => {
+                Printed::Decimals(most.max(decimals.min(30)))
+            }
+            _ => Printed::Exact,
+        };
+    }
+
     /// Takes a row. X may be empty in every row; a cell behind the columns is a comment.
     fn take_row(
         &mut self,
@@ -486,6 +506,7 @@ impl Segment {
             );
             return Err(RecordingError::at_line(file, line, problem));
         }
+        self.note_digits(cells.first().copied().unwrap_or_default(), decimal);
         self.lines.push(line);
         Ok(())
     }

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use super::function_text::{FunctionTable, all_within_coherence};
 use super::health::first_unusable;
 use super::resample::resample;
 use super::responses::{FrequencyResponse, FrequencyResponses, time_series};
-use super::text::{TimeCheck, check_even};
+use super::text::{Printed, check_even};
 use super::{Format, ReadSettings, Recording};
 
 /// Bytes of the file's header.
@@ -83,10 +84,9 @@ pub(super) fn open_mat(
     let content = MatFile::open(path, file)?;
     let wanted = &settings.variables;
     if wanted.contains_key(&VariableRole::Frf) || wanted.contains_key(&VariableRole::Spectrum) {
-        return Err(RecordingError::NoTimeSeries {
-            file: content.file,
-            found: "functions of frequency, as its variables are named".to_owned(),
-            remedy: "name samples in `variables` (--variable), or give its [[recording]] a `form`",
+        return Err(RecordingError::Functions {
+            place: content.file,
+            found: "its variables are named as frf or spectrum".to_owned(),
         });
     }
     let samples = content.matrices(wanted, VariableRole::Samples)?;
@@ -124,8 +124,7 @@ pub(super) fn open_mat(
                 times.len()
             )));
         }
-        let check = TimeCheck::of_values(&times).for_resampling();
-        let check = check_even(&times, 1.., check).map_err(|uneven| {
+        let check = check_even(&times, 1.., Printed::Exact, true).map_err(|uneven| {
             content.error(format!(
                 "uneven sampling: \"{}\", element {}: {}{}; allowed: 2 % of the step; export without gaps",
                 time.name,
@@ -515,7 +514,7 @@ impl MatFile {
 
     /// First frequency and spacing of a vector of frequencies (Hz).
     fn even_lines(&self, name: &str, values: &[f64]) -> Result<(f64, f64), RecordingError> {
-        if let Err(uneven) = check_even(values, 1.., TimeCheck::of_values(values)) {
+        if let Err(uneven) = check_even(values, 1.., Printed::Exact, false) {
             return Err(self.error(format!(
                 "uneven lines: \"{name}\", element {}: {}; allowed: 0.1 % of the step",
                 uneven.line,
@@ -564,12 +563,14 @@ impl MatFile {
 
     /// Reads all variables.
     fn open(path: &Path, file: String) -> Result<Self, RecordingError> {
-        let bytes = std::fs::read(path).map_err(|error| unreadable(&file, error))?;
+        let mut bytes = Vec::new();
+        let read = File::open(path).and_then(|mut opened| opened.read_to_end(&mut bytes));
+        read.map_err(|error| unreadable(&file, error))?;
         let big = match bytes.get(126..HEADER) {
             Some(b"MI") => true,
             Some(b"IM") => false,
             _ => {
-                let problem = "byte 127: the header is cut or has no mark of the byte order (MI or IM); save it again with -v7";
+                let problem = "byte 127: the header of a MATLAB file is cut or has no mark of the byte order (MI or IM); save it again with -v7";
                 return Err(RecordingError::new(&file, problem));
             }
         };

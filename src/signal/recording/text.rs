@@ -364,14 +364,6 @@ impl TimeCheck {
         }
     }
 
-    /// Takes the reference from numbers whose text is no longer there.
-    pub(super) fn of_values(values: &[f64]) -> Self {
-        let head = &values[..values.len().min(HEAD_ROWS)];
-        let printed: Vec<String> = head.iter().map(|x| format!("{x:e}")).collect();
-        let texts = printed.iter().map(|text| text.as_bytes());
-        Self::new(head.iter().copied().zip(texts))
-    }
-
     /// Lets steps deviate by up to 2 %, for samples that are resampled then.
     pub(super) fn for_resampling(mut self) -> Self {
         self.resamples = true;
@@ -456,14 +448,40 @@ impl TimeCheck {
 /// Rows that settle the reference step.
 const HEAD_ROWS: usize = 4096;
 
-/// Checks that values rise evenly, each with its line (1-based) in the file.
+/// Digits with which numbers were written whose text is no longer there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Printed {
+    /// As few as tell the number from its neighbours.
+    Shortest,
+    /// So many decimals.
+    Decimals(usize),
+    /// All of them: binary numbers.
+    Exact,
+}
+
+impl Printed {
+    fn text(self, value: f64) -> String {
+        match self {
+            Self::Shortest => format!("{value:e}"),
+            Self::Decimals(decimals) => format!("{value:.decimals$}"),
+            Self::Exact => format!("{value:.16e}"),
+        }
+    }
+}
+
+/// Checks that values rise evenly, each with its line (1-based) in the file. Where `resamples`, steps may deviate by 2 %.
 pub(super) fn check_even(
     values: &[f64],
     lines: impl Iterator<Item = u64>,
-    mut check: TimeCheck,
+    printed: Printed,
+    resamples: bool,
 ) -> Result<TimeCheck, UnevenStep> {
+    let head = values.iter().take(HEAD_ROWS);
+    let head: Vec<(f64, String)> = head.map(|value| (*value, printed.text(*value))).collect();
+    let mut check = TimeCheck::new(head.iter().map(|(value, text)| (*value, text.as_bytes())));
+    check.resamples = resamples;
     for (value, line) in values.iter().zip(lines) {
-        check.add(*value, format!("{value:e}").as_bytes(), line)?;
+        check.add(*value, printed.text(*value).as_bytes(), line)?;
     }
     Ok(check)
 }

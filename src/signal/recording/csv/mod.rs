@@ -118,9 +118,9 @@ impl CsvSource {
         let head = Head::new(&head);
         let layout = head.layout(file, series.is_some())?;
         if layout.time_is_inferred && head.says_frequency(&layout) {
-            return Err(RecordingError::FrequencyColumn {
+            return Err(RecordingError::Functions {
                 place: format!("{file}:{}", layout.lines_before + 1),
-                column: "by the text above".to_owned(),
+                found: "the text above the rows names frequencies".to_owned(),
             });
         }
         let mut source = Self {

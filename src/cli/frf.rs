@@ -31,7 +31,7 @@ use tapjoint::spectral::FrfEstimator;
     after_help = "Examples:\n  tapjoint frf taps.wav --hammer 1 --scale-hammer 500 --scale-sensor 2000 --png frf.png\n  tapjoint frf test.toml --form receptance --csv frf.csv"
 )]
 pub(super) struct FrfArguments {
-    /// Recording (WAV, CSV, UFF58), frequency response functions (UFF58, text) or test description (.toml)
+    /// Recording (WAV, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58, text, LabVIEW, MATLAB) or test description (.toml)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]
@@ -111,6 +111,8 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let described = [
             ("--hammer", bare.hammer.is_some()),
             ("--sample-rate", bare.sample_rate.is_some()),
+            ("--time-unit", bare.time_unit.is_some()),
+            ("--values", bare.values.is_some()),
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),

@@ -44,7 +44,10 @@ pub(super) fn analyse(
     if !is_no_time_series(&problem) {
         return Err(problem.into());
     }
-    let mut functions = match (problem, open_frequency_responses(path)) {
+    let mut functions = match (
+        problem,
+        open_frequency_responses(path, &recording.settings()),
+    ) {
         (_, Ok(functions)) => functions,
         // A universal file without samples may hold neither.
         (problem @ RecordingError::NoTimeSeries { .. }, Err(_)) => return Err(problem.into()),
@@ -53,6 +56,7 @@ pub(super) fn analyse(
     let time_options = [
         ("--hammer", recording.hammer.is_some()),
         ("--sample-rate", recording.sample_rate.is_some()),
+        ("--time-unit", recording.time_unit.is_some()),
         ("--block", spectrum.block.is_some()),
         ("--window", spectrum.window.is_some()),
     ];
@@ -82,7 +86,9 @@ pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> an
 fn is_no_time_series(problem: &RecordingError) -> bool {
     matches!(
         problem,
-        RecordingError::FrequencyColumn { .. } | RecordingError::NoTimeSeries { .. }
+        RecordingError::FrequencyColumn { .. }
+            | RecordingError::Functions { .. }
+            | RecordingError::NoTimeSeries { .. }
     )
 }
 
@@ -110,7 +116,7 @@ const MOST_SAMPLES: u64 = 50_000_000;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint inspect taps.wav --hammer 1")]
 pub(super) struct InspectArguments {
-    /// Recordings (WAV, CSV, UFF58). The datasets of universal files are listed as well
+    /// Recordings (WAV, CSV, UFF58, LabVIEW, MATLAB). The datasets of universal files are listed as well
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// Only list the datasets of universal files by their headers. This is fast for files of any size,
@@ -189,7 +195,7 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
     after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"
 )]
 pub(super) struct SpectrumArguments {
-    /// Recording (WAV, CSV, UFF58), or frequency response functions (UFF58, text)
+    /// Recording (WAV, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58, text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]

@@ -24,6 +24,7 @@ mod identify;
 mod identify_consistent;
 mod identify_perturbation;
 mod joint_law;
+mod laboratory;
 mod modal_fit;
 mod observations;
 mod pairing;

@@ -159,6 +159,8 @@ pub struct Found {
 pub struct Answer {
     pub case: usize,
     pub noise: Noise,
+    /// What else was drawn, in words.
+    pub about: String,
     /// True frequency (Hz): all values that an interval may hold, one but for drifting frequencies.
     pub truth: (f64, f64),
     pub damping_ratio: f64,
@@ -171,6 +173,7 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// True where the interval holds the truth; `None` where the mode was missed.
     pub fn is_inside(&self) -> Option<bool> {
         let found = self.found?;
         Some(found.low <= self.truth.1 && self.truth.0 <= found.high)
@@ -359,6 +362,19 @@ impl Case {
             .collect()
     }
 
+    fn about(&self) -> String {
+        format!(
+            "{} modes, {} taps of {:.2} s at {} Hz, {} responses, {} hammer, {:.0} dB",
+            self.modes.len(),
+            self.taps,
+            self.samples as f64 / self.rate,
+            self.rate,
+            self.responses,
+            if self.has_hammer { "a" } else { "no" },
+            self.level
+        )
+    }
+
     /// Frames of the whole recording.
     fn frames(&self) -> usize {
         self.lead + self.taps * self.samples + 8
@@ -472,16 +488,16 @@ impl Case {
 
     /// What the program reads from these channels.
     fn readings(&self, mut channels: Vec<Vec<f64>>, random: &mut ChaCha8Rng) -> Vec<ModeReading> {
+        // The file goes when the analysis has been made.
+        let folder = tempfile::tempdir().expect("a folder for temporary files");
         let recording = if self.cell == Cell::SixteenBit {
             let part = log_uniform(random, 0.01, 0.9);
             for channel in &mut channels {
                 let peak = channel.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
                 channel.iter_mut().for_each(|x| *x *= part / peak);
             }
-            let folder = tempfile::tempdir().expect("a folder for temporary files");
             let path = folder.path().join("taps.wav");
             write_wav(&path, self.rate as u32, &channels, WavFormat::Pcm16).expect("a WAV file");
-            // An open file stays readable after its folder has gone.
             Recording::open(&path, &ReadSettings::default())
         } else {
             let channels = channels.into_iter().map(|samples| Channel {
@@ -545,6 +561,7 @@ impl Case {
             answers.push(Answer {
                 case,
                 noise: self.noise,
+                about: self.about(),
                 truth: truths[index],
                 damping_ratio: mode.damping_ratio,
                 bound: bounds[index],

@@ -114,9 +114,10 @@ fn show_worst(answers: &[Answer], count: usize) {
     for answer in sorted.into_iter().take(count) {
         if let (Some(found), Some(deviations)) = (answer.found, answer.deviations()) {
             println!(
-                "    case {} {:?}: {:.1} deviations, truth {:.5} damping {:.5}, found {:.5} +-{:.5} ({}) damping {:?}, bound {:?}{}",
+                "    case {} {:?}, {}: {:.1} deviations, truth {:.5} damping {:.5}, found {:.5} +-{:.5} ({}) damping {:.5?}, bound {:.5?}{}",
                 answer.case,
                 answer.noise,
+                answer.about,
                 deviations,
                 answer.truth.0,
                 answer.damping_ratio,

@@ -16,9 +16,7 @@ use rayon::prelude::*;
 use tapjoint::description::{ChannelRef, WindowKind};
 use tapjoint::modal::{ModeReading, ReadBy};
 use tapjoint::pipeline::run_recording;
-use tapjoint::recording::{
-    Channel, ReadSettings, Recording, RecordingError, WavFormat, write_wav,
-};
+use tapjoint::recording::{Channel, ReadSettings, Recording, RecordingError, WavFormat, write_wav};
 
 /// Circumstances under which intervals are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -362,9 +360,9 @@ impl Case {
             .collect()
     }
 
-    fn about(&self) -> String {
+    fn about(&self, used: usize) -> String {
         format!(
-            "{} modes, {} taps of {:.2} s at {} Hz, {} responses, {} hammer, {:.0} dB",
+            "{} modes, {used} of {} taps used, each of {:.2} s at {} Hz, {} responses, {} hammer, {:.0} dB",
             self.modes.len(),
             self.taps,
             self.samples as f64 / self.rate,
@@ -395,9 +393,7 @@ impl Case {
                 let places = (from..from + frames).map(|n| n % turn);
                 places.map(|n| source[n.min(turn - n)]).collect()
             }
-            _ => (0..frames)
-                .map(|_| StandardNormal.sample(random))
-                .collect(),
+            _ => (0..frames).map(|_| StandardNormal.sample(random)).collect(),
         };
         let mut before = 0.0;
         for x in &mut samples {
@@ -417,12 +413,7 @@ impl Case {
     }
 
     /// Analyses the case and compares each mode with its truth.
-    fn answers(
-        &self,
-        case: usize,
-        real: &RealSignals,
-        random: &mut ChaCha8Rng,
-    ) -> Vec<Answer> {
+    fn answers(&self, case: usize, real: &RealSignals, random: &mut ChaCha8Rng) -> Vec<Answer> {
         let pulses = self.pulses(real, random);
         let frames = self.frames();
         let mut responses = vec![vec![0.0; frames]; self.responses];
@@ -478,16 +469,20 @@ impl Case {
             channels.push(force);
         }
         channels.extend(responses);
-        let readings = self.readings(channels, random);
+        let (readings, used) = self.readings(channels, random);
         let bounds = self.modes.iter().zip(&heights).map(|(mode, heights)| {
             (self.noise == Noise::White).then(|| mode.bound(heights, self, noise_std))
         });
         let bounds: Vec<Option<f64>> = bounds.collect();
-        self.compare(case, &readings, &bounds)
+        self.compare(case, &readings, used, &bounds)
     }
 
-    /// What the program reads from these channels.
-    fn readings(&self, mut channels: Vec<Vec<f64>>, random: &mut ChaCha8Rng) -> Vec<ModeReading> {
+    /// What the program reads from these channels, and how many taps it accepts.
+    fn readings(
+        &self,
+        mut channels: Vec<Vec<f64>>,
+        random: &mut ChaCha8Rng,
+    ) -> (Vec<ModeReading>, usize) {
         // The file goes when the analysis has been made.
         let folder = tempfile::tempdir().expect("a folder for temporary files");
         let recording = if self.cell == Cell::SixteenBit {
@@ -515,13 +510,30 @@ impl Case {
             }
         });
         let Ok(analysis) = analysis else {
-            return Vec::new();
+            return (Vec::new(), 0);
         };
+        let used = analysis.recordings[0].measurement.taps.accepted().count();
+        if std::env::var_os("DBG").is_some() && used < self.taps {
+            for t in &analysis.recordings[0].measurement.taps.taps {
+                eprintln!(
+                    "{} {:.3} {:?} {:?} {:?} {:?}",
+                    self.about(used),
+                    t.time,
+                    t.record,
+                    t.pulse_end,
+                    t.second_hit,
+                    t.rejection.as_ref().map(|r| r.to_string())
+                );
+            }
+            eprintln!(
+                "lead {} {:?}",
+                self.lead as f64 / self.rate,
+                analysis.recordings[0].measurement.taps.remarks
+            );
+        }
         let modes = analysis.modes.into_iter();
-        modes
-            .filter(|mode| mode.mode.is_some())
-            .filter_map(|mode| mode.reading)
-            .collect()
+        let modes = modes.filter(|mode| mode.mode.is_some());
+        (modes.filter_map(|mode| mode.reading).collect(), used)
     }
 
     /// Gives each mode the reading nearest to it; a reading belongs to the mode nearest to it.
@@ -529,6 +541,7 @@ impl Case {
         &self,
         case: usize,
         readings: &[ModeReading],
+        used: usize,
         bounds: &[Option<f64>],
     ) -> Vec<Answer> {
         let truths: Vec<(f64, f64)> = self.modes.iter().map(Mode::truth).collect();
@@ -542,11 +555,10 @@ impl Case {
             let Some(nearest) = nearest else { continue };
             // What lies a tenth away stands for nothing that was drawn.
             let reach = 0.1 * truths[nearest].1;
-            let nearer = own[nearest]
-                .is_none_or(|other| {
-                    let theirs = other.frequency.clamp(truths[nearest].0, truths[nearest].1);
-                    distance(&truths[nearest]) < (other.frequency - theirs).abs()
-                });
+            let nearer = own[nearest].is_none_or(|other| {
+                let theirs = other.frequency.clamp(truths[nearest].0, truths[nearest].1);
+                distance(&truths[nearest]) < (other.frequency - theirs).abs()
+            });
             if distance(&truths[nearest]) < reach && nearer {
                 own[nearest] = Some(reading);
             }
@@ -557,11 +569,16 @@ impl Case {
             self.settle_pair(first, readings, &truths, &mut own, &mut shared);
         }
         let mut answers = Vec::new();
-        for (index, mode) in self.modes.iter().enumerate().filter(|(_, mode)| mode.counts) {
+        for (index, mode) in self
+            .modes
+            .iter()
+            .enumerate()
+            .filter(|(_, mode)| mode.counts)
+        {
             answers.push(Answer {
                 case,
                 noise: self.noise,
-                about: self.about(),
+                about: self.about(used),
                 truth: truths[index],
                 damping_ratio: mode.damping_ratio,
                 bound: bounds[index],
@@ -583,9 +600,9 @@ impl Case {
     ) {
         let (low, high) = (truths[first].0, truths[first + 1].0);
         let reach = 3.0 * (high - low);
-        let near = readings.iter().filter(|reading| {
-            (low - reach..high + reach).contains(&reading.frequency)
-        });
+        let near = readings
+            .iter()
+            .filter(|reading| (low - reach..high + reach).contains(&reading.frequency));
         let near: Vec<&ModeReading> = near.collect();
         match near[..] {
             [] => {}

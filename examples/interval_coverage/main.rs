@@ -148,7 +148,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for (noises, suffix, real) in &kinds {
         for cell in Cell::ALL {
-            if arguments.cell.as_ref().is_some_and(|name| name != cell.name()) {
+            if arguments
+                .cell
+                .as_ref()
+                .is_some_and(|name| name != cell.name())
+            {
                 continue;
             }
             let answers = run_cell(cell, arguments.modes, arguments.seed, noises, real);
@@ -162,8 +166,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
             if arguments.by_noise && noises.len() > 1 {
                 for noise in *noises {
-                    let own: Vec<&Answer> =
-                        answers.iter().filter(|a| a.noise == *noise).collect();
+                    let own: Vec<&Answer> = answers.iter().filter(|a| a.noise == *noise).collect();
                     report(&format!("   {noise:?}"), &own);
                 }
             }

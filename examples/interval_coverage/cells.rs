@@ -141,7 +141,7 @@ impl RealSignals {
 }
 
 /// What the program says of one mode.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
     pub frequency: f64,
     pub std: f64,
@@ -153,7 +153,7 @@ pub struct Found {
 }
 
 /// One mode of a case, and what the program says of it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     pub case: usize,
     pub noise: Noise,
@@ -513,24 +513,6 @@ impl Case {
             return (Vec::new(), 0);
         };
         let used = analysis.recordings[0].measurement.taps.accepted().count();
-        if std::env::var_os("DBG").is_some() && used < self.taps {
-            for t in &analysis.recordings[0].measurement.taps.taps {
-                eprintln!(
-                    "{} {:.3} {:?} {:?} {:?} {:?}",
-                    self.about(used),
-                    t.time,
-                    t.record,
-                    t.pulse_end,
-                    t.second_hit,
-                    t.rejection.as_ref().map(|r| r.to_string())
-                );
-            }
-            eprintln!(
-                "lead {} {:?}",
-                self.lead as f64 / self.rate,
-                analysis.recordings[0].measurement.taps.remarks
-            );
-        }
         let modes = analysis.modes.into_iter();
         let modes = modes.filter(|mode| mode.mode.is_some());
         (modes.filter_map(|mode| mode.reading).collect(), used)

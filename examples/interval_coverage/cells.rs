@@ -423,7 +423,8 @@ impl Case {
             let normal: f64 = StandardNormal.sample(random);
             let moved = 1.0 + self.scatter * normal;
             for (mode, heights) in self.modes.iter().zip(&mut heights) {
-                let states = mode.ring(pulse, frames - start, self.rate, moved);
+                let slope = mode.drift / mode.largest(&pulses, self.rate);
+                let states = mode.ring(pulse, frames - start, self.rate, moved, slope);
                 heights.push(states[pulse.len().min(states.len() - 1)].norm());
                 for (response, residue) in responses.iter_mut().zip(&mode.residues) {
                     for (x, state) in response[*start..].iter_mut().zip(&states) {
@@ -617,18 +618,9 @@ fn found(reading: &ModeReading) -> Found {
 
 impl Mode {
     /// Free amplitude on the samples from the beginning of a pulse: z' = p z + f with the pole
-    /// p = omega(-zeta + j sqrt(1 - zeta^2)), its frequency `moved` by this factor and by the amplitude.
-    fn ring(&self, pulse: &[f64], frames: usize, rate: f64, moved: f64) -> Vec<Complex64> {
-        let straight = self.states(pulse, frames, rate, moved, 0.0);
-        if self.drift == 0.0 {
-            return straight;
-        }
-        let largest = straight.iter().fold(0.0, |a: f64, z| a.max(z.norm()));
-        self.states(pulse, frames, rate, moved, self.drift / largest)
-    }
-
-    /// `slope`: relative change of the frequency over the amplitude.
-    fn states(
+    /// p = omega(-zeta + j sqrt(1 - zeta^2)). `moved` is a factor on the frequency; `slope` is its relative change over
+    /// the amplitude.
+    fn ring(
         &self,
         pulse: &[f64],
         frames: usize,
@@ -656,9 +648,22 @@ impl Mode {
         states
     }
 
+    /// Largest amplitude after any of the pulses, at a constant frequency.
+    fn largest(&self, pulses: &[(usize, Vec<f64>)], rate: f64) -> f64 {
+        let rings = pulses
+            .iter()
+            .flat_map(|(_, pulse)| self.ring(pulse, pulse.len(), rate, 1.0, 0.0));
+        rings.fold(0.0, |most: f64, state| most.max(state.norm()))
+    }
+
+    /// The true frequency at a part of the largest amplitude.
+    fn truth_at(&self, part: f64) -> f64 {
+        self.frequency * (1.0 + self.drift * part)
+    }
+
     /// The true frequency; of a drifting one all that it has from the largest amplitude to a tenth of it.
     fn truth(&self) -> (f64, f64) {
-        let ends = [1.0, 0.1].map(|part| self.frequency * (1.0 + self.drift * part));
+        let ends = [1.0, 0.1].map(|part| self.truth_at(part));
         (ends[0].min(ends[1]), ends[0].max(ends[1]))
     }
 

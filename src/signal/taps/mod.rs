@@ -651,7 +651,7 @@ mod tests {
     #[test]
     fn regress_a_hit_that_leaves_the_ringing_no_louder_is_a_tap() {
         for noise in [1e-3, 3e-2] {
-            // After 1.2 s the modes keep 76 and 56 % of their amplitudes, and both are half a cycle off the second hit.
+            // After 1.2 s the modes keep 80 and 56 % of their amplitudes, and both are half a cycle off the second hit.
             let found = taps(&[1.0, 2.2], noise);
             let reasons: Vec<_> = found.taps.iter().map(|tap| &tap.rejection).collect();
             assert_eq!(reasons, [&None, &None], "noise {noise}");

@@ -565,10 +565,10 @@ fn unpredicted(samples: &[f64], turn: usize, lag: usize) -> Option<(f64, f64)> {
     let past = |row: usize| (1..=LAGS).map(move |k| samples[row - k * lag]);
     let mut normal = DMatrix::<f64>::zeros(LAGS, LAGS);
     let mut right = DVector::<f64>::zeros(LAGS);
-    for row in reach..turn {
+    for (row, &value) in samples.iter().enumerate().take(turn).skip(reach) {
         let values = DVector::from_iterator(LAGS, past(row));
         normal.ger(1.0, &values, &values, 1.0);
-        right.axpy(samples[row], &values, 1.0);
+        right.axpy(value, &values, 1.0);
     }
     // Fewer oscillations than the weights could follow leave the equations nearly singular.
     let trace = normal.trace();

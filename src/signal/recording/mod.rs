@@ -28,6 +28,7 @@ mod health;
 mod lvm;
 mod mat;
 mod resample;
+mod response_files;
 mod responses;
 mod text;
 mod uff;
@@ -38,9 +39,8 @@ mod write;
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
 pub use mat::{VariableRole, Variables};
-pub use responses::{
-    FrequencyResponse, FrequencyResponses, ValueColumns, open_frequency_responses,
-};
+pub use response_files::open_frequency_responses;
+pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
 pub use text::Separator;
 pub use uff::{
     Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,

@@ -107,7 +107,9 @@ fn recover_signals_leave_nothing_and_kills_are_swept() {
     assert!(made.unwrap().success());
     for (signal, code) in [("HUP", 129), ("INT", 130), ("TERM", 143), ("KILL", -1)] {
         // The picture's temporary file is made; then the program waits for a reader of the pipe.
-        let mut command = Command::new(program());
+        // Under `nohup` and in the background of a shell some signals are turned off, and would stay so.
+        let mut command = Command::new("env");
+        command.arg("--default-signal=HUP,INT,TERM").arg(program());
         command.current_dir(folder.path()).stdout(Stdio::null());
         command.args(["frf", SPECTRUM[1], "--hammer", "1", "--png", "frf.png"]);
         let mut run = command.args(["--csv", "pipe"]).spawn().unwrap();

@@ -271,3 +271,35 @@ pub fn near_mains(frequency: f64, half_line: f64, settings: &MainsSettings) -> O
         (harmonic > 0.0 && near).then_some(harmonic)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// A mode of ten lines' half width with noise of power 2 on its lines.
+    #[test]
+    fn prop_the_noise_of_a_function_is_that_of_its_lines() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let values: Vec<Complex64> = (0..1000)
+            .map(|line| {
+                let [re, im]: [f64; 2] = [(); 2].map(|()| StandardNormal.sample(&mut random));
+                Complex64::new(re, im) + 1e3 / Complex64::new(10.0, f64::from(line) - 500.0)
+            })
+            .collect();
+        let noise = noise_of_function(&values);
+        let mean = noise[50..400].iter().sum::<f64>() / 350.0;
+        // Medians of 350 lines, whose differences share values: some 10 % for one standard deviation.
+        assert!((1.4..2.6).contains(&mean), "{mean}");
+        // The mode's level is 10^4 at its peak: it does not hide itself.
+        assert!(noise[500] < 10.0, "{}", noise[500]);
+    }
+
+    #[test]
+    fn limit_the_noise_of_few_lines() {
+        assert_eq!(noise_of_function(&[Complex64::ONE; 3]), vec![0.0; 3]);
+        assert_eq!(noise_of_function(&[]), Vec::<f64>::new());
+    }
+}

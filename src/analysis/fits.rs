@@ -163,7 +163,7 @@ impl Candidates<'_> {
                 Ok(fit) => !(self.is_own(fit, &added[index - peaks]) && accepted.needs(index, fit)),
                 Err(_) => true,
             });
-            let costly = starts.len() > fitted.len() && {
+            let costly = !added.is_empty() && starts.len() > fitted.len() && {
                 let mut pairs = fitted.iter().zip(&fits);
                 pairs.any(|(before, now)| *before && now.is_err())
             };

@@ -85,6 +85,7 @@ fn check_numbers(result: &impl Debug) {
 fn recording(bytes: &[u8]) {
     let settings = ReadSettings {
         sample_rate: Some(1000.0),
+        ..ReadSettings::default()
     };
     let Ok(recording) = Recording::open(&file_of(bytes), &settings) else {
         return;
@@ -148,7 +149,7 @@ fn universal(bytes: &[u8]) {
 
 /// Opens frequency response functions. All lines hold finite values.
 fn responses(bytes: &[u8]) {
-    let Ok(found) = open_frequency_responses(&file_of(bytes)) else {
+    let Ok(found) = open_frequency_responses(&file_of(bytes), &ReadSettings::default()) else {
         return;
     };
     assert!(!found.responses.is_empty() && found.spacing > 0.0 && found.lines <= bytes.len());

@@ -5,9 +5,11 @@ use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
 use super::recording_result::{Conditions, RecordingResult, Response};
 use super::warnings::Warning;
 use num_complex::Complex64;
-use tapjoint_description::{ReadBy, SensorKind};
+use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
-use tapjoint_signal::modal::{CompositeLevel, PeakSettings, find_peaks, read_peaks};
+use tapjoint_signal::modal::{
+    CompositeLevel, PeakSettings, find_peaks, read_magnitude_peaks, read_peaks,
+};
 use tapjoint_signal::recording::{Format, FrequencyResponses, ResponseForm};
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, LEAST_BLOCK, Lines, SpectralError, Window,
@@ -17,8 +19,8 @@ use tapjoint_signal::taps::Taps;
 /// Settings for a file of frequency response functions.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FunctionSettings {
-    /// Form of all functions; `None` = what the file says.
-    pub form: Option<ResponseForm>,
+    /// Form of all functions; `None` = what the file says. Functions without a phase are spectra in any case.
+    pub form: Option<FunctionForm>,
     /// Name of the sensor; `None` = the functions' own names.
     pub sensor: Option<String>,
     /// Band to be analysed (Hz); `None` = all lines.
@@ -38,8 +40,13 @@ pub(super) fn measure_functions(
         problem,
     })?;
     let (mut responses, mut forms, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    let is_spectrum = !functions.has_phase || settings.form == Some(FunctionForm::Spectrum);
     for response in &functions.responses {
-        let form = settings.form.or(response.form);
+        let form = match settings.form {
+            _ if is_spectrum => None,
+            Some(FunctionForm::Response(form)) => Some(form),
+            _ => response.form,
+        };
         let sensor = settings.sensor.as_ref();
         responses.push(Response {
             name: sensor.unwrap_or(&response.name).clone(),
@@ -53,7 +60,10 @@ pub(super) fn measure_functions(
         forms.push(form);
         values.push(response.values[first..first + lines.points()].to_vec());
     }
-    let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
+    let spectra = match is_spectrum {
+        true => spectra_of_magnitudes(lines, &values, settings.reading),
+        false => spectra_of_functions(lines, values, &forms, settings.reading),
+    };
     let warnings = functions.warnings.iter();
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     Ok(RecordingResult {
@@ -62,9 +72,9 @@ pub(super) fn measure_functions(
         sample_rate: None,
         seconds: None,
         channels: Vec::new(),
-        has_hammer: true,
+        has_hammer: !is_spectrum,
         conditions: Conditions::default(),
-        tap_unit: Some("N".to_string()),
+        tap_unit: (!is_spectrum).then(|| "N".to_string()),
         responses,
         band: settings.band,
         overview: None,
@@ -114,6 +124,37 @@ fn axis(
         duration: 1.0 / spacing,
     };
     Ok((first, lines))
+}
+
+/// Reads the resonances of spectra without a phase: frequencies and half-power damping.
+fn spectra_of_magnitudes(
+    lines: Lines,
+    values: &[Vec<Complex64>],
+    wanted: ReadBy,
+) -> MeasuredSpectra {
+    let squares = |h: &Vec<Complex64>| h.iter().map(Complex64::norm_sqr).collect();
+    let powers: Vec<Vec<f64>> = values.iter().map(squares).collect();
+    let level = CompositeLevel::new(lines, &powers, None);
+    let peaks = find_peaks(&level, &PeakSettings::default());
+    let mut readings = read_magnitude_peaks(&level, &peaks);
+    for reading in &mut readings {
+        reading.select_estimate(wanted);
+    }
+    let roots = values
+        .iter()
+        .map(|h| h.iter().map(|value| value.norm()).collect());
+    MeasuredSpectra {
+        averages: AveragedSpectra {
+            responses: roots.collect(),
+            response_power: powers,
+            ..AveragedSpectra::empty(lines)
+        },
+        window: Window::Rectangular,
+        decay: None,
+        readings,
+        force_noise: None,
+        stabilisation: stabilisation(lines.low, lines.spacing, &[]),
+    }
 }
 
 /// Reads the resonances of functions, each with its form where it is known.

@@ -12,6 +12,7 @@
 mod amplitude;
 mod checks;
 mod fits;
+mod found;
 mod frf;
 mod function_file;
 mod identification;
@@ -27,6 +28,7 @@ mod wiring;
 
 pub use amplitude::AmplitudeChange;
 use checks::judge;
+pub use found::look_at;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;

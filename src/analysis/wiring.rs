@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, RecordingDescription, Scale, SensorKind, TestDescription,
+    ChannelPlace, ChannelRef, FunctionForm, RecordingDescription, Scale, SensorKind,
+    TestDescription,
 };
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
@@ -54,8 +55,23 @@ fn measure_described(
 ) -> Result<RecordingResult, PipelineError> {
     let path = folder.join(&description.file);
     let file = description.file.display().to_string();
+    let read = ReadSettings {
+        sample_rate: description.sample_rate,
+        time_unit: description.time_unit,
+        values: description.values,
+        variables: description.variables.clone(),
+    };
     if let Some(form) = description.form {
-        let mut functions = open_frequency_responses(&path)?;
+        let mut functions = open_frequency_responses(&path, &read)?;
+        if let FunctionForm::Response(form) = form
+            && !functions.has_phase
+        {
+            let form = form.name();
+            return Err(PipelineError::Description(format!(
+                "{test_file}:{}: {file} holds magnitudes without a phase, and form = \"{form}\" needs one; write form = \"spectrum\", or export the phase as well",
+                description.line
+            )));
+        }
         functions.file = file;
         let mut sensor = description.sensor.clone();
         if let ([one], None) = (test.sensors.as_slice(), &sensor) {
@@ -71,9 +87,6 @@ fn measure_described(
         result.conditions = conditions(test, description);
         return Ok(result);
     }
-    let read = ReadSettings {
-        sample_rate: description.sample_rate,
-    };
     if test.sensors.is_empty() {
         return Err(PipelineError::Description(format!(
             "{test_file}: the recordings need at least one [[sensor]] with its channel, or there is no response to \

@@ -11,7 +11,9 @@ use tapjoint::description::{
 };
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
 use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::recording::{ReadSettings, Recording, RecordingError};
+use tapjoint::recording::{
+    ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns, VariableRole, Variables,
+};
 use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
 
@@ -108,15 +110,36 @@ pub(super) struct RecordingArguments {
     /// Sample rate of a CSV file without a time column, such as 5120 or "51.2 kHz" (Hz)
     #[arg(long, value_name = "HZ", value_parser = sample_rate)]
     pub(super) sample_rate: Option<f64>,
+    /// Unit of a time column without a unit in its heading; default: s
+    #[arg(long, value_name = "UNIT", value_parser = time_unit())]
+    pub(super) time_unit: Option<f64>,
+    /// Columns of a text file of functions; default: by headings and numbers
+    #[arg(long, value_name = "COLUMNS", value_parser = value_columns())]
+    pub(super) values: Option<ValueColumns>,
+    /// Variable of a MATLAB file, such as frf=yspec or rate=fs; repeat it. Roles: frf, spectrum, coherence,
+    /// frequency, samples, time, rate, points
+    #[arg(long, value_name = "ROLE=NAME", value_parser = variable)]
+    pub(super) variable: Vec<(VariableRole, String)>,
 }
 
 impl RecordingArguments {
+    /// Returns the settings of the readers.
+    pub(super) fn settings(&self) -> ReadSettings {
+        let mut variables = Variables::new();
+        for (role, name) in &self.variable {
+            variables.entry(*role).or_default().push(name.clone());
+        }
+        ReadSettings {
+            sample_rate: self.sample_rate,
+            time_unit: self.time_unit,
+            values: self.values,
+            variables,
+        }
+    }
+
     /// Opens a recording that has the hammer's channel.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
-        let settings = ReadSettings {
-            sample_rate: self.sample_rate,
-        };
-        let recording = Recording::open(path, &settings)?;
+        let recording = Recording::open(path, &self.settings())?;
         if let Some(hammer) = &self.hammer {
             channel_of(&recording, "--hammer", hammer)?;
         }
@@ -143,6 +166,21 @@ pub(super) fn channel_of(
         place: option.to_owned(),
         problem: problem.to_string(),
     })
+}
+
+/// Parses the use of a variable and its name.
+pub(super) fn variable(text: &str) -> Result<(VariableRole, String), String> {
+    let words = VariableRole::WORDS;
+    let allowed = words.map(|(word, _)| word).join(", ");
+    let (word, name) = text
+        .split_once('=')
+        .ok_or_else(|| format!("there is no equals sign; give ROLE=NAME; roles: {allowed}"))?;
+    let found = words.iter().find(|(known, _)| *known == word.trim());
+    let (_, role) = found.ok_or_else(|| format!("\"{word}\" is no role; roles: {allowed}"))?;
+    match name.trim() {
+        "" => Err("the name is empty; give ROLE=NAME".to_owned()),
+        name => Ok((*role, name.to_owned())),
+    }
 }
 
 fn sample_rate(text: &str) -> Result<f64, String> {
@@ -422,6 +460,20 @@ pub(super) fn reading() -> impl TypedValueParser<Value = ReadBy> {
         "Take the highest spectral line, with the half-line bound",
     ];
     words(READINGS, help)
+}
+
+fn time_unit() -> impl TypedValueParser<Value = f64> {
+    let help = ["Seconds", "Milliseconds", "Microseconds", "Nanoseconds"];
+    words(TIME_UNITS, help)
+}
+
+fn value_columns() -> impl TypedValueParser<Value = ValueColumns> {
+    let help = [
+        "Real and imaginary part",
+        "Magnitude and phase, or the magnitude alone",
+        "Level in dB and phase in degrees, or the level alone",
+    ];
+    words(ValueColumns::WORDS, help)
 }
 
 pub(super) fn sensor_kind() -> impl TypedValueParser<Value = SensorKind> {

@@ -111,6 +111,8 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let described = [
             ("--hammer", bare.hammer.is_some()),
             ("--sample-rate", bare.sample_rate.is_some()),
+            ("--time-unit", bare.time_unit.is_some()),
+            ("--values", bare.values.is_some()),
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),

@@ -233,6 +233,7 @@ mod tests {
             ValueParser::path_buf().type_id(),
             ValueParser::string().type_id(),
             ValueParser::from(clap::value_parser!(arguments::JsonDestination)).type_id(),
+            ValueParser::new(arguments::variable).type_id(),
         ];
         let mut line = CommandLine::command();
         line.build();

@@ -13,8 +13,9 @@ use clap::{Args, Command, CommandFactory};
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 use serde_json::json;
-use std::path::PathBuf;
-use tapjoint::description::{Assembly, runnable_template, template_of};
+use std::path::{Path, PathBuf};
+use tapjoint::description::{Assembly, FoundContent, runnable_template, template_of};
+use tapjoint::pipeline::look_at;
 use tapjoint::report::document::VERSION;
 use tapjoint::report::render_reproduction;
 use tapjoint::study::publication::reproduce;
@@ -115,8 +116,8 @@ pub(super) fn with_suggestion(mut error: clap::Error, command: &Command) -> clap
 
 /// Print a commented test.toml with every key, unit and default.
 ///
-/// Each RECORDING gets its own table. Without recordings the file holds example frequencies, so that it
-/// runs unchanged.
+/// Each RECORDING is opened and gets its own table; channels, names, units, forms and the hammer are written as found.
+/// Beam and positions stay examples. Without recordings the file holds example frequencies, so that it runs unchanged.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint init > test.toml && tapjoint run test.toml\n  tapjoint init --kind lap low.wav high.wav > test.toml"
@@ -134,7 +135,15 @@ pub(super) fn print_template(
     arguments: &InitArguments,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    let text = match arguments.recordings.as_slice() {
+    let mut found = Vec::with_capacity(arguments.recordings.len());
+    for name in &arguments.recordings {
+        let file = look_at(Path::new(name), name);
+        if let FoundContent::Unread(problem) = &file.content {
+            terminal.warn(problem);
+        }
+        found.push(file);
+    }
+    let text = match found.as_slice() {
         [] => runnable_template(arguments.kind),
         files => template_of(arguments.kind, files),
     };

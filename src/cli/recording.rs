@@ -44,7 +44,10 @@ pub(super) fn analyse(
     if !is_no_time_series(&problem) {
         return Err(problem.into());
     }
-    let mut functions = match (problem, open_frequency_responses(path)) {
+    let mut functions = match (
+        problem,
+        open_frequency_responses(path, &recording.settings()),
+    ) {
         (_, Ok(functions)) => functions,
         // A universal file without samples may hold neither.
         (problem @ RecordingError::NoTimeSeries { .. }, Err(_)) => return Err(problem.into()),
@@ -53,6 +56,7 @@ pub(super) fn analyse(
     let time_options = [
         ("--hammer", recording.hammer.is_some()),
         ("--sample-rate", recording.sample_rate.is_some()),
+        ("--time-unit", recording.time_unit.is_some()),
         ("--block", spectrum.block.is_some()),
         ("--window", spectrum.window.is_some()),
     ];
@@ -82,7 +86,9 @@ pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> an
 fn is_no_time_series(problem: &RecordingError) -> bool {
     matches!(
         problem,
-        RecordingError::FrequencyColumn { .. } | RecordingError::NoTimeSeries { .. }
+        RecordingError::FrequencyColumn { .. }
+            | RecordingError::Functions { .. }
+            | RecordingError::NoTimeSeries { .. }
     )
 }
 

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, diagnose_test};
+use tapjoint::recording::ReadSettings;
 use tapjoint::report::{
     MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
@@ -85,9 +86,10 @@ const SAMPLES: usize = 1000;
 
 /// Reads the description, and checks that options and recordings go with it.
 fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
-    if arguments.recording.hammer.is_some() || arguments.recording.sample_rate.is_some() {
+    let bare = &arguments.recording;
+    if bare.hammer.is_some() || bare.settings() != ReadSettings::default() {
         bail!(
-            "--hammer and --sample-rate are for bare recordings; a test description says both: `channel` in [hammer], `sample_rate` in [[recording]]"
+            "--hammer, --sample-rate, --time-unit, --values and --variable are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
     let mut file = read_test(&arguments.file, terminal)?;

@@ -19,8 +19,10 @@ pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, la
 pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
-pub use tapjoint_signal::recording::ResponseForm;
-pub use template::{runnable_template, template, template_of};
+pub use tapjoint_signal::recording::{ResponseForm, ValueColumns, VariableRole, Variables};
+pub use template::{
+    FoundChannel, FoundContent, FoundRecording, runnable_template, template, template_of,
+};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -183,6 +185,15 @@ pub struct HammerDescription {
     pub scale: Option<Scale>,
 }
 
+/// What a file of functions holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FunctionForm {
+    /// Frequency response functions of this form.
+    Response(ResponseForm),
+    /// Spectra: magnitudes without a phase and without a force.
+    Spectrum,
+}
+
 /// Quantity that a sensor measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorKind {
@@ -237,8 +248,14 @@ pub struct RecordingDescription {
     pub masses: Vec<PointMass>,
     /// Sample rate (Hz) of a CSV file without a time column.
     pub sample_rate: Option<f64>,
-    /// Given when the file holds frequency response functions instead of time series.
-    pub form: Option<ResponseForm>,
+    /// Unit of the time column (s) where its heading does not name it.
+    pub time_unit: Option<f64>,
+    /// Given when the file holds functions of frequency instead of time series.
+    pub form: Option<FunctionForm>,
+    /// Columns of the values of such a file.
+    pub values: Option<ValueColumns>,
+    /// Variables of a MATLAB file.
+    pub variables: Variables,
     /// The sensor of such a file.
     pub sensor: Option<String>,
     /// Carried to the outputs: tightening torque (N m).

@@ -6,12 +6,14 @@ use super::reader::{
 };
 use super::structure::along;
 use super::{
-    BeamDescription, ChannelPlace, ChannelRef, HammerDescription, MeasuredFrequencies, PointMass,
-    RecordingDescription, ResponseForm, Scale, SensorDescription, SensorKind, keys,
+    BeamDescription, ChannelPlace, ChannelRef, FunctionForm, HammerDescription,
+    MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm, Scale, SensorDescription,
+    SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
 use std::collections::BTreeMap;
 use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
+use tapjoint_signal::recording::TIME_UNITS;
 use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
 
 /// Words of `kind` in `[[sensor]]`.
@@ -241,6 +243,19 @@ pub const FORMS: [(&str, ResponseForm); 3] = [
     ("mobility", ResponseForm::Mobility),
     ("receptance", ResponseForm::Receptance),
 ];
+/// Words of `form` in `[[recording]]`, those of spectra included.
+const FUNCTION_FORMS: [(&str, FunctionForm); 4] = [
+    (
+        "accelerance",
+        FunctionForm::Response(ResponseForm::Accelerance),
+    ),
+    ("mobility", FunctionForm::Response(ResponseForm::Mobility)),
+    (
+        "receptance",
+        FunctionForm::Response(ResponseForm::Receptance),
+    ),
+    ("spectrum", FunctionForm::Spectrum),
+];
 const BLOCK: Limits = Limits::between(
     LEAST_BLOCK as f64,
     MOST_BLOCK as f64,
@@ -299,13 +314,16 @@ pub(super) fn read_recording(
             .map(|entry| read_fastened(entry, beam))
             .collect()
     })?;
-    let form = table.choice("form", &FORMS)?;
+    let form = table.choice("form", &FUNCTION_FORMS)?;
+    let values = table.choice("values", &ValueColumns::WORDS)?;
     let sensor = table.optional("sensor", |entry| {
         let name = entry.text("a sensor's name such as \"A\"")?;
         check_sensor(&name, entry, sensors)?;
         Ok(name)
     })?;
     match (table.get("form"), table.get("sensor")) {
+        // A spectrum need not belong to a sensor: it gives frequencies alone.
+        (Some(_), None) if form == Some(FunctionForm::Spectrum) => {}
         (Some(entry), None) if sensors.len() > 1 => {
             return Err(entry.error(
                 "a response function belongs to one sensor, and several are declared; add `sensor = \"A\"`",
@@ -319,6 +337,12 @@ pub(super) fn read_recording(
         }
         _ => {}
     }
+    if let (Some(entry), None) = (table.get("values"), form) {
+        return Err(entry.error(
+            "`values` names the columns of a function, and `form` is missing; add `form = \"accelerance\"`, \
+             or remove `values`",
+        ));
+    }
     Ok(RecordingDescription {
         file: file.text("a file such as \"taps.wav\"")?.into(),
         line: file.line,
@@ -329,12 +353,45 @@ pub(super) fn read_recording(
         at,
         masses: masses.unwrap_or_default(),
         sample_rate: table.within("sample_rate", Dimension::Rate, &SAMPLE_RATE)?,
+        time_unit: table.choice("time_unit", &TIME_UNITS)?,
         form,
+        values,
+        variables: table
+            .optional("variables", read_variables)?
+            .unwrap_or_default(),
         sensor,
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
     })
+}
+
+/// Reads the names of variables, each a text or a list of texts, by what they are for.
+fn read_variables(entry: &Entry<'_>) -> Result<Variables, DescriptionError> {
+    let table = entry.free_table("a table such as { frf = \"yspec\", rate = \"freq\" }")?;
+    let mut variables = Variables::new();
+    for (word, entry) in table.all() {
+        let words = VariableRole::WORDS;
+        let Some((_, role)) = words.iter().find(|(known, _)| *known == word) else {
+            let known = words.map(|(known, _)| known);
+            let meant = did_you_mean(word, &known);
+            return Err(entry.error(format!(
+                "\"{word}\" is no use of a variable; allowed: {}{meant}",
+                quoted(&known)
+            )));
+        };
+        let wanted = "the name of a variable, or a list of names";
+        let names = match entry.is_list() {
+            true => entry
+                .list(wanted)?
+                .iter()
+                .map(|item| item.text(wanted))
+                .collect::<Result<_, _>>()?,
+            false => vec![entry.text(wanted)?],
+        };
+        variables.insert(*role, names);
+    }
+    Ok(variables)
 }
 
 fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {

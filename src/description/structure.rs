@@ -118,7 +118,11 @@ pub(super) fn read_beam(table: &Table<'_>) -> Result<BeamDescription, Descriptio
         let question = "did you swap thickness and length, or mix units?";
         entry.unusual(beam.thickness, "m", &usual, question);
     }
-    if let Some(entry) = table.get("tolerance") {
+    // "exact" states that there are none.
+    let stated = table
+        .get("tolerance")
+        .filter(|entry| entry.as_text() != Some("exact"));
+    if let Some(entry) = stated {
         let table = entry.table(&keys::TOLERANCE)?;
         beam.tolerance = BeamTolerance {
             length: tolerance(&table, &LENGTH, beam.length)?,

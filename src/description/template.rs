@@ -1,6 +1,6 @@
 //! The commented `test.toml` for a new test.
 
-use super::Assembly;
+use super::{Assembly, FunctionForm, ResponseForm, SENSOR_KINDS, SensorKind};
 
 const HEAD: &str = r#"# Test description for tapjoint. Replace the values by those of your test, then: tapjoint run test.toml
 #
@@ -69,7 +69,7 @@ position = 0.338               # m
 # kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
 
 [[recording]]                  # once for each file; the same file may be read in several bands
-file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this file
+file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
@@ -80,7 +80,11 @@ file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none
-#   form = "accelerance" | "mobility" | "receptance" and sensor = "A" where the file holds a frequency response function
+# time_unit = "ms"             # "s" (default) | "ms" | "us" | "ns", for a CSV file whose time has no unit
+#   form = "accelerance" | "mobility" | "receptance" and sensor = "A" where the file holds a frequency response function,
+#   form = "spectrum" where it holds magnitudes without a phase: frequencies and half-power damping
+#   values = "complex" | "magnitude-phase" | "dB-degrees" where the columns of a function do not say so
+#   variables = { samples = "data", rate = "fs" } or { frf = "H", frequency = "f" } of a MATLAB file
 
 #   Or, instead of all [[recording]] tables, natural frequencies that were measured elsewhere:
 # [measured]
@@ -133,25 +137,233 @@ pub fn runnable_template(kind: Assembly) -> String {
     lines.map(|line| line + "\n").collect()
 }
 
-/// Returns a template with a table for each of these recordings.
-pub fn template_of(kind: Assembly, files: &[String]) -> String {
-    let tables: Vec<String> = files
-        .iter()
-        .map(|file| format!("{RECORDING}\nfile = {}\n", toml::Value::from(file.as_str())))
-        .collect();
+/// What a file of the test holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundRecording {
+    /// The file, as a description would name it.
+    pub file: String,
+    /// What was found in it.
+    pub content: FoundContent,
+}
+
+/// What was found in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FoundContent {
+    /// A time series.
+    Series {
+        /// All channels, in the order of the file.
+        channels: Vec<FoundChannel>,
+        /// The hammer's channel (0-based), and what shows it.
+        hammer: Option<(usize, &'static str)>,
+        /// Samples per second (Hz).
+        sample_rate: f64,
+    },
+    /// Functions of frequency.
+    Functions {
+        /// Their form; `None` where the file does not say.
+        form: Option<FunctionForm>,
+        /// First and last line (Hz).
+        band: (f64, f64),
+        /// Number of functions.
+        count: usize,
+    },
+    /// Reason why it was not read.
+    Unread(String),
+}
+
+/// A channel of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundChannel {
+    /// Its name, where the file gives one.
+    pub name: Option<String>,
+    /// Its unit, where the file gives one.
+    pub unit: Option<String>,
+    /// What it senses, by its unit.
+    pub kind: Option<SensorKind>,
+}
+
+/// Returns a template with what was found in these files: hammer, sensors and recordings. Everything else stays an
+/// example.
+pub fn template_of(kind: Assembly, files: &[FoundRecording]) -> String {
     let text = template(kind);
-    let Some((head, rest)) = text.split_once(RECORDING) else {
+    let (Some((head, _)), Some((instruments, recording))) =
+        (text.split_once("\n[hammer]"), text.split_once(RECORDING))
+    else {
         return text;
     };
-    // The first file replaces the example, whose comments stay. The others follow it.
-    let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
-    let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
-    let [first, others @ ..] = tables.as_slice() else {
-        return text.clone();
+    let (comments, tail) = recording.split_once("\n\n").unwrap_or((recording, ""));
+    // The first line below the header is the example's file.
+    let comments: Vec<&str> = comments.lines().skip(2).collect();
+    let series = files.iter().find_map(|found| match &found.content {
+        FoundContent::Series {
+            channels, hammer, ..
+        } => Some((channels.as_slice(), *hammer)),
+        _ => None,
+    });
+    let has_functions = files
+        .iter()
+        .any(|found| matches!(found.content, FoundContent::Functions { .. }));
+    let instruments = match series {
+        Some((channels, hammer)) => instruments_found(channels, hammer),
+        None if has_functions => SENSOR_OF_FUNCTIONS.to_owned(),
+        None => format!(
+            "[hammer]{}",
+            &instruments[head.len() + "\n[hammer]".len()..]
+        ),
     };
-    let (comments, tail) = rest.split_once("\n\n").unwrap_or((rest, ""));
-    let others: String = others.iter().map(|table| format!("\n{table}")).collect();
-    format!("{head}{first}{comments}\n{others}\n{tail}")
+    let mut tables = String::new();
+    for (at, found) in files.iter().enumerate() {
+        tables.push_str(&recording_found(found));
+        // The comments on all other keys stand once.
+        if at == 0 {
+            let others = comments
+                .iter()
+                .filter(|line| !tables.contains(key_of(line)));
+            let others: String = others.map(|line| format!("{line}\n")).collect();
+            tables.push_str(&others);
+        }
+        tables.push('\n');
+    }
+    let head = head.replacen("[beam]", &format!("{EXAMPLES}\n[beam]"), 1);
+    format!("{head}\n{instruments}{tables}{tail}")
+}
+
+/// Returns the beginning of a commented line up to its equals sign; what no other line holds where it has none.
+fn key_of(line: &str) -> &str {
+    let key = line
+        .strip_prefix("# ")
+        .and_then(|rest| rest.split_once(" = "));
+    key.map_or("\u{0}", |_| {
+        &line[2..line.find(" = ").map_or(line.len(), |end| end + 3)]
+    })
+}
+
+/// Line above the beam, of which no recording says anything.
+const EXAMPLES: &str = "# EXAMPLES: the files do not say what the beam is. Replace every value of this table and of [joint].";
+
+/// Sensor of functions in files.
+const SENSOR_OF_FUNCTIONS: &str = r#"[[sensor]]                     # the sensor of the functions; once for each
+name = "A"
+# position = 0.338             # m, not known from the files: give it
+# mass = "24 g"                # kg, from the data sheet, default: not known
+
+"#;
+
+/// Returns `[hammer]` and `[[sensor]]` as found.
+fn instruments_found(channels: &[FoundChannel], hammer: Option<(usize, &str)>) -> String {
+    let mut text = String::new();
+    match hammer {
+        Some((channel, shown)) => {
+            text += &format!(
+                "[hammer]\nchannel = {}                    # {}, found {shown}\n",
+                channel + 1,
+                title(&channels[channel])
+            );
+            text += match channels[channel].unit.as_deref() {
+                Some("N") => {
+                    "# scale = 1.0                  # N per unit of the file; its unit is used\n\n"
+                }
+                Some("V") => {
+                    "# sensitivity = \"2.25 mV/N\"    # the file is in volts: give it, or forces stay in volts\n\n"
+                }
+                _ => {
+                    "# scale = 1.0                  # N per unit of the file: give it, or forces stay in its units\n\n"
+                }
+            };
+        }
+        None => {
+            text += "# no hammer was found in the files; where there is one:\n# [hammer]\n# channel = 1\n\n"
+        }
+    }
+    let mut names: Vec<String> = Vec::new();
+    for (at, channel) in channels.iter().enumerate() {
+        if Some(at) == hammer.map(|(channel, _)| channel) {
+            continue;
+        }
+        let letter = char::from(b'A' + (names.len() % 26) as u8).to_string();
+        let mut name = channel
+            .name
+            .clone()
+            .filter(|name| !name.trim().is_empty())
+            .unwrap_or(letter);
+        if names.contains(&name) {
+            name = format!("{name} {}", at + 1);
+        }
+        text += &format!(
+            "[[sensor]]\nname = {}\nchannel = {}                    # {}\n",
+            toml::Value::from(name.as_str()),
+            at + 1,
+            title(channel)
+        );
+        names.push(name);
+        let kind = SENSOR_KINDS
+            .iter()
+            .find(|(_, kind)| Some(*kind) == channel.kind);
+        match (kind, channel.unit.as_deref()) {
+            (Some((word, _)), _) => text += &format!("kind = \"{word}\"          # by its unit\n"),
+            (None, Some("V")) => {
+                text += "# sensitivity = \"100 mV/g\"     # the file is in volts: give it\n"
+            }
+            _ => text += "# scale = 1.0                  # m/s2 per unit of the file: give it\n",
+        }
+        text += "# position = 0.338             # m, not known from the files: give it\n# mass = \"24 g\"                # kg, from the data sheet, default: not known\n\n";
+    }
+    text
+}
+
+/// A channel in words: "Force, N", without anything that would end a comment.
+fn title(channel: &FoundChannel) -> String {
+    let parts = [
+        channel.name.as_deref().unwrap_or("without a name"),
+        channel.unit.as_deref().unwrap_or("without a unit"),
+    ];
+    parts.join(", ").replace(char::is_control, " ")
+}
+
+/// Returns the table of a recording as found.
+fn recording_found(found: &FoundRecording) -> String {
+    let mut text = format!(
+        "{RECORDING}\nfile = {}\n",
+        toml::Value::from(found.file.as_str())
+    );
+    match &found.content {
+        FoundContent::Series {
+            channels,
+            sample_rate,
+            ..
+        } => {
+            text += &format!(
+                "# band = [0, {}]             # Hz, zoom band; the file has {} channels at {sample_rate} Hz\n",
+                (sample_rate / 2.56).round(),
+                channels.len()
+            );
+        }
+        FoundContent::Functions { form, band, count } => {
+            text += &format!(
+                "# band = [{}, {}]           # Hz, zoom band; all lines of the {count} function(s)\n",
+                band.0, band.1
+            );
+            text += match form {
+                Some(FunctionForm::Spectrum) => {
+                    "form = \"spectrum\"              # magnitudes without a phase\n"
+                }
+                Some(FunctionForm::Response(ResponseForm::Accelerance)) => {
+                    "form = \"accelerance\"\n"
+                }
+                Some(FunctionForm::Response(ResponseForm::Mobility)) => "form = \"mobility\"\n",
+                Some(FunctionForm::Response(ResponseForm::Receptance)) => "form = \"receptance\"\n",
+                None => {
+                    "form = \"accelerance\"           # the file does not say: or \"mobility\", \"receptance\"\n"
+                }
+            };
+            text += "sensor = \"A\"\n";
+        }
+        FoundContent::Unread(problem) => {
+            let problem = problem.replace(char::is_control, " ");
+            text += &format!("# not read: {problem}\n");
+        }
+    }
+    text
 }
 
 /// Returns a commented test description: every key with its default and unit. It is valid unchanged; its

@@ -272,6 +272,7 @@ pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, Record
             first_frequency: first.lines.low,
             spacing: first.lines.spacing,
             lines: first.lines.points(),
+            has_phase: true,
             responses: numbered
                 .map(|(node, frf)| FrequencyResponse {
                     name: frf.response.clone(),

@@ -255,6 +255,7 @@ fn functions(constants: [[f64; 3]; 2]) -> FrequencyResponses {
         first_frequency: 0.0,
         spacing,
         lines: 4000,
+        has_phase: true,
         responses: (0..3).map(response).collect(),
         warnings: Vec::new(),
     }

@@ -203,7 +203,11 @@ fn described(document: &Document) -> Option<String> {
 fn channels(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let mut names: Vec<&str> = Vec::new();
-    for recording in recordings.iter().filter(|recording| !recording.has_hammer) {
+    // A spectrum from a file has no taps.
+    let in_time = recordings
+        .iter()
+        .filter(|recording| recording.sample_rate.is_some());
+    for recording in in_time.filter(|recording| !recording.has_hammer) {
         for name in &recording.responses {
             if !names.contains(&name.as_str()) {
                 names.push(name);

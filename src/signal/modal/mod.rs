@@ -11,10 +11,12 @@
 
 pub mod amplitude;
 pub mod fit;
+mod magnitude;
 mod peaks;
 pub mod polyreference;
 mod reading;
 
+pub use magnitude::{interpolate_magnitude, read_magnitude_peaks};
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
     near_mains,

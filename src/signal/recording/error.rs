@@ -28,13 +28,23 @@ pub enum RecordingError {
     },
     /// Text whose first column is a frequency, where a time series was expected.
     #[error(
-        "{place}: the first column is a frequency (\"{column}\"): this is a frequency response function and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\"); without one `tapjoint run FILE` and `tapjoint spectrum FILE` read it"
+        "{place}: the first column is a frequency (\"{column}\"): this is a frequency response function and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\", \"spectrum\"); without one `tapjoint run FILE` and `tapjoint spectrum FILE` read it"
     )]
     FrequencyColumn {
         /// The file, and the line of the first row (1-based).
         place: String,
         /// The column's heading.
         column: String,
+    },
+    /// Text by LabVIEW, a MATLAB file or text without headings that holds functions, where a time series was expected.
+    #[error(
+        "{place}: {found}: these are functions of frequency and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\", \"spectrum\"); without one `tapjoint run FILE` and `tapjoint spectrum FILE` read it"
+    )]
+    Functions {
+        /// The file, and the line of the first row (1-based) where there is one.
+        place: String,
+        /// What shows it.
+        found: String,
     },
     /// A universal file with functions, none of them a time series.
     #[error("{file}: holds no time series (function type 1), only {found}; {remedy}")]

@@ -23,7 +23,11 @@ use std::sync::Arc;
 
 mod csv;
 mod error;
+mod function_text;
 mod health;
+mod lvm;
+mod mat;
+mod resample;
 mod responses;
 mod text;
 mod uff;
@@ -33,13 +37,16 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
-pub use responses::{FrequencyResponse, FrequencyResponses, open_frequency_responses};
+pub use mat::{VariableRole, Variables};
+pub use responses::{
+    FrequencyResponse, FrequencyResponses, ValueColumns, open_frequency_responses,
+};
 pub use text::Separator;
 pub use uff::{
     Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,
     UffCoding, UniversalFile, list_datasets, read_function,
 };
-pub use units::{ResponseForm, channel_unit};
+pub use units::{ResponseForm, TIME_UNITS, channel_unit};
 pub use write::{
     UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff, encode_wav,
     write_wav,
@@ -55,11 +62,17 @@ const SAME_RATE: f64 = 1e-3;
 const SAME_SCALE: f64 = 1e-6;
 
 /// Facts about a file that the file itself may not contain.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReadSettings {
     /// Sample rate (Hz) of a CSV file without a time column. A file's own rate wins, with a
     /// warning where they differ. Default: none, because a guessed rate scales every frequency.
     pub sample_rate: Option<f64>,
+    /// What a unit of a CSV file's time column is (s), where its heading does not say so. Default: 1 s.
+    pub time_unit: Option<f64>,
+    /// Columns of a text file of functions. Default: by headings and numbers.
+    pub values: Option<ValueColumns>,
+    /// Variables of a MATLAB file. Without them opening it is an error that lists what there is.
+    pub variables: Variables,
 }
 
 impl ReadSettings {
@@ -98,6 +111,10 @@ pub enum Format {
         /// Source of the sample rate.
         timed: Timing,
     },
+    /// Text by LabVIEW (.lvm).
+    Lvm,
+    /// MATLAB file of level 5.
+    Mat,
     /// Universal file, datasets 58 or 58b.
     Uff58 {
         /// Text or binary, of the first channel.
@@ -134,6 +151,8 @@ impl fmt::Display for Format {
                 coding: UffCoding::Ascii,
             } => f.write_str("UFF 58, text"),
             Self::Uff58 { .. } => f.write_str("UFF 58b, binary"),
+            Self::Lvm => f.write_str("LabVIEW text"),
+            Self::Mat => f.write_str("MATLAB 5"),
             Self::FrequencyResponses => f.write_str("frequency response functions"),
             Self::Memory => f.write_str("samples in memory"),
         }
@@ -168,6 +187,29 @@ pub struct ChannelInfo {
 }
 
 impl ChannelInfo {
+    /// Channel `number` (1-based) with what a header says about it. Values are in SI where the header's unit is known;
+    /// `warnings` takes the doubt where it is not.
+    fn with_header(
+        number: usize,
+        header: csv::Column,
+        meter: HealthMeter,
+        warnings: &mut Vec<RecordingWarning>,
+    ) -> Self {
+        let known = header.unit.as_deref().and_then(channel_unit);
+        if let (Some(unit), None) = (&header.unit, known) {
+            let name = header.name.as_deref();
+            warnings.push(RecordingWarning::unknown_unit(number, name, unit));
+        }
+        let scale = known.map_or(1.0, |(factor, _)| factor);
+        Self {
+            name: header.name,
+            unit: known.map_or_else(|| header.unit.clone(), |(_, si)| Some(si.to_owned())),
+            header_unit: header.unit,
+            scale,
+            health: meter.finish().scaled(scale),
+        }
+    }
+
     /// A channel whose file units are its values.
     fn unscaled(name: Option<String>, unit: Option<String>, meter: HealthMeter) -> Self {
         Self {
@@ -232,6 +274,8 @@ impl Recording {
         match recognise(path, &file)? {
             FileType::Wav => wav::open_wav(path, file, settings),
             FileType::Text => csv::open_csv(path, file, settings),
+            FileType::Lvm => lvm::open_lvm(path, file, settings),
+            FileType::Mat => mat::open_mat(path, file, settings),
             FileType::Universal => uff::open_uff(path, file, settings),
         }
     }
@@ -265,6 +309,40 @@ impl Recording {
             channels,
             warnings: Vec::new(),
             source: Arc::new(samples),
+        })
+    }
+
+    /// A file whose samples are all in memory, each channel with what a header says about it.
+    fn in_memory(
+        name: String,
+        format: Format,
+        sample_rate: f64,
+        columns: Vec<(csv::Column, Vec<f64>)>,
+        mut warnings: Vec<RecordingWarning>,
+    ) -> Result<Self, RecordingError> {
+        check_rate(&name, sample_rate)?;
+        let slices = columns.iter().map(|(_, samples)| samples.as_slice());
+        let frames = check_samples(&name, sample_rate, slices)? as u64;
+        let (mut channels, mut all) = (Vec::new(), Vec::new());
+        for (number, (header, samples)) in (1..).zip(columns) {
+            let mut meter = HealthMeter::new(None);
+            meter.add(&samples);
+            channels.push(ChannelInfo::with_header(
+                number,
+                header,
+                meter,
+                &mut warnings,
+            ));
+            all.push(samples);
+        }
+        Ok(Self {
+            name,
+            format,
+            sample_rate,
+            frames,
+            channels,
+            warnings,
+            source: Arc::new(all),
         })
     }
 
@@ -633,6 +711,8 @@ impl Cursor for Vec<&[f64]> {
 enum FileType {
     Wav,
     Text,
+    Lvm,
+    Mat,
     Universal,
 }
 
@@ -640,7 +720,6 @@ enum FileType {
 const UNREAD: &[(usize, &[u8], &str)] = &[
     (0, b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
     (512, b"\x89HDF\r\n\x1a\n", "a MATLAB 7.3 (HDF5) file"),
-    (0, b"MATLAB 5.0", "a MATLAB file"),
     (0, b"MATLAB 7.3", "a MATLAB 7.3 (HDF5) file"),
     (0, b"fLaC", "FLAC audio"),
     (0, b"OggS", "Ogg audio"),
@@ -687,6 +766,9 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     if riff && stands_at(&head, 8, b"WAVE") {
         return Ok(FileType::Wav);
     }
+    if head.starts_with(b"MATLAB 5.0") {
+        return Ok(FileType::Mat);
+    }
     let mut unread = UNREAD.iter();
     if let Some((.., format)) = unread.find(|(at, bytes, _)| stands_at(&head, *at, bytes)) {
         let problem = format!("{format} is not read by this version; export as WAV, CSV or UFF58");
@@ -694,6 +776,9 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     }
     if begins_with_mark(&head) {
         return Ok(FileType::Universal);
+    }
+    if head.starts_with(b"LabVIEW Measurement") {
+        return Ok(FileType::Lvm);
     }
     // Text has no control characters but tabs, line ends and form feeds; latin-1 letters may occur.
     if head

@@ -1,5 +1,5 @@
-//! Frequency response functions that an analyser has measured: from universal files (function type
-//! 4) and from text with a frequency, a real and an imaginary column.
+//! Frequency response functions and spectra that an analyser has measured, and how universal files hold them (function
+//! type 4). Text is read in `function_text`, LabVIEW text in `lvm`, MATLAB files in `mat`.
 //!
 //! Values are in SI units. Where a file says in which unit they are, they are converted; where it
 //! does not, they are taken as they stand. Lines are evenly spaced; a file whose lines are not is an
@@ -9,23 +9,16 @@ use std::path::Path;
 
 use num_complex::Complex64;
 
-use super::csv::{CsvSource, split_texts};
 use super::error::{RecordingError, RecordingWarning};
+use super::function_text::{all_within_coherence, open_text};
 use super::health::first_unusable;
-use super::text::{TimeCheck, shown};
 use super::uff::{
     ACCELERATION, AbscissaUnit, DISPLACEMENT, EXCITATION_FORCE, Entry, EvenPoints, Function,
     FunctionGroup, FunctionType, Ordinate, Point, UniversalFile, VELOCITY, even_points, left_out,
     list_datasets, read_function,
 };
 use super::units::{ResponseForm, quotient, response_unit};
-use super::{FileType, read_head, recognise};
-
-/// Bytes of header that are looked at.
-const HEADER_BYTES: usize = 1 << 16;
-
-/// Rows that settle the reference step.
-const HEAD_ROWS: usize = 4096;
+use super::{FileType, ReadSettings, lvm, mat, recognise};
 
 /// Frequency response functions on the same lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +31,9 @@ pub struct FrequencyResponses {
     pub spacing: f64,
     /// Number of lines.
     pub lines: usize,
+    /// True where the values have a phase. Without one they are magnitudes alone: a spectrum, which gives frequencies
+    /// and half-power damping.
+    pub has_phase: bool,
     /// The responses in the order of the file; one at least.
     pub responses: Vec<FrequencyResponse>,
     /// Doubts about them.
@@ -70,201 +66,52 @@ pub struct FrequencyResponse {
     pub coherence: Option<Vec<f64>>,
 }
 
-/// Reads the frequency response functions of a file, a universal file or text.
+/// Columns of a function's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ValueColumns {
+    /// Real and imaginary part.
+    Complex,
+    /// Magnitude and phase, or the magnitude alone.
+    MagnitudePhase,
+    /// Level (dB, 20 lg of the magnitude) and phase (degrees), or the level alone.
+    DecibelDegrees,
+}
+
+impl ValueColumns {
+    /// Words of descriptions and options, each with what it means.
+    pub const WORDS: [(&'static str, ValueColumns); 3] = [
+        ("complex", ValueColumns::Complex),
+        ("magnitude-phase", ValueColumns::MagnitudePhase),
+        ("dB-degrees", ValueColumns::DecibelDegrees),
+    ];
+}
+
+/// Reads the frequency response functions or spectra of a file: a universal file, text, text by LabVIEW, or a
+/// MATLAB file.
 ///
 /// # Errors
 /// Files that cannot be read or understood, that hold time series instead, or whose lines are not
 /// evenly spaced; merely poor data are [`warnings`](FrequencyResponses::warnings).
-pub fn open_frequency_responses(path: &Path) -> Result<FrequencyResponses, RecordingError> {
+pub fn open_frequency_responses(
+    path: &Path,
+    settings: &ReadSettings,
+) -> Result<FrequencyResponses, RecordingError> {
     let file = path.display().to_string();
     match recognise(path, &file)? {
         FileType::Universal => open_uff(path),
-        FileType::Text => open_text(path, file),
+        FileType::Text => open_text(path, file, settings),
+        FileType::Lvm => lvm::open_functions(path, file, settings),
+        FileType::Mat => mat::open_functions(path, file, settings),
         FileType::Wav => Err(time_series(&file, "a WAV file, a time series")),
     }
 }
 
 /// Returns the error of a recording where responses were expected.
-fn time_series(file: &str, what: &str) -> RecordingError {
+pub(super) fn time_series(file: &str, what: &str) -> RecordingError {
     let problem = format!(
         "is {what}; frequency response functions were expected because `form` is given; remove `form` (and `sensor`) from its [[recording]], or give the file with the responses"
     );
     RecordingError::new(file, problem)
-}
-
-// ---- Text: columns of frequency, real and imaginary part, below whatever the analyser writes about them.
-
-/// Returns the error of columns that are not frequency, real part and imaginary part.
-fn wrong_columns(source: &CsvSource, problem: &str) -> RecordingError {
-    source.error(format!(
-        "{problem}; allowed: three columns, frequency (Hz), real part and imaginary part, and coherence as a fourth; export it so"
-    ))
-}
-
-fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingError> {
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    let source = CsvSource::open(path, &file, |block| {
-        columns.resize(block.len(), Vec::new());
-        for (column, part) in columns.iter_mut().zip(block) {
-            column.extend_from_slice(part);
-        }
-    })?;
-    // Cells of the lines above the first row, the last line first.
-    let length = usize::try_from(source.layout.start).unwrap_or(HEADER_BYTES);
-    let bytes = read_head(path, &source.file, length.min(HEADER_BYTES))?;
-    let lines = bytes.rsplit(|byte| *byte == source.layout.line_end);
-    let header: Vec<Vec<String>> = lines
-        .map(|line| split_texts(line, source.layout.separator))
-        .collect();
-    check_columns(&header, &source, columns.len())?;
-    columns.resize(4, Vec::new());
-    let [frequencies, real, imaginary, coherence] = columns.as_slice() else {
-        return Err(RecordingError::no_samples(&file));
-    };
-    let (first_frequency, spacing) = even_lines(&source, frequencies)?;
-    let (factor, unit) = units_in(&header);
-    let scale = unit.as_ref().map_or(1.0, |(_, scale, _)| *scale);
-    let parts = real.iter().zip(imaginary);
-    // A line such as "Ref Chan:Resp Chan", "1+Z:3+Z".
-    let points = header.iter().find(|cells| {
-        let first = cells.first().map(|cell| cell.to_lowercase());
-        first.is_some_and(|cell| cell.starts_with("ref") && cell.contains("resp"))
-    });
-    let points = points.and_then(|cells| cells.get(1)?.split_once(':'));
-    let (reference, response) = points.unwrap_or_default();
-    let [reference, response] = [reference, response].map(|name| Point {
-        name: Some(name.trim().to_owned()).filter(|name| !name.is_empty()),
-        ..Point::default()
-    });
-    let is_coherence = coherence.len() == frequencies.len() && all_within_coherence(coherence);
-    let doubt = (!coherence.is_empty() && !is_coherence).then(|| {
-        let message = "the column of the coherence is left out: its values are not all between 0 and 1; export it again if it is needed";
-        RecordingWarning::new("coherence-left-out", message.to_owned())
-    });
-    Ok(FrequencyResponses {
-        file,
-        first_frequency: first_frequency * factor,
-        spacing: spacing * factor,
-        lines: frequencies.len(),
-        responses: vec![FrequencyResponse {
-            name: match (&response.name, &reference.name) {
-                (None, None) => "response".to_owned(),
-                _ => format!("{response} / {reference}"),
-            },
-            response,
-            reference,
-            form: unit.as_ref().map(|(.., form)| *form),
-            unit: unit.map(|(written, ..)| written),
-            values: parts
-                .map(|(re, im)| Complex64::new(*re, *im) * scale)
-                .collect(),
-            coherence: is_coherence.then(|| coherence.clone()),
-        }],
-        warnings: Vec::from_iter(doubt),
-    })
-}
-
-/// Returns true where all values lie between 0 and 1, but for what printing with six digits adds, and more.
-fn all_within_coherence(values: &[f64]) -> bool {
-    values.iter().all(|value| (-1e-3..=1.001).contains(value))
-}
-
-/// Words that begin the heading of a magnitude or a phase.
-const POLAR: [&str; 8] = [
-    "magnitude",
-    "amplitude",
-    "phase",
-    "abs",
-    "mag ",
-    "mag(",
-    "deg",
-    "db",
-];
-
-/// The first cell that begins with one of `words`, in any case of letters.
-fn cell_beginning<'a>(header: &'a [Vec<String>], words: &[&str]) -> Option<&'a String> {
-    header.iter().flatten().find(|cell| {
-        let cell = cell.to_lowercase();
-        words.iter().any(|word| cell.starts_with(word))
-    })
-}
-
-/// Checks that there are three columns, or four with a coherence, none of them named as something else.
-fn check_columns(
-    header: &[Vec<String>],
-    source: &CsvSource,
-    count: usize,
-) -> Result<(), RecordingError> {
-    if source.layout.time.is_some() {
-        let what = "a time series (it has a time column)";
-        return Err(time_series(&source.file, what));
-    }
-    let polar = cell_beginning(header, &POLAR);
-    let coherence = cell_beginning(header, &["coh", "gamma"]);
-    let problem = match (polar, count, coherence) {
-        (Some(cell), ..) => {
-            let cell = shown(cell.as_bytes());
-            format!("the heading \"{cell}\" means magnitude and phase")
-        }
-        (None, 3, _) | (None, 4, Some(_)) => return Ok(()),
-        (None, 4, None) => "there are 4 columns and no heading says what the last is".to_owned(),
-        (None, count, _) => format!("there are {count} columns"),
-    };
-    Err(wrong_columns(source, &problem))
-}
-
-/// Returns the factor from the frequency column's unit to Hz, and the unit of the values: as written, its factor, its
-/// form.
-fn units_in(header: &[Vec<String>]) -> (f64, Option<(String, f64, ResponseForm)>) {
-    let mut first_cells = header.iter().filter_map(|cells| cells.first());
-    let factor = first_cells.find_map(|cell| {
-        let cell = cell.to_lowercase();
-        let cell = cell.trim_end_matches([')', ']']);
-        match cell.rsplit(['(', '[', ' ']).next() {
-            Some("hz") => Some(1.0),
-            Some("khz") => Some(1e3),
-            // 2 pi rad are one cycle.
-            Some("rad/s") => Some(0.5 / std::f64::consts::PI),
-            _ => None,
-        }
-    });
-    // The cell nearest above the numbers that is a unit, or that has one in its last brackets.
-    let unit = header.iter().flatten().find_map(|cell| {
-        let inner = cell.split_once(['(', '[']).map(|(_, rest)| rest);
-        let inner = inner.and_then(|rest| rest.strip_suffix([')', ']']));
-        [Some(cell.as_str()), inner].into_iter().find_map(|text| {
-            let text = text?.trim();
-            let (factor, form) = response_unit(text)?;
-            Some((text.to_owned(), factor, form))
-        })
-    });
-    (factor.unwrap_or(1.0), unit)
-}
-
-/// Returns first frequency and spacing (the column's unit).
-fn even_lines(source: &CsvSource, frequencies: &[f64]) -> Result<(f64, f64), RecordingError> {
-    let printed: Vec<String> = frequencies.iter().map(|x| format!("{x:e}")).collect();
-    let texts = printed.iter().map(|text| text.as_bytes());
-    let cells = frequencies.iter().copied().zip(texts);
-    let mut check = TimeCheck::new(cells.clone().take(HEAD_ROWS));
-    // Empty lines are not counted.
-    for ((frequency, cell), line) in cells.zip(source.layout.lines_before + 1..) {
-        check.add(frequency, cell, line).map_err(|uneven| {
-            let problem = format!(
-                "uneven lines: {}; allowed: 0.1 % of the step, or what rounding of the printed frequency explains; export evenly spaced lines",
-                uneven.words(1.0, "Hz", "line")
-            );
-            RecordingError::at_line(&source.file, uneven.line, problem)
-        })?;
-    }
-    match frequencies {
-        [] => Ok((0.0, 0.0)),
-        [_] => {
-            let problem = "there is a single line, which has no spacing";
-            Err(wrong_columns(source, problem))
-        }
-        [first, .., last] => Ok((*first, (last - first) / (frequencies.len() - 1) as f64)),
-    }
 }
 
 // ---- Universal files.
@@ -314,6 +161,7 @@ fn open_uff(path: &Path) -> Result<FrequencyResponses, RecordingError> {
         first_frequency: group.points.start,
         spacing: group.points.step,
         lines,
+        has_phase: true,
         responses: responses.collect(),
         file: file.name,
         warnings,

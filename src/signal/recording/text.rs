@@ -260,6 +260,10 @@ pub(super) fn parse_fortran(text: &[u8]) -> Option<f64> {
 /// Largest deviation of a step from the step elsewhere, as a part of it.
 const TOLERANCE: f64 = 1e-3;
 
+/// The same where samples are resampled: far below the half step from which on neighbours could not be told from a
+/// lost sample, and small enough for the resampling to converge in three passes.
+const RESAMPLED: f64 = 0.02;
+
 /// A rate this near to a whole number, relatively, may be that whole number: a tenth of the
 /// tolerance, far below any resolution of frequency.
 const WHOLE_RATE: f64 = 1e-4;
@@ -325,6 +329,10 @@ pub(super) struct TimeCheck {
     count: u64,
     shortest: Option<UnevenStep>,
     longest: Option<UnevenStep>,
+    /// True where steps may deviate by [`RESAMPLED`].
+    resamples: bool,
+    /// Largest deviation of a step beyond the tolerance, as a part of the step.
+    uneven: Option<f64>,
 }
 
 impl TimeCheck {
@@ -351,7 +359,20 @@ impl TimeCheck {
             count: 0,
             shortest: None,
             longest: None,
+            resamples: false,
+            uneven: None,
         }
+    }
+
+    /// Lets steps deviate by up to 2 %, for samples that are resampled then.
+    pub(super) fn for_resampling(mut self) -> Self {
+        self.resamples = true;
+        self
+    }
+
+    /// Returns the largest deviation of a step, as a part of it, where the samples must be resampled.
+    pub(super) fn uneven(&self) -> Option<f64> {
+        self.uneven
     }
 
     /// Takes the next time, printed as `cell` in line `line`.
@@ -392,6 +413,11 @@ impl TimeCheck {
         if step > 0.0 && deviation <= limit && spread <= (unit + allowed) * SLACK {
             return Ok(());
         }
+        if self.resamples && step > 0.0 && deviation <= RESAMPLED * expected + limit {
+            let part = deviation / expected;
+            self.uneven = Some(self.uneven.map_or(part, |other| other.max(part)));
+            return Ok(());
+        }
         // The step that deviates most is the one to blame; it may have come before.
         let blame = [shortest, longest]
             .into_iter()
@@ -417,6 +443,47 @@ impl TimeCheck {
         let is_whole = deviation <= WHOLE_RATE && (in_scatter || deviation <= by_rounding);
         Some((mean, if is_whole { whole } else { mean }))
     }
+}
+
+/// Rows that settle the reference step.
+const HEAD_ROWS: usize = 4096;
+
+/// Digits with which numbers were written whose text is no longer there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Printed {
+    /// As few as tell the number from its neighbours.
+    Shortest,
+    /// So many decimals.
+    Decimals(usize),
+    /// All of them: binary numbers.
+    Exact,
+}
+
+impl Printed {
+    fn text(self, value: f64) -> String {
+        match self {
+            Self::Shortest => format!("{value:e}"),
+            Self::Decimals(decimals) => format!("{value:.decimals$}"),
+            Self::Exact => format!("{value:.16e}"),
+        }
+    }
+}
+
+/// Checks that values rise evenly, each with its line (1-based) in the file. Where `resamples`, steps may deviate by 2 %.
+pub(super) fn check_even(
+    values: &[f64],
+    lines: impl Iterator<Item = u64>,
+    printed: Printed,
+    resamples: bool,
+) -> Result<TimeCheck, UnevenStep> {
+    let head = values.iter().take(HEAD_ROWS);
+    let head: Vec<(f64, String)> = head.map(|value| (*value, printed.text(*value))).collect();
+    let mut check = TimeCheck::new(head.iter().map(|(value, text)| (*value, text.as_bytes())));
+    check.resamples = resamples;
+    for (value, line) in values.iter().zip(lines) {
+        check.add(*value, printed.text(*value).as_bytes(), line)?;
+    }
+    Ok(check)
 }
 
 /// Number of digits of the times, over all cells looked at: fixed decimals or fixed significant

@@ -56,6 +56,9 @@ const UNITS: &[(&str, f64, &str)] = &[
     ("-", 1.0, "1"),
 ];
 
+/// Units of a time column and what they are in seconds: words of descriptions and options.
+pub const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+
 /// Factor to SI and the SI unit's name of a channel's unit, `None` for an unknown one.
 ///
 /// Case counts. Micro may be written u or as either micro sign, powers with or without a caret,

@@ -30,6 +30,8 @@ pub(in crate::recording) struct CsvLayout {
     pub columns: Vec<Column>,
     /// The time column, 0-based.
     pub time: Option<usize>,
+    /// True where no heading names the time: the first column rises evenly.
+    pub time_is_inferred: bool,
     /// Byte at which the first row begins.
     pub start: u64,
     /// Number of the line before the first row.
@@ -53,8 +55,13 @@ impl CsvLayout {
 
     /// Returns the factor from the time column's unit to seconds.
     ///
-    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is seconds.
-    pub(super) fn time_factor(&self, file: &str) -> Result<f64, RecordingError> {
+    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is the `stated` one (s), else
+    /// seconds.
+    pub(super) fn time_factor(
+        &self,
+        file: &str,
+        stated: Option<f64>,
+    ) -> Result<f64, RecordingError> {
         let column = self.time.map(|at| &self.columns[at]);
         let Some(column) = column else {
             return Ok(1.0);
@@ -63,8 +70,16 @@ impl CsvLayout {
         let suffix = name.rsplit('_').next().unwrap_or_default();
         let unit = channel_unit(column.unit.as_deref().unwrap_or(suffix));
         match (unit, &column.unit) {
-            (Some((factor, "s")), _) => Ok(factor),
-            (_, None) => Ok(1.0),
+            (Some((factor, "s")), _) => match stated {
+                Some(stated) if stated != factor => {
+                    let problem = format!(
+                        "the heading gives the time in units of {factor} s, and time_unit states {stated} s; drop time_unit, or correct the heading"
+                    );
+                    Err(RecordingError::at_line(file, self.lines_before, problem))
+                }
+                _ => Ok(factor),
+            },
+            (_, None) => Ok(stated.unwrap_or(1.0)),
             (_, Some(unit)) => {
                 let problem = format!(
                     "the time column's unit \"{unit}\" is not one of time; allowed: s, ms, us, ns, min, h"
@@ -89,7 +104,7 @@ pub(in crate::recording) struct Column {
 }
 
 impl Column {
-    fn new(name: &str, unit: &str) -> Self {
+    pub fn new(name: &str, unit: &str) -> Self {
         let [name, unit] = [name, unit].map(|text| Some(text.trim().to_owned()));
         Self {
             name: name.filter(|name| !name.is_empty()),
@@ -136,8 +151,13 @@ impl<'a> Head<'a> {
         Self { lines, line_end }
     }
 
-    /// Finds the layout of the file; `file` names it in errors.
-    pub(super) fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
+    /// Finds the layout of the file; `file` names it in errors. Where `infers_time`, a first column without heading may
+    /// be the time.
+    pub(super) fn layout(
+        &self,
+        file: &str,
+        infers_time: bool,
+    ) -> Result<CsvLayout, RecordingError> {
         let candidates = Separator::ALL.map(|separator| Candidate::new(self, separator));
         // Most rows first, then a header that fits, then most columns, then the order of preference.
         let best = candidates.iter().rev().max_by_key(|one| {
@@ -146,7 +166,11 @@ impl<'a> Head<'a> {
             (one.rows, header_fits, one.cells)
         });
         if let Some(best) = best.filter(|best| best.rows > 0) {
-            return best.layout(file);
+            let mut layout = best.layout(file)?;
+            if infers_time && layout.time.is_none() && self.first_rises_evenly(&layout) {
+                (layout.time, layout.time_is_inferred) = (Some(0), true);
+            }
+            return Ok(layout);
         }
         // The line with most digits, the first of several.
         let lines = self.lines.iter().enumerate().rev();
@@ -166,6 +190,40 @@ impl<'a> Head<'a> {
     pub(super) fn numbers(&self, layout: &CsvLayout, column: usize) -> Vec<HeadNumber<'a>> {
         let rows = layout.lines_before as usize..self.lines.len();
         self.numbers_in(rows, layout.separator, column)
+    }
+
+    /// Returns true where no column has a heading and the first rises in every row, nearly evenly in nine of ten steps:
+    /// no signal does that. (Which steps are too uneven is found when the rows are read.)
+    fn first_rises_evenly(&self, layout: &CsvLayout) -> bool {
+        let named = |column: &Column| column.name.is_some() || column.unit.is_some();
+        if layout.columns.len() < 2 || layout.columns.iter().any(named) {
+            return false;
+        }
+        let numbers = self.numbers(layout, 0);
+        let steps = numbers.windows(2).map(|pair| pair[1].value - pair[0].value);
+        let mut sorted: Vec<f64> = steps.collect();
+        sorted.sort_by(f64::total_cmp);
+        let Some(median) = sorted.get(sorted.len() / 2) else {
+            return false;
+        };
+        // Three rows are two steps; printed times are rounded, so a tenth.
+        let near = sorted
+            .iter()
+            .filter(|step| (*step - median).abs() <= 0.1 * median);
+        sorted.len() >= 2 && sorted[0] > 0.0 && 10 * near.count() >= 9 * sorted.len()
+    }
+
+    /// Returns true where text above the rows says that the columns are functions of frequency.
+    pub(super) fn says_frequency(&self, layout: &CsvLayout) -> bool {
+        let above = self.lines.iter().take(layout.lines_before as usize);
+        above.clone().any(|(_, text)| {
+            let cells = split_texts(text, layout.separator);
+            let first = cells.first().map(|cell| cell.to_lowercase());
+            let first = first.unwrap_or_default();
+            cells.len() > 1
+                && cells[1..].iter().all(|cell| cell.parse::<f64>().is_err())
+                && (first == "hz" || first.starts_with("freq"))
+        })
     }
 
     /// Returns the readable numbers of one column in some lines (0-based).
@@ -403,6 +461,7 @@ impl<'a> Candidate<'a> {
             separator: self.separator,
             decimal: None,
             time,
+            time_is_inferred: false,
             columns,
             start: self.head.lines[first].0,
             lines_before: first as u64,
@@ -495,7 +554,7 @@ pub(in crate::recording) fn split_texts(line: &[u8], separator: Separator) -> Ve
 }
 
 /// Joins cells that begin with a bracket to the cell before: under blanks a name such as "force (N)" falls into two.
-fn joined_brackets(cells: Vec<String>) -> Vec<String> {
+pub(in crate::recording) fn joined_brackets(cells: Vec<String>) -> Vec<String> {
     let mut joined: Vec<String> = Vec::new();
     for cell in cells {
         match joined.last_mut() {

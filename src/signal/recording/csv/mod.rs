@@ -7,14 +7,17 @@ use std::sync::Arc;
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_rate};
+use super::resample::resample;
 use super::text::{Cell, CellProblem, TimeCheck, is_comment, parse_number, shown, split_cells};
-use super::units::channel_unit;
-use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, Timing, read_head};
+use super::{
+    ChannelInfo, Cursor, Format, ReadSettings, Recording, SAME_RATE, Source, Timing, read_head,
+};
 
 mod layout;
 
-pub(super) use layout::split_texts;
+pub(super) use layout::Column;
 use layout::{CsvLayout, HEAD_BYTES, Head};
+pub(super) use layout::{joined_brackets, split_texts};
 
 /// Rows between two entries of the index: some 100 kB of text, read in under a millisecond.
 const INDEX_ROWS: u64 = 4096;
@@ -32,7 +35,7 @@ pub(super) fn open_csv(
     settings: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
     let mut meters: Vec<HealthMeter> = Vec::new();
-    let source = CsvSource::open(path, &file, |block| {
+    let source = CsvSource::open(path, &file, Some(settings), |block| {
         meters.resize(block.len(), HealthMeter::new(None));
         for (samples, meter) in block.iter().zip(&mut meters) {
             meter.add(samples);
@@ -44,34 +47,38 @@ pub(super) fn open_csv(
     let mut warnings = Vec::new();
     let sample_rate = source.sample_rate(settings, &mut warnings)?;
     let layout = &source.layout;
+    let format = Format::Csv {
+        separator: layout.separator,
+        decimal: char::from(layout.decimal.unwrap_or(b'.')),
+        timed: match layout.time {
+            Some(_) => Timing::TimeColumn,
+            None => Timing::Given,
+        },
+    };
+    let columns = layout.channel_columns();
+    let headers: Vec<Column> = columns
+        .iter()
+        .map(|at| layout.columns[*at].clone())
+        .collect();
+    if let Some(deviation) = source.uneven {
+        let (times, samples) = source.times_and_samples(source.seconds_per_unit(sample_rate))?;
+        let even = resample(&times, &samples, deviation);
+        warnings.push(even.warning());
+        let columns = headers.into_iter().zip(even.samples).collect();
+        return Recording::in_memory(file, format, even.sample_rate, columns, warnings);
+    }
     let mut channels = Vec::with_capacity(meters.len());
-    for ((number, column), meter) in (1..).zip(layout.channel_columns()).zip(meters) {
-        let header = layout.columns[column].clone();
-        // Values are in SI where the header's unit is known.
-        let known = header.unit.as_deref().and_then(channel_unit);
-        if let (Some(unit), None) = (&header.unit, known) {
-            let name = header.name.as_deref();
-            warnings.push(RecordingWarning::unknown_unit(number, name, unit));
-        }
-        let scale = known.map_or(1.0, |(factor, _)| factor);
-        channels.push(ChannelInfo {
-            name: header.name,
-            unit: known.map_or_else(|| header.unit.clone(), |(_, si)| Some(si.to_owned())),
-            header_unit: header.unit,
-            scale,
-            health: meter.finish().scaled(scale),
-        });
+    for ((number, header), meter) in (1..).zip(headers).zip(meters) {
+        channels.push(ChannelInfo::with_header(
+            number,
+            header,
+            meter,
+            &mut warnings,
+        ));
     }
     Ok(Recording {
         name: file,
-        format: Format::Csv {
-            separator: layout.separator,
-            decimal: char::from(layout.decimal.unwrap_or(b'.')),
-            timed: match layout.time {
-                Some(_) => Timing::TimeColumn,
-                None => Timing::Given,
-            },
-        },
+        format,
         sample_rate,
         frames: source.frames,
         channels,
@@ -89,28 +96,42 @@ pub(super) struct CsvSource {
     frames: u64,
     /// Place of every 4096th row.
     index: Vec<RowPlace>,
+    /// What a unit of the time column is by heading or statement (s).
+    time_factor: f64,
     /// Sample rate by the time column: from first and last time, and the one to use (Hz).
     rate: Option<(f64, f64)>,
+    /// Largest deviation of a step of time, as a part of it, where samples must be resampled.
+    uneven: Option<f64>,
 }
 
 impl CsvSource {
     /// Reads the whole file once, hands every block of channel values to `sink`, and remembers
-    /// where rows begin. Every cell is parsed, and every step of time checked.
+    /// where rows begin. Every cell is parsed, and every step of time checked. `series` are the settings for a time
+    /// series; without them the columns are functions of frequency, and none is taken for the time unless it is named.
     pub(super) fn open(
         path: &Path,
         file: &str,
+        series: Option<&ReadSettings>,
         mut sink: impl FnMut(&[Vec<f64>]),
     ) -> Result<Self, RecordingError> {
         let head = read_head(path, file, HEAD_BYTES)?;
         let head = Head::new(&head);
-        let layout = head.layout(file)?;
+        let layout = head.layout(file, series.is_some())?;
+        if layout.time_is_inferred && head.says_frequency(&layout) {
+            return Err(RecordingError::Functions {
+                place: format!("{file}:{}", layout.lines_before + 1),
+                found: "the text above the rows names frequencies".to_owned(),
+            });
+        }
         let mut source = Self {
             path: path.to_owned(),
             file: file.to_owned(),
             layout,
             frames: 0,
             index: Vec::new(),
+            time_factor: 1.0,
             rate: None,
+            uneven: None,
         };
         let layout = &source.layout;
         let channels = layout.channel_columns();
@@ -122,10 +143,11 @@ impl CsvSource {
             );
             return Err(source.error(problem));
         }
-        let factor = layout.time_factor(file)?;
+        let factor = layout.time_factor(file, series.and_then(|settings| settings.time_unit))?;
         let mut time = layout.time.map(|column| {
             let numbers = head.numbers(layout, column);
-            TimeCheck::new(numbers.iter().map(|number| (number.value, number.text)))
+            let numbers = numbers.iter().map(|number| (number.value, number.text));
+            TimeCheck::new(numbers).for_resampling()
         });
         let (mut index, mut frames) = (Vec::new(), 0_u64);
         let mut block = vec![Vec::new(); channels.len()];
@@ -142,7 +164,7 @@ impl CsvSource {
                 let (cell, line) = (rows.cell(column), rows.line_number());
                 check.add(rows.values[column], cell, line).map_err(|uneven| {
                     let problem = format!(
-                        "uneven sampling: time {}{}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
+                        "uneven sampling: time {}{}; allowed: 2 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
                         uneven.words(factor, "s", "row"),
                         uneven.lost_rows()
                     );
@@ -155,7 +177,9 @@ impl CsvSource {
         }
         sink(&block);
         let decimal = rows.decimal;
+        source.uneven = time.as_ref().and_then(TimeCheck::uneven);
         source.rate = time.and_then(|time| time.sample_rate(factor));
+        source.time_factor = factor;
         source.layout.decimal = decimal;
         (source.index, source.frames) = (index, frames);
         Ok(source)
@@ -187,6 +211,10 @@ impl CsvSource {
                 });
             }
         }
+        if let Some((_, used)) = self.rate.filter(|_| layout.time_is_inferred) {
+            check_rate(file, used)?;
+            return self.inferred_rate(used, settings, warnings);
+        }
         if let Some((mean, used)) = self.rate {
             check_rate(file, used)?;
             if (mean - used).abs() > MENTIONED_ROUNDING * used {
@@ -203,6 +231,65 @@ impl CsvSource {
         }
         let head = read_head(&self.path, file, HEAD_BYTES)?;
         Err(Head::new(&head).no_sample_rate(layout, file))
+    }
+
+    /// Settles the sample rate (Hz) where the first column is the time and no heading says so; `by_column` is the
+    /// column's.
+    fn inferred_rate(
+        &self,
+        by_column: f64,
+        settings: &ReadSettings,
+        warnings: &mut Vec<RecordingWarning>,
+    ) -> Result<f64, RecordingError> {
+        // Rows that are counted have steps of exactly 1.
+        let counts = settings.time_unit.is_none() && (by_column - 1.0).abs() < 1e-9;
+        if let Some(given) = settings.sample_rate {
+            let ratio = given / by_column;
+            let units = [1.0, 1e3, 1e6, 1e9].map(|unit| (ratio / unit - 1.0).abs() <= SAME_RATE);
+            if counts || units.contains(&true) {
+                return Ok(given);
+            }
+            return Err(self.error(format!(
+                "the first column rises evenly, as a time of {by_column} Hz, and sample_rate states {given} Hz; allowed: two that agree, in s, ms or us; correct sample_rate, or give the columns headings"
+            )));
+        }
+        if counts {
+            return Err(self.error(
+                "the first column counts the rows and has no heading: it gives no sample rate; give sample_rate in Hz, or time_unit where it is a time",
+            ));
+        }
+        if settings.time_unit.is_none() {
+            let message = format!(
+                "no heading names the time: the first column rises evenly and is taken as the time in s, {by_column} Hz; state time_unit = \"ms\" (--time-unit) if it is in another unit"
+            );
+            warnings.push(RecordingWarning::new("time-assumed", message));
+        }
+        Ok(by_column)
+    }
+
+    /// Returns what a unit of the time column is (s): by its heading, as stated, or by a given sample rate.
+    fn seconds_per_unit(&self, sample_rate: f64) -> f64 {
+        let by_column = self.rate.map_or(sample_rate, |(_, used)| used);
+        self.time_factor * by_column / sample_rate
+    }
+
+    /// Reads all times (s) and all samples.
+    fn times_and_samples(
+        &self,
+        seconds_per_unit: f64,
+    ) -> Result<(Vec<f64>, Vec<Vec<f64>>), RecordingError> {
+        let mut columns = self.layout.channel_columns();
+        columns.extend(self.layout.time);
+        let mut rows = self.rows(self.first_row())?;
+        let mut samples = vec![Vec::new(); columns.len()];
+        while rows.next_row(&columns)? {
+            for (column, value) in samples.iter_mut().zip(&rows.values) {
+                column.push(*value);
+            }
+        }
+        let mut times = samples.pop().unwrap_or_default();
+        times.iter_mut().for_each(|time| *time *= seconds_per_unit);
+        Ok((times, samples))
     }
 
     fn first_row(&self) -> RowPlace {

@@ -3,6 +3,8 @@
 mod arbitrary;
 mod csv;
 mod health;
+mod laboratory;
+mod mat;
 mod real;
 mod wav;
 

@@ -11,6 +11,7 @@ fn open_and_read(bytes: &[u8]) -> Result<(), TestCaseError> {
     let file = file("arbitrary", bytes);
     let settings = ReadSettings {
         sample_rate: Some(1000.0),
+        ..ReadSettings::default()
     };
     let recording = match Recording::open(&file.path, &settings) {
         Ok(recording) => recording,

@@ -219,6 +219,7 @@ fn prop_health_does_not_depend_on_how_the_file_is_read() {
     for file in [wav, csv] {
         let settings = ReadSettings {
             sample_rate: Some(RATE),
+            ..ReadSettings::default()
         };
         let recording = Recording::open(&file.path, &settings).unwrap();
         let mut other = recording.channels()[0].health.clone();

@@ -615,6 +615,7 @@ fn prop_a_given_rate_that_differs_is_ignored_with_a_warning() {
     let file = file("rate.wav", pcm16().bytes());
     let settings = |rate| ReadSettings {
         sample_rate: Some(rate),
+        ..ReadSettings::default()
     };
     let recording = Recording::open(&file.path, &settings(5120.0)).unwrap();
     assert_eq!(recording.sample_rate(), 12_800.0);

@@ -1,7 +1,7 @@
 //! Universal files that analysers and other programs wrote.
 
 use tapjoint_signal::recording::{
-    Abscissa, FunctionType, ResponseForm, list_datasets, open_frequency_responses,
+    Abscissa, FunctionType, ReadSettings, ResponseForm, list_datasets, open_frequency_responses,
 };
 
 use super::{data, function, open, samples};
@@ -249,7 +249,8 @@ fn val_a_hammer_test_and_its_resonances() {
     let path = data("ufffiles_jl_uff/dataset58_FRF.unv");
     let utf = data("ufffiles_jl_uff/dataset58_FRF_UTF.unv");
     for path in [path, utf] {
-        let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
+        let found = open_frequency_responses(&path, &ReadSettings::default())
+            .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(
             (found.spacing, found.lines, found.responses.len()),
             (0.5, 1600, 1)
@@ -277,7 +278,8 @@ fn val_a_hammer_test_and_its_resonances() {
 #[ignore = "needs TAPJOINT_DATA"]
 fn val_other_responses() {
     let path = data("pyuff_uff/non_ascii_header.uff");
-    let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
+    let found = open_frequency_responses(&path, &ReadSettings::default())
+        .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((found.lines, found.spacing), (6, 25.0 / 128.0));
     let only = &found.responses[0];
     assert_eq!(
@@ -289,7 +291,8 @@ fn val_other_responses() {
         num_complex::Complex64::new(3.75037, 2.93363)
     );
     let path = data("ufffiles_jl_uff/dataset58_ufb.ufb");
-    let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
+    let found = open_frequency_responses(&path, &ReadSettings::default())
+        .unwrap_or_else(|error| panic!("{error}"));
     let names: Vec<_> = found.responses.iter().map(|r| r.name.as_str()).collect();
     assert_eq!(names, ["1:+X / 22:+X", "1:+Y / 22:+X"]);
     assert!(
@@ -305,7 +308,8 @@ fn val_other_responses() {
 fn val_an_analysers_text_and_its_resonances() {
     for name in ["Hxysv00001", "Hxysv00005"] {
         let path = data(&format!("modelab_freefree_beam/{name}.txt"));
-        let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
+        let found = open_frequency_responses(&path, &ReadSettings::default())
+            .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((found.lines, found.first_frequency), (51_201, 0.0));
         assert!(
             (found.spacing - 0.019_531_25).abs() < 1e-12,

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use proptest::prelude::*;
 use tapjoint_signal::recording::{
-    FrequencyResponse, FrequencyResponses, Point, ResponseForm, UffFormat,
+    FrequencyResponse, FrequencyResponses, Point, ReadSettings, ResponseForm, UffFormat,
     encode_frequency_responses_uff, open_frequency_responses,
 };
 
@@ -12,12 +12,13 @@ use crate::recording::assert_message;
 use crate::written::file;
 
 fn responses(path: &std::path::Path) -> FrequencyResponses {
-    open_frequency_responses(path).unwrap_or_else(|error| panic!("{error}"))
+    open_frequency_responses(path, &ReadSettings::default())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn error(bytes: impl AsRef<[u8]>) -> String {
     let tested = file("tested.frf", bytes);
-    let message = open_frequency_responses(&tested.path)
+    let message = open_frequency_responses(&tested.path, &ReadSettings::default())
         .expect_err("unusable")
         .to_string();
     message[message.find("tested.frf").unwrap()..].to_owned()
@@ -179,14 +180,9 @@ fn val_what_holds_no_response_says_what_it_holds() {
         &["form"],
     );
     assert_message(
-        &error("Hz,Magnitude,Phase\n0,1,2\n1,1,2\n2,1,2\n"),
-        "tested.frf:2: the heading \"Magnitude\"",
-        &["real part"],
-    );
-    assert_message(
         &error("Hz,Re\n0,1\n1,1\n2,1\n"),
-        "tested.frf:2: there are 2 columns",
-        &["three columns"],
+        "tested.frf:2: the headings do not say which columns belong together",
+        &["real and imaginary part", "dB-degrees"],
     );
     assert_message(
         &error("Hz,Re,Im\n0,1,2\n1,1,2\n3,1,2\n4,1,2\n"),
@@ -261,6 +257,7 @@ fn made(values: Vec<Complex64>, coherence: Option<Vec<f64>>) -> FrequencyRespons
         first_frequency: 0.5,
         spacing: 0.3125,
         lines: values.len(),
+        has_phase: true,
         responses: vec![FrequencyResponse {
             name: "tip 3:+Z / 1:-RY".to_owned(),
             response: point(Some("tip"), 3, 3),

@@ -1,7 +1,7 @@
 //! Time series and the eight cases, from files that the tests write.
 
 use proptest::prelude::*;
-use tapjoint_signal::recording::{Format, UffCoding, list_datasets, read_function};
+use tapjoint_signal::recording::{Format, ReadSettings, UffCoding, list_datasets, read_function};
 
 use super::{Made, Store, file_of, function, open, response, samples, series};
 use crate::recording::assert_message;
@@ -497,7 +497,9 @@ fn read_everything(bytes: &[u8]) -> Result<(), TestCaseError> {
             }
         }
     }
-    if let Ok(found) = tapjoint_signal::recording::open_frequency_responses(&tested.path) {
+    if let Ok(found) =
+        tapjoint_signal::recording::open_frequency_responses(&tested.path, &ReadSettings::default())
+    {
         for response in &found.responses {
             prop_assert_eq!(response.values.len(), found.lines);
         }

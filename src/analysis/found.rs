@@ -1,0 +1,124 @@
+//! What the files of a test hold, for a description that is yet to be written.
+
+use std::path::Path;
+
+use tapjoint_description::{FoundChannel, FoundContent, FoundRecording, FunctionForm, SensorKind};
+use tapjoint_signal::recording::{
+    FrequencyResponses, ReadSettings, Recording, RecordingError, open_frequency_responses,
+};
+
+/// Samples of each channel by which a hammer is recognised.
+const LOOKED_AT: u64 = 4_000_000;
+
+/// Least kurtosis of a hammer's channel. A pulse of a thousandth of the record has about a thousand; a tap that rings
+/// for a tenth of it has some thirty, noise 3.
+const PULSES: f64 = 100.0;
+
+/// Least ratio of a hammer's kurtosis to that of any other channel: pulses last far shorter than what they excite.
+const SHORTER: f64 = 3.0;
+
+/// Opens a file and tells what it holds. A file that cannot be opened is told as such.
+pub fn look_at(path: &Path, name: &str) -> FoundRecording {
+    let settings = ReadSettings::default();
+    let content = match Recording::open(path, &settings) {
+        Ok(recording) => series(&recording),
+        Err(
+            RecordingError::FrequencyColumn { .. }
+            | RecordingError::Functions { .. }
+            | RecordingError::NoTimeSeries { .. },
+        ) => open_frequency_responses(path, &settings).map(|found| functions(&found)),
+        Err(problem) => Err(problem),
+    };
+    FoundRecording {
+        file: name.to_owned(),
+        content: content.unwrap_or_else(|problem| FoundContent::Unread(problem.to_string())),
+    }
+}
+
+fn functions(found: &FrequencyResponses) -> FoundContent {
+    let form = found.responses.first().and_then(|response| response.form);
+    FoundContent::Functions {
+        form: match found.has_phase {
+            true => form.map(FunctionForm::Response),
+            false => Some(FunctionForm::Spectrum),
+        },
+        band: (
+            found.frequency(0),
+            found.frequency(found.lines.saturating_sub(1)),
+        ),
+        count: found.responses.len(),
+    }
+}
+
+fn series(recording: &Recording) -> Result<FoundContent, RecordingError> {
+    let mut channels = Vec::new();
+    for info in recording.channels() {
+        channels.push(FoundChannel {
+            name: info.name.clone(),
+            unit: info.unit.clone(),
+            kind: match info.unit.as_deref() {
+                Some("m/s") => Some(SensorKind::Velocity),
+                Some("m") => Some(SensorKind::Displacement),
+                Some("Pa") => Some(SensorKind::Sound),
+                Some("m/s2") => Some(SensorKind::Acceleration),
+                _ => None,
+            },
+        });
+    }
+    Ok(FoundContent::Series {
+        hammer: hammer(recording)?,
+        channels,
+        sample_rate: recording.sample_rate(),
+    })
+}
+
+/// Returns the channel of the hammer (0-based), and what shows it: its name, its unit, or the shape of its signal.
+fn hammer(recording: &Recording) -> Result<Option<(usize, &'static str)>, RecordingError> {
+    let channels = recording.channels();
+    let named = channels.iter().position(|info| {
+        let name = info.name.as_deref().unwrap_or_default().to_lowercase();
+        ["hammer", "force", "kraft", "impact"]
+            .iter()
+            .any(|word| name.contains(word))
+    });
+    if let Some(channel) = named {
+        return Ok(Some((channel, "by its name")));
+    }
+    let in_newton = channels
+        .iter()
+        .position(|info| info.unit.as_deref() == Some("N"));
+    if let Some(channel) = in_newton {
+        return Ok(Some((channel, "by its unit")));
+    }
+    let mut sharpness = Vec::with_capacity(channels.len());
+    for channel in 0..channels.len() {
+        sharpness.push(kurtosis(&recording.read(channel, 0..LOOKED_AT)?));
+    }
+    let sharpest = (0..channels.len()).max_by(|a, b| sharpness[*a].total_cmp(&sharpness[*b]));
+    let is_hammer = |channel: &usize| {
+        let mut others = (0..sharpness.len()).filter(|other| other != channel);
+        sharpness[*channel] >= PULSES
+            && sharpness.len() > 1
+            && others.all(|other| sharpness[*channel] >= SHORTER * sharpness[other])
+    };
+    Ok(sharpest
+        .filter(is_hammer)
+        .map(|channel| (channel, "by its short pulses; check it")))
+}
+
+/// Returns the fourth moment over the square of the second, about the mean; 0 for a constant.
+fn kurtosis(samples: &[f64]) -> f64 {
+    let count = samples.len().max(1) as f64;
+    let mean = samples.iter().sum::<f64>() / count;
+    let (mut second, mut fourth) = (0.0, 0.0);
+    for sample in samples {
+        let square = (sample - mean).powi(2);
+        second += square;
+        fourth += square * square;
+    }
+    if second > 0.0 {
+        count * fourth / (second * second)
+    } else {
+        0.0
+    }
+}

@@ -23,6 +23,7 @@ mod golden;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;
+mod interval_coverage;
 mod joint_law;
 mod modal_fit;
 mod observations;

@@ -15,6 +15,7 @@ use std::ops::Range;
 
 use crate::recording::{Recording, RecordingError};
 use double_hit::second_hit;
+use nalgebra::{DMatrix, DVector};
 use search::{Force, Survey, find_pulses, find_rises};
 use tapjoint_numerics::stats::{median, root_mean_square};
 
@@ -503,11 +504,10 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
 /// Stretch before and after the trigger that is compared (s): several periods of the lowest modes'
 /// higher companions, short beside the time between taps.
 const STRETCH: f64 = 0.05;
-/// A tap raises the rms of some response by this factor at least; a weaker one rings on top of what
-/// is still ringing and is of no use.
+/// A tap raises the rms of some response by this factor at least, or that of what cannot be predicted of it.
 const RISE: f64 = 1.5;
 
-/// Returns `true` where any response rises when the force does. A hammer laid down, a swinging hammer and an
+/// Returns `true` where any response rises, or does not ring on as before, when the force rises. A hammer laid down, a swinging hammer and an
 /// electrical spike move no sensor. Without responses, or at the very start of the recording, the
 /// benefit of the doubt is given.
 fn is_answered(
@@ -531,8 +531,61 @@ fn is_answered(
         {
             return Ok(true);
         }
+        // A hit on a structure that still rings loudly may leave it no louder.
+        let continued = (CONTINUED * recording.sample_rate()) as u64;
+        let first = before.end.saturating_sub(continued);
+        let ringing = recording.read(response, first..after.end)?;
+        let turn = (before.end - first) as usize;
+        let lag = ((LAG * recording.sample_rate()) as usize).max(1);
+        if let Some((quiet, loud)) = unpredicted(&ringing, turn, lag)
+            && loud > RISE * quiet
+        {
+            return Ok(true);
+        }
     }
     Ok(false)
+}
+
+/// Stretch before the trigger from which the ringing is continued (s): two taps lie no nearer.
+const CONTINUED: f64 = 0.2;
+/// Distance of the past values from which the next one is predicted (s): a part of a period of the strong low modes,
+/// so that noise on neighbouring samples does not hide their curvature.
+const LAG: f64 = 1e-3;
+/// Number of past values: two for each of eight oscillations.
+const LAGS: usize = 16;
+
+/// Root mean squares of what a linear prediction misses before the sample `turn`, from which its weights come, and
+/// after it; `None` where there are too few samples.
+///
+/// A sum of n decaying oscillations is predicted exactly by 2 n equally spaced past values (de Prony 1795), whatever
+/// its beats. A new hit breaks the prediction.
+fn unpredicted(samples: &[f64], turn: usize, lag: usize) -> Option<(f64, f64)> {
+    let reach = LAGS * lag;
+    let rows = turn.checked_sub(reach).filter(|rows| *rows >= 4 * LAGS)?;
+    let past = |row: usize| (1..=LAGS).map(move |k| samples[row - k * lag]);
+    let mut normal = DMatrix::<f64>::zeros(LAGS, LAGS);
+    let mut right = DVector::<f64>::zeros(LAGS);
+    for row in reach..turn {
+        let values = DVector::from_iterator(LAGS, past(row));
+        normal.ger(1.0, &values, &values, 1.0);
+        right.axpy(samples[row], &values, 1.0);
+    }
+    // Fewer oscillations than the weights could follow leave the equations nearly singular.
+    let trace = normal.trace();
+    for k in 0..LAGS {
+        normal[(k, k)] += 1e-12 * trace;
+    }
+    let weights = normal.cholesky()?.solve(&right);
+    let misses = |rows: Range<usize>| -> f64 {
+        let errors = rows.map(|row| {
+            let predicted: f64 = past(row).zip(&weights).map(|(x, w)| x * w).sum();
+            (samples[row] - predicted).powi(2)
+        });
+        errors.sum()
+    };
+    let before = misses(reach..turn) / (rows - LAGS) as f64;
+    let after = misses(turn..samples.len()) / samples.len().saturating_sub(turn).max(1) as f64;
+    Some((before.sqrt(), after.sqrt()))
 }
 
 /// rms of the second differences: it weighs high modes, which die first and which a new hit wakes
@@ -550,4 +603,84 @@ fn rms_about_mean(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let about: Vec<f64> = samples.iter().map(|x| x - mean).collect();
     root_mean_square(&about)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Channel;
+    use std::f64::consts::TAU;
+
+    /// Force pulses of 2 ms at 1 and 2.2 s, and the decays that the `struck` ones wake: 60.4 and 155.4 Hz.
+    fn taps(struck: &[f64], noise: f64) -> Taps {
+        const RATE: f64 = 2048.0;
+        let (mut force, mut response) = (vec![0.0; 8192], vec![0.0; 8192]);
+        // A linear congruence is noise enough.
+        let mut state = 1u32;
+        for n in 0..8192 {
+            let time = n as f64 / RATE;
+            for hit in [1.0, 2.2] {
+                let t = time - hit;
+                if (0.0..2e-3).contains(&t) {
+                    force[n] += (TAU * t / 4e-3).sin();
+                }
+                if t > 0.0 && struck.contains(&hit) {
+                    for (frequency, damping, amplitude) in [(60.4, 5e-4, 1.0), (155.4, 5e-4, 0.3)] {
+                        let omega = TAU * frequency;
+                        response[n] += amplitude * (-damping * omega * t).exp() * (omega * t).sin();
+                    }
+                }
+            }
+            for samples in [&mut force, &mut response] {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                samples[n] += noise * (f64::from(state) / f64::from(u32::MAX) - 0.5);
+            }
+        }
+        let channels = [force, response].map(|samples| Channel {
+            samples,
+            ..Channel::default()
+        });
+        let recording = Recording::from_samples("taps", RATE, channels.into()).unwrap();
+        let source = TapSource::Hammer {
+            channel: 0,
+            responses: vec![1],
+        };
+        find_taps(&recording, &source, &TapSettings::default()).unwrap()
+    }
+
+    #[test]
+    fn regress_a_hit_that_leaves_the_ringing_no_louder_is_a_tap() {
+        for noise in [1e-3, 3e-2] {
+            // After 1.2 s the modes keep 80 and 56 % of their amplitudes, and both are half a cycle off the second hit.
+            let found = taps(&[1.0, 2.2], noise);
+            let reasons: Vec<_> = found.taps.iter().map(|tap| &tap.rejection).collect();
+            assert_eq!(reasons, [&None, &None], "noise {noise}");
+            // Its record ends where the second begins, or the fit would take both hits for one decay.
+            assert!(found.taps[0].record.end <= found.taps[1].record.start + 1);
+            // A hammer laid down while the structure rings moves nothing.
+            let found = taps(&[1.0], noise);
+            assert_eq!(
+                found.taps[1].rejection,
+                Some(Rejection::NoResponse),
+                "noise {noise}"
+            );
+        }
+    }
+
+    #[test]
+    fn limit_oscillations_are_predicted_until_something_new_comes() {
+        let rings = |n: usize| -> f64 {
+            let waves = [(0.31, 1.0), (0.47, 0.5), (1.13, 0.2)];
+            let at = |(omega, amplitude): &(f64, f64)| amplitude * (omega * n as f64).sin();
+            (-1e-3 * n as f64).exp() * waves.iter().map(at).sum::<f64>()
+        };
+        let mut samples: Vec<f64> = (0..400).map(rings).collect();
+        let (before, after) = unpredicted(&samples, 300, 2).unwrap();
+        // The ridge of 10^-12 leaves some 10^-6 of the amplitude.
+        assert!(before < 1e-4 && after < 1e-4, "{before} {after}");
+        samples[320] += 0.01;
+        let (before, after) = unpredicted(&samples, 300, 2).unwrap();
+        assert!(after > 10.0 * before, "{before} {after}");
+        assert_eq!(unpredicted(&samples, 90, 2), None);
+    }
 }

@@ -1,0 +1,73 @@
+//! Intervals of the whole chain hold the truth as often as they say: a small version of `examples/interval_coverage`.
+
+#[allow(
+    dead_code,
+    reason = "the study reads more of its answers than the tests"
+)]
+#[path = "../../examples/interval_coverage/cells.rs"]
+mod cells;
+
+use cells::{Answer, Cell, Noise, RealSignals, run_cell};
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+const NOISES: [Noise; 4] = [Noise::White, Noise::Red, Noise::Blue, Noise::HeavyTailed];
+/// Chance at which a test fails although the intervals are true.
+const CHANCE: f64 = 1e-3;
+
+fn answers(cell: Cell, modes: usize) -> Vec<Answer> {
+    run_cell(cell, modes, 7, &NOISES, &RealSignals::default())
+}
+
+#[test]
+fn prop_intervals_hold_the_truth_as_often_as_they_say() {
+    let cells = [
+        Cell::Clean,
+        Cell::HeavyDamping,
+        Cell::SixteenBit,
+        Cell::ExponentialWindow,
+    ];
+    for cell in cells {
+        let answers = answers(cell, 100);
+        let found = answers.iter().filter(|answer| answer.found.is_some());
+        let found = found.count() as u64;
+        // A mode may drown in noise; the full study misses 0.4 to 5 % of them.
+        assert!(found >= 85, "{}: {found} of 100 modes", cell.name());
+        let inside = answers
+            .iter()
+            .filter(|answer| answer.is_inside() == Some(true));
+        let inside = inside.count() as u64;
+        // So few inside by chance where 93 % hold the truth, so many where 97 % do: both improbable.
+        let few = Binomial::new(0.93, found).unwrap().cdf(inside);
+        let many = match inside {
+            0 => 1.0,
+            _ => Binomial::new(0.97, found).unwrap().sf(inside - 1),
+        };
+        assert!(
+            few > CHANCE && many > CHANCE,
+            "{}: {inside} of {found} intervals hold the truth",
+            cell.name()
+        );
+        let far = answers
+            .iter()
+            .filter(|answer| answer.deviations() > Some(3.0));
+        let far = far.count() as u64;
+        let chance = match far {
+            0 => 1.0,
+            _ => Binomial::new(0.005, found).unwrap().sf(far - 1),
+        };
+        assert!(
+            chance > CHANCE,
+            "{}: {far} of {found} are off by more than three standard deviations",
+            cell.name()
+        );
+    }
+}
+
+#[test]
+fn prop_cases_are_the_same_whatever_the_number_of_threads() {
+    let in_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| answers(Cell::Clean, 12))
+    };
+    assert_eq!(in_threads(1), in_threads(3));
+}

@@ -5,11 +5,10 @@ use serde::Serialize;
 use std::cmp::Ordering;
 use std::fmt;
 use tapjoint_numerics::stats::median;
-use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
+use tapjoint_signal::modal::amplitude::{
+    AmplitudeCurve, AmplitudeReading, AmplitudeVerdict, LEAST_CHANGE,
+};
 
-/// Smallest relative change of a frequency that is reported: 0.01 %, a fifth of the smallest
-/// change that Ingole & Chatterjee perturb frequencies by.
-const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
 /// Smallest relative change of a damping that is reported: 5 %, about the repeatability of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
 /// Bounds of a curve up to this many times their median count as well known.
@@ -67,7 +66,7 @@ impl AmplitudeChange {
             damping_bound: ends.map(|end| end.damping_bound),
         };
         let (frequency, damping) = change.size();
-        let matters = frequency > LEAST_FREQUENCY_CHANGE || damping > LEAST_DAMPING_CHANGE;
+        let matters = frequency > LEAST_CHANGE || damping > LEAST_DAMPING_CHANGE;
         matters.then_some(change)
     }
 

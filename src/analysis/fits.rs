@@ -5,7 +5,7 @@
 //! [`fit_modes`].
 
 use num_complex::Complex64;
-use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
+use tapjoint_signal::modal::amplitude::{AmplitudeVerdict, Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
     PoleStart, TapForce, Unfit, fit_modes, modal_constants,
@@ -242,6 +242,12 @@ fn is_clear(fit: &ModeFit) -> bool {
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
 }
 
+/// Returns true for a reading that is a part of another mode's line.
+fn is_part(reading: &ModeReading) -> bool {
+    let curve = reading.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
+    curve.is_some_and(|curve| matches!(curve.verdict, AmplitudeVerdict::PartOf { .. }))
+}
+
 /// Decays of all taps, and what of them is fitted.
 pub(super) struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
@@ -325,6 +331,13 @@ impl FreeDecays {
         for (fit, curve) in fitted.into_iter().zip(curves) {
             fit.amplitude = Some(curve);
             fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
+        }
+        // Peaks of a line that is swept while it rings are no modes; what made no peak goes.
+        readings.retain(|reading| reading.prominence_db.is_some() || !is_part(reading));
+        for reading in readings.iter_mut().filter(|reading| is_part(reading)) {
+            reading.fit = None;
+            reading.between = None;
+            reading.label = Some(PeakLabel::NoResonance);
         }
         stabilisation
     }

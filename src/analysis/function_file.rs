@@ -170,6 +170,7 @@ fn spectra_of_functions(
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation,
     }
 }

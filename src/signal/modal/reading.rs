@@ -16,7 +16,7 @@ use num_complex::Complex64;
 
 use super::Subspace;
 use super::amplitude::AmplitudeCurve;
-use super::fit::{ModalConstant, ModeFit};
+use super::fit::{FittedValue, ModalConstant, ModeFit};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::{Lines, Window};
 
@@ -104,17 +104,16 @@ impl ModeReading {
     /// Takes the frequency that was read as `wanted`, or the next best that there is: by the fit, between
     /// the lines, on the line. The damping is that of the fit, or of the reading between the lines.
     pub fn select_estimate(&mut self, wanted: ReadBy) {
-        let fit = self.fit.as_deref().map(|fit| &fit.mode);
+        let fit = self.fit.as_deref().map(FittedReading::pole);
         (self.damping_ratio, self.damping_std) = match (fit, self.between) {
-            (Some(fit), _) => (Some(fit.damping_ratio.value), Some(fit.damping_ratio.std)),
+            (Some((_, damping)), _) => (Some(damping.value), Some(damping.std)),
             (None, Some(between)) => (
                 between.damping_ratio,
                 between.damping_ratio.map(|_| between.damping_std),
             ),
             (None, None) => (None, None),
         };
-        if let Some(fit) = fit.filter(|_| wanted == ReadBy::Fit) {
-            let found = fit.frequency;
+        if let Some((found, _)) = fit.filter(|_| wanted == ReadBy::Fit) {
             (self.frequency, self.source) = (found.value, ReadBy::Fit);
             (self.std, self.interval) = (Some(found.std), (found.low, found.high));
             return;
@@ -148,6 +147,16 @@ pub struct FittedReading {
 }
 
 impl FittedReading {
+    /// Natural frequency (Hz) and damping ratio (1): those at one amplitude, where they change with it, else those of the
+    /// whole decays.
+    pub fn pole(&self) -> (FittedValue, FittedValue) {
+        let curve = self.amplitude.as_ref();
+        match curve.and_then(|curve| curve.stated) {
+            Some(stated) => (stated.frequency, stated.damping_ratio),
+            None => (self.mode.frequency, self.mode.damping_ratio),
+        }
+    }
+
     /// Takes a fit alone.
     pub fn new(mode: ModeFit) -> Self {
         FittedReading {

@@ -325,6 +325,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation: Default::default(),
     };
     spectra.stabilisation.searches = vec![band_search(band)];
@@ -446,6 +447,7 @@ fn measured_taps() -> Vec<Tap> {
             time: tap.time,
             peak: tap.peak_force.unwrap_or(1.0),
             pulse_end: None,
+            pulse: None,
             record: 0..0,
             second_hit: None,
             rejection: None,

@@ -22,6 +22,8 @@ pub struct AmplitudeChange {
     pub amplitude: [f64; 2],
     /// Unit of the amplitude; `None` where it is not known.
     pub unit: Option<String>,
+    /// Amplitude at which the mode's one frequency holds (`unit`); `None` where it is that of a pole that does not change.
+    pub holds_at: Option<f64>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
     /// 95 % bounds of the frequency (Hz).
@@ -60,6 +62,7 @@ impl AmplitudeChange {
         let change = AmplitudeChange {
             amplitude: ends.map(|end| end.amplitude),
             unit: None,
+            holds_at: curve.stated.and(curve.amplitude),
             frequency: ends.map(|end| end.frequency),
             frequency_bound: ends.map(|end| end.frequency_bound),
             damping_ratio: ends.map(|end| end.damping_ratio),
@@ -136,7 +139,11 @@ impl fmt::Display for AmplitudeChange {
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
-        )
+        )?;
+        match self.holds_at {
+            Some(amplitude) => write!(f, "; the one listed holds at {}", two_digits(amplitude)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -208,6 +215,7 @@ mod tests {
         let change = AmplitudeChange {
             amplitude: [33.2, 2.31],
             unit: Some("m/s2".into()),
+            holds_at: None,
             frequency: [80.281, 80.543],
             frequency_bound: [0.01, 0.02],
             damping_ratio: [0.00283, 0.00149],
@@ -219,6 +227,11 @@ mod tests {
             "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
              falls from 33 to 2.3 m/s\u{b2}"
         );
+        let listed = AmplitudeChange {
+            holds_at: Some(14.2),
+            ..change.clone()
+        };
+        assert!(plain(&listed).ends_with("2.3 m/s\u{b2}; the one listed holds at 14"));
         let steady = AmplitudeChange {
             damping_bound: [0.001, 0.001],
             ..change

@@ -148,6 +148,7 @@ fn spectra_of_functions(
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
+            steady_lines: &[],
         };
         candidates.fit(&mut readings);
         // There are modal constants where the form of every function is known.

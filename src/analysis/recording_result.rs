@@ -229,6 +229,7 @@ mod tests {
             peak: 1.0,
             pulse_end: None,
             pulse: None,
+            overload: None,
             record: 0..100,
             second_hit,
             rejection: None,

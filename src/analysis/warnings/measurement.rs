@@ -392,8 +392,7 @@ fn dependence(mut group: Vec<(String, AmplitudeChanges)>) -> Warning {
     if let Some((_, first)) = changes.first() {
         text += &format!("; {}", first.way().cause());
     }
-    text += "; a recording at a second tap level would confirm it, and frequencies should be stated with their \
-             amplitude, or taken from softer taps";
+    text += "; a recording at a second tap level would confirm it; softer taps show the limit of small amplitudes";
     for (place, (file, changes)) in group.iter().enumerate() {
         let begin = if place == 0 { "; the same in" } else { ";" };
         let numbers: Vec<String> = changes.iter().map(|(mode, _)| mode.to_string()).collect();

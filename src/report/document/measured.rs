@@ -303,6 +303,11 @@ pub struct ModeSection {
     pub damping: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_std: Option<f64>,
+    /// Peak amplitude of the strongest sensor (`amplitude_unit`) at which frequency and damping hold; null where the
+    /// decays were not followed.
+    pub amplitude: Option<f64>,
+    /// Unit of `amplitude`; null where it is not known.
+    pub amplitude_unit: Option<String>,
     /// The fit; null where the mode was not fitted.
     pub fit: Option<FitSection>,
     /// Coherence on the mode's line, of the sensor that knows it best; null below two averages.
@@ -363,7 +368,7 @@ pub struct FitSection {
 /// Frequency and damping of a mode along its decays.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct AmplitudeSection {
-    /// "changes", "steady", "beating", "unresolved" or "too-few-points".
+    /// "changes", "steady", "beating", "unresolved", "part-of" or "too-few-points".
     pub verdict: AmplitudeVerdict,
     /// Change of the frequency (Hz); null with too few points.
     pub frequency: Option<Trend>,
@@ -411,6 +416,9 @@ impl ModeSection {
         let quality = spectra.map(|spectra| spectra.averages.best_quality(reading.frequency));
         let change = recording.and_then(|recording| recording.amplitude_change(reading));
         let fit = reading.fit.as_deref();
+        let curve = fit.and_then(|fit| fit.amplitude.as_ref());
+        let curve = curve.filter(|_| reading.source == ReadBy::Fit);
+        let sensor = curve.and_then(|curve| recording?.responses.get(curve.sensor?));
         ModeSection {
             mode: None,
             frequency: reading.frequency,
@@ -424,6 +432,8 @@ impl ModeSection {
             high: Some(reading.interval.1),
             damping: reading.damping_ratio,
             damping_std: reading.damping_std,
+            amplitude: curve.and_then(|curve| curve.amplitude),
+            amplitude_unit: sensor.and_then(|sensor| sensor.unit.clone()),
             fit: fit.map(|fit| FitSection::of(fit, change)),
             coherence: quality.and_then(|quality| quality.coherence),
             random_error: quality.and_then(|quality| quality.random_error),
@@ -439,12 +449,13 @@ impl ModeSection {
 impl FitSection {
     fn of(fit: &FittedReading, change: Option<AmplitudeChange>) -> Self {
         let mode = &fit.mode;
+        let (frequency, damping_ratio) = fit.pole();
         FitSection {
-            damping_low: mode.damping_ratio.low,
-            damping_high: mode.damping_ratio.high,
-            uncertainty_from: mode.frequency.source,
-            freedom: mode.frequency.freedom,
-            scatter_probability: mode.frequency.scatter_probability,
+            damping_low: damping_ratio.low,
+            damping_high: damping_ratio.high,
+            uncertainty_from: frequency.source,
+            freedom: frequency.freedom,
+            scatter_probability: frequency.scatter_probability,
             residual_correlation: mode.residual_correlation,
             band: [mode.band.0, mode.band.1],
             taps: mode.taps.clone(),

@@ -72,6 +72,8 @@ pub struct TapSettings {
     pub rearm: f64,
     /// Length of signal that the wanted block needs (s), where a block is given.
     pub wanted: Option<f64>,
+    /// True to accept taps that drove a channel to its limit: their decays are used from where they are whole.
+    pub keep_overload: bool,
 }
 
 impl Default for TapSettings {
@@ -86,6 +88,7 @@ impl Default for TapSettings {
             double_hit_warning: 0.04,
             rearm: 0.05,
             wanted: None,
+            keep_overload: false,
         }
     }
 }
@@ -106,8 +109,21 @@ pub struct Tap {
     /// A second hit within the record, from [`TapSettings::double_hit_warning`] of the peak up; `None`
     /// without one, and without a hammer, where it cannot be told from two modes that beat.
     pub second_hit: Option<SecondHit>,
+    /// Samples of its record that were cut off; `None` without any.
+    pub overload: Option<Overload>,
     /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
+}
+
+/// Samples of a tap's record at the limit of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overload {
+    /// The first such channel, 1-based.
+    pub channel: usize,
+    /// Its samples at the limit.
+    pub samples: usize,
+    /// Frame from which no response is cut off any more.
+    pub whole_from: u64,
 }
 
 impl Tap {
@@ -116,9 +132,18 @@ impl Tap {
         self.rejection.is_none()
     }
 
-    /// Length of its record (frames).
+    /// First frame that is used of its record: without a hammer an overloaded tap has only its decay, from where that is
+    /// whole.
+    pub fn usable_from(&self) -> u64 {
+        let whole = self.overload.map(|overload| overload.whole_from);
+        whole
+            .filter(|_| self.pulse_end.is_none())
+            .unwrap_or(self.record.start)
+    }
+
+    /// Length of what is used of its record (frames).
     pub fn frames(&self) -> u64 {
-        self.record.end - self.record.start
+        self.record.end - self.usable_from().min(self.record.end)
     }
 }
 
@@ -221,6 +246,11 @@ pub enum TapRemark {
         /// Number of times.
         count: usize,
     },
+    /// Taps that drove a channel to its limit were accepted: they were asked for, or there were no others.
+    OverloadKept {
+        /// Number of taps.
+        count: usize,
+    },
 }
 
 impl fmt::Display for TapRemark {
@@ -239,6 +269,12 @@ impl fmt::Display for TapRemark {
                 f,
                 "the force stayed up for more than 50 ms {count} time(s), longer than any hammer pulse; \
                  that was left out: a moved cable, a hand on the hammer, or the wrong channel"
+            ),
+            TapRemark::OverloadKept { count } => write!(
+                f,
+                "{count} tap(s) that drove a channel to its limit are used: frequencies and damping come from the \
+                 decays where they are whole, but spectra and frequency response functions hold the cut-off samples; \
+                 lower the gain or tap more softly"
             ),
         }
     }
@@ -324,11 +360,30 @@ pub fn find_taps(
     for index in 0..found.events.len() {
         taps.push(tap(recording, source, &found, index, weakest, settings)?);
     }
+    let mut remarks = found.remarks;
+    // Where no other tap is left, overloaded ones are better than none.
+    let none_left = !taps.iter().any(Tap::accepted);
+    let mut kept = 0;
+    for tap in &mut taps {
+        // Less than half of a record says little, and would shorten the blocks of all others.
+        let whole = tap.overload.map_or(0, |overload| {
+            tap.record.end.saturating_sub(overload.whole_from)
+        });
+        let enough = 2 * whole >= tap.record.end - tap.record.start;
+        let overloaded = matches!(tap.rejection, Some(Rejection::Overload { .. }));
+        if overloaded && enough && (settings.keep_overload || none_left) {
+            tap.rejection = None;
+            kept += 1;
+        }
+    }
+    if kept > 0 {
+        remarks.push(TapRemark::OverloadKept { count: kept });
+    }
     reject_short(&mut taps, recording.sample_rate(), settings.wanted);
     Ok(Taps {
         taps,
         noise: found.noise,
-        remarks: found.remarks,
+        remarks,
     })
 }
 
@@ -374,6 +429,7 @@ fn tap(
         pulse_end = Some(end);
         second = second_hit(&force, event, own, settings);
     }
+    let overload = overload(recording, source, &record)?;
     let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
@@ -385,7 +441,10 @@ fn tap(
             ratio: double.ratio,
             limit: settings.double_hit,
         }),
-        None => overload(recording, source, &record)?,
+        None => overload.map(|found| Rejection::Overload {
+            channel: found.channel,
+            samples: found.samples,
+        }),
     };
     Ok(Tap {
         time: event.trigger as f64 / rate,
@@ -394,6 +453,7 @@ fn tap(
         pulse,
         record,
         second_hit: second,
+        overload,
         rejection,
     })
 }
@@ -436,46 +496,44 @@ fn force_of(
     Ok(Some(force))
 }
 
-/// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat
-/// tops.
+/// Samples at a channel's rails, the frame after the last of them in any response, and the channel; `None` without
+/// any.
 fn overload(
     recording: &Recording,
     source: &TapSource,
     record: &Range<u64>,
-) -> Result<Option<Rejection>, RecordingError> {
+) -> Result<Option<Overload>, RecordingError> {
+    let mut found: Option<Overload> = None;
     for channel in source.channels() {
         let Some(info) = recording.channels().get(channel) else {
             continue;
         };
-        let health = &info.health;
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for top in &health.flat_tops {
-            if top.value > health.mean {
-                high = high.min(top.value);
-            } else {
-                low = low.max(top.value);
-            }
-        }
-        if health.full_scale_samples > 0 {
-            high = high.min(health.peak);
-            low = low.max(-health.peak);
-        }
-        if low.is_infinite() && high.is_infinite() {
+        let [low, high] = info.health.rails;
+        if low.is_none() && high.is_none() {
             continue;
         }
-        // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
-        let hair = 1e-9 * health.peak;
-        let (low, high) = (low + hair, high - hair);
+        // A hair inside, so that rescaling by a unit cannot make a sample slip through.
+        let hair = 1e-9 * info.health.peak;
+        let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
+        let high = high.map_or(f64::INFINITY, |high| high - hair);
         let samples = recording.read(channel, record.clone())?;
-        let count = samples.iter().filter(|&&x| x >= high || x <= low).count();
-        if count > 0 {
-            return Ok(Some(Rejection::Overload {
-                channel: channel + 1,
-                samples: count,
-            }));
+        let is_cut = |x: &f64| *x >= high || *x <= low;
+        let count = samples.iter().filter(|x| is_cut(x)).count();
+        let Some(last) = samples.iter().rposition(|x| is_cut(x)) else {
+            continue;
+        };
+        let is_force =
+            matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel);
+        let overload = found.get_or_insert(Overload {
+            channel: channel + 1,
+            samples: count,
+            whole_from: record.start,
+        });
+        if !is_force {
+            overload.whole_from = overload.whole_from.max(record.start + last as u64 + 1);
         }
     }
-    Ok(None)
+    Ok(found)
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest

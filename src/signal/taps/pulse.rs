@@ -120,9 +120,9 @@ mod tests {
             let x = f * length;
             20.0 * ((PI * x).cos() / (1.0 - 4.0 * x * x)).abs().log10()
         };
-        // Lines lie 49 Hz apart. Between them the level in dB is nearly straight.
-        assert!((level(pulse.fall_10_db.unwrap()) + 10.0).abs() < 0.1);
-        assert!((level(pulse.fall_20_db.unwrap()) + 20.0).abs() < 0.1);
+        // Lines lie 49 Hz apart. Between them the level bends by less than 0.2 dB.
+        assert!((level(pulse.fall_10_db.unwrap()) + 10.0).abs() < 0.2);
+        assert!((level(pulse.fall_20_db.unwrap()) + 20.0).abs() < 0.2);
         let widths = [pulse.fall_10_db, pulse.fall_20_db].map(|f| f.unwrap() * pulse.width);
         assert!((widths[0] - 0.69).abs() < 0.01 && (widths[1] - 0.87).abs() < 0.01);
         assert_eq!(Some(pulse.usable_to), pulse.fall_20_db);

@@ -448,6 +448,7 @@ fn measured_taps() -> Vec<Tap> {
             peak: tap.peak_force.unwrap_or(1.0),
             pulse_end: None,
             pulse: None,
+            overload: None,
             record: 0..0,
             second_hit: None,
             rejection: None,

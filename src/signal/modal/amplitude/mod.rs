@@ -58,6 +58,20 @@ pub struct KnownMode {
     pub damping_ratio: f64,
 }
 
+impl KnownMode {
+    /// Hum at a frequency (Hz), which does not decay.
+    pub fn steady(frequency: f64) -> Self {
+        KnownMode {
+            frequency,
+            damping_ratio: 0.0,
+        }
+    }
+
+    fn is_steady(&self) -> bool {
+        self.damping_ratio <= 0.0
+    }
+}
+
 // Times below are shares of the decay time 1/sigma, or of a quarter of the record where that is shorter.
 
 /// Length of the band filter where neighbours leave room: 0.1. It decides how early the curve begins.
@@ -220,12 +234,13 @@ fn parts_of_lines(decays: &[Decay], modes: &[KnownMode]) -> Vec<Option<usize>> {
     let mut parts: Vec<Option<usize>> = vec![None; modes.len()];
     for (index, mode) in modes.iter().enumerate() {
         let near = |other: &KnownMode| {
-            (other.frequency - mode.frequency).abs() < FARTHEST * mode.frequency
+            !other.is_steady()
+                && (other.frequency - mode.frequency).abs() < FARTHEST * mode.frequency
         };
         let others: Vec<usize> = (0..modes.len())
             .filter(|&other| other != index && parts[other].is_none() && near(&modes[other]))
             .collect();
-        if others.is_empty() || parts[index].is_some() {
+        if others.is_empty() || mode.is_steady() || parts[index].is_some() {
             continue;
         }
         let alone = [*mode];
@@ -285,11 +300,14 @@ impl AmplitudeCurve {
 
 /// Follows one of the modes.
 fn follow_mode(decays: &[Decay], modes: &[KnownMode], index: usize) -> AmplitudeCurve {
+    let mut curve = AmplitudeCurve::without_points(AmplitudeVerdict::TooFewPoints);
+    if modes[index].is_steady() {
+        return curve;
+    }
     let taps = decays.iter().enumerate();
     let bands: Vec<_> = taps
         .filter_map(|(tap, decay)| band::extract_band(decay, tap, modes, index))
         .collect();
-    let mut curve = AmplitudeCurve::without_points(AmplitudeVerdict::TooFewPoints);
     curve.sensor = band::strongest(&bands);
     let Some(sensor) = curve.sensor else {
         return curve;

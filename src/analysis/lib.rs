@@ -21,6 +21,7 @@ mod observations;
 mod observed_mode;
 mod recording_result;
 mod results;
+mod scale;
 mod structure;
 mod warnings;
 mod wiring;
@@ -44,6 +45,7 @@ pub use results::{
     MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
     SensitivitySection,
 };
+use scale::scale_doubts;
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
@@ -123,6 +125,7 @@ pub fn run_test(
     let method = identification.method(&structure, settings.method);
     warnings.extend(neglected_effects(test, &structure, method));
     warnings.extend(doubts);
+    warnings.extend(scale_doubts(test, &recordings, &identification));
     let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Ok(Analysis {

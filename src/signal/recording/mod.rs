@@ -24,6 +24,7 @@ use std::sync::Arc;
 mod csv;
 mod error;
 mod health;
+mod joined;
 mod responses;
 mod text;
 mod uff;
@@ -33,6 +34,7 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
+pub use joined::MOST_FILES;
 pub use responses::{FrequencyResponse, FrequencyResponses, open_frequency_responses};
 pub use text::Separator;
 pub use uff::{
@@ -583,6 +585,11 @@ impl Iterator for Blocks<'_> {
 trait Source: fmt::Debug + Send + Sync {
     /// Positions a reader at `frame`.
     fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError>;
+
+    /// First frames of the files after the first.
+    fn seams(&self) -> &[u64] {
+        &[]
+    }
 }
 
 /// A reader somewhere in the samples; one per pass, since it moves.

@@ -413,10 +413,17 @@ fn tap(
     let before = ((settings.pre_trigger * rate) as u64).max(16);
     let mut later = found.events.iter().skip(index + 1);
     let next = later.find(|next| next.answered && next.peak >= weakest);
-    let end = next.map_or(recording.frames(), |next| {
-        next.trigger.saturating_sub(before)
+    // Neither reaches into another file.
+    let seams = recording.seams();
+    let later = seams.partition_point(|seam| *seam <= event.trigger);
+    let file_end = seams.get(later).copied().unwrap_or(recording.frames());
+    let end = next.map_or(file_end, |next| {
+        next.trigger.saturating_sub(before).min(file_end)
     });
-    let start = event.trigger.saturating_sub(before);
+    let start = event
+        .trigger
+        .saturating_sub(before)
+        .max(file_start(recording, event.trigger));
     let record = start..end.max(start);
     // Least distance of two taps (frames).
     let least = (settings.least_distance * rate) as u64;
@@ -494,6 +501,13 @@ fn force_of(
         }
     }
     Ok(Some(force))
+}
+
+/// First frame of the file that holds a frame.
+fn file_start(recording: &Recording, frame: u64) -> u64 {
+    let seams = recording.seams();
+    let later = seams.partition_point(|seam| *seam <= frame);
+    later.checked_sub(1).map_or(0, |place| seams[place])
 }
 
 /// Samples at a channel's rails, the frame after the last of them in any response, and the channel; `None` without
@@ -580,7 +594,7 @@ const STRETCH: f64 = 0.05;
 const RISE: f64 = 1.5;
 
 /// Returns `true` where any response rises when the force does. A hammer laid down, a swinging hammer and an
-/// electrical spike move no sensor. Without responses, or at the very start of the recording, the
+/// electrical spike move no sensor. Without responses, or at the very start of the recording or a file of it, the
 /// benefit of the doubt is given.
 fn is_answered(
     recording: &Recording,
@@ -590,7 +604,8 @@ fn is_answered(
     let stretch = (STRETCH * recording.sample_rate()) as u64;
     // The filter's ringing ahead of the pulse belongs to neither side.
     let gap = stretch / 10;
-    if responses.is_empty() || stretch < 8 || event.trigger < 2 * stretch {
+    let since_start = event.trigger - file_start(recording, event.trigger);
+    if responses.is_empty() || stretch < 8 || since_start < 2 * stretch {
         return Ok(true);
     }
     let before = event.trigger - gap - stretch..event.trigger - gap;

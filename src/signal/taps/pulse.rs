@@ -9,7 +9,7 @@ use super::search::half_width;
 /// Width of a force pulse and the band that it excites.
 ///
 /// Levels are those of the Fourier transform of the pulse over its largest value at a lower frequency. A half sine of
-/// width w at half height (length 1.5 w) has fallen by 10 dB at 0.69/w and by 20 dB at 0.87/w.
+/// width w at half height (length 1.5 w) has fallen by 10 dB at 0.68/w and by 20 dB at 0.87/w.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Pulse {
     /// Width at half of its height (s).
@@ -124,7 +124,7 @@ mod tests {
         assert!((level(pulse.fall_10_db.unwrap()) + 10.0).abs() < 0.2);
         assert!((level(pulse.fall_20_db.unwrap()) + 20.0).abs() < 0.2);
         let widths = [pulse.fall_10_db, pulse.fall_20_db].map(|f| f.unwrap() * pulse.width);
-        assert!((widths[0] - 0.69).abs() < 0.01 && (widths[1] - 0.87).abs() < 0.01);
+        assert!((widths[0] - 0.68).abs() < 0.01 && (widths[1] - 0.87).abs() < 0.01);
         assert_eq!(Some(pulse.usable_to), pulse.fall_20_db);
         // Noise ends the band before the spectrum has fallen by 20 dB.
         let noisy = Pulse::of(&samples, 3.0, rate).unwrap();

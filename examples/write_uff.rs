@@ -8,7 +8,9 @@
 use std::error::Error;
 use std::path::Path;
 
-use tapjoint::recording::{UffFormat, encode_frequency_responses_uff, open_frequency_responses};
+use tapjoint::recording::{
+    ReadSettings, UffFormat, encode_frequency_responses_uff, open_frequency_responses,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -18,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         [file, out, "binary"] => (file, out, UffFormat::Binary),
         _ => return Err("usage: write_uff FILE OUT ascii|binary".into()),
     };
-    let responses = open_frequency_responses(Path::new(file))?;
+    let responses = open_frequency_responses(Path::new(file), &ReadSettings::default())?;
     for warning in &responses.warnings {
         eprintln!("warning: {warning}");
     }

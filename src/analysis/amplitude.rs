@@ -5,11 +5,10 @@ use serde::Serialize;
 use std::cmp::Ordering;
 use std::fmt;
 use tapjoint_numerics::stats::median;
-use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
+use tapjoint_signal::modal::amplitude::{
+    AmplitudeCurve, AmplitudeReading, AmplitudeVerdict, LEAST_CHANGE,
+};
 
-/// Smallest relative change of a frequency that is reported: 0.01 %, a fifth of the smallest
-/// change that Ingole & Chatterjee perturb frequencies by.
-const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
 /// Smallest relative change of a damping that is reported: 5 %, about the repeatability of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
 /// Bounds of a curve up to this many times their median count as well known.
@@ -23,6 +22,8 @@ pub struct AmplitudeChange {
     pub amplitude: [f64; 2],
     /// Unit of the amplitude; `None` where it is not known.
     pub unit: Option<String>,
+    /// Amplitude at which the mode's one frequency holds (`unit`); `None` where it is that of a pole that does not change.
+    pub holds_at: Option<f64>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
     /// 95 % bounds of the frequency (Hz).
@@ -61,13 +62,14 @@ impl AmplitudeChange {
         let change = AmplitudeChange {
             amplitude: ends.map(|end| end.amplitude),
             unit: None,
+            holds_at: curve.stated.and(curve.amplitude),
             frequency: ends.map(|end| end.frequency),
             frequency_bound: ends.map(|end| end.frequency_bound),
             damping_ratio: ends.map(|end| end.damping_ratio),
             damping_bound: ends.map(|end| end.damping_bound),
         };
         let (frequency, damping) = change.size();
-        let matters = frequency > LEAST_FREQUENCY_CHANGE || damping > LEAST_DAMPING_CHANGE;
+        let matters = frequency > LEAST_CHANGE || damping > LEAST_DAMPING_CHANGE;
         matters.then_some(change)
     }
 
@@ -137,7 +139,11 @@ impl fmt::Display for AmplitudeChange {
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
-        )
+        )?;
+        match self.holds_at {
+            Some(amplitude) => write!(f, "; the one listed holds at {}", two_digits(amplitude)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -209,6 +215,7 @@ mod tests {
         let change = AmplitudeChange {
             amplitude: [33.2, 2.31],
             unit: Some("m/s2".into()),
+            holds_at: None,
             frequency: [80.281, 80.543],
             frequency_bound: [0.01, 0.02],
             damping_ratio: [0.00283, 0.00149],
@@ -220,6 +227,11 @@ mod tests {
             "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
              falls from 33 to 2.3 m/s\u{b2}"
         );
+        let listed = AmplitudeChange {
+            holds_at: Some(14.2),
+            ..change.clone()
+        };
+        assert!(plain(&listed).ends_with("2.3 m/s\u{b2}; the one listed holds at 14"));
         let steady = AmplitudeChange {
             damping_bound: [0.001, 0.001],
             ..change

@@ -5,7 +5,7 @@
 //! [`fit_modes`].
 
 use num_complex::Complex64;
-use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
+use tapjoint_signal::modal::amplitude::{AmplitudeVerdict, Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
     PoleStart, TapForce, Unfit, fit_modes, modal_constants,
@@ -63,6 +63,8 @@ pub(super) struct Candidates<'a> {
     pub data: &'a ModalData,
     /// Result of the polyreference fit.
     pub stabilisation: &'a Stabilisation,
+    /// Frequencies (Hz) of hum that was there before the taps.
+    pub steady_lines: &'a [f64],
 }
 
 impl Candidates<'_> {
@@ -73,8 +75,11 @@ impl Candidates<'_> {
             PeakLabel::Mains(harmonic) => Some(harmonic),
             _ => None,
         });
+        let mut steady_lines: Vec<f64> = mains.chain(self.steady_lines.iter().copied()).collect();
+        steady_lines.sort_by(f64::total_cmp);
+        steady_lines.dedup();
         let settings = FitSettings {
-            steady_lines: mains.collect(),
+            steady_lines,
             ..FitSettings::default()
         };
         let proposed = all_modes(&self.stabilisation.searches);
@@ -242,6 +247,12 @@ fn is_clear(fit: &ModeFit) -> bool {
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
 }
 
+/// Returns true for a reading that is a part of another mode's line.
+fn is_part(reading: &ModeReading) -> bool {
+    let curve = reading.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
+    curve.is_some_and(|curve| matches!(curve.verdict, AmplitudeVerdict::PartOf { .. }))
+}
+
 /// Decays of all taps, and what of them is fitted.
 pub(super) struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
@@ -299,6 +310,7 @@ impl FreeDecays {
         readings: &mut Vec<ModeReading>,
         lines: &Lines,
         kinds: &[Option<ResponseForm>],
+        steady_lines: &[f64],
     ) -> Stabilisation {
         let functions = self.functions();
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
@@ -308,23 +320,31 @@ impl FreeDecays {
             lines,
             data: &self.data,
             stabilisation: &stabilisation,
+            steady_lines,
         };
         candidates.fit(readings);
         let fitted: Vec<&mut FittedReading> = readings
             .iter_mut()
             .filter_map(|reading| reading.fit.as_deref_mut())
             .collect();
-        let known: Vec<KnownMode> = fitted
-            .iter()
-            .map(|fit| KnownMode {
-                frequency: fit.mode.frequency.value,
-                damping_ratio: fit.mode.damping_ratio.value,
-            })
-            .collect();
+        let modes = fitted.iter().map(|fit| KnownMode {
+            frequency: fit.mode.frequency.value,
+            damping_ratio: fit.mode.damping_ratio.value,
+        });
+        // Hum is followed along with the modes, for it beats with those beside it.
+        let hum = steady_lines.iter().copied().map(KnownMode::steady);
+        let known: Vec<KnownMode> = modes.chain(hum).collect();
         let curves = follow_amplitude(&self.decays, &known);
         for (fit, curve) in fitted.into_iter().zip(curves) {
             fit.amplitude = Some(curve);
             fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
+        }
+        // Peaks of a line that is swept while it rings are no modes; what made no peak goes.
+        readings.retain(|reading| reading.prominence_db.is_some() || !is_part(reading));
+        for reading in readings.iter_mut().filter(|reading| is_part(reading)) {
+            reading.fit = None;
+            reading.between = None;
+            reading.label = Some(PeakLabel::NoResonance);
         }
         stabilisation
     }

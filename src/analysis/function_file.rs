@@ -153,6 +153,7 @@ fn spectra_of_magnitudes(
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation: stabilisation(lines.low, lines.spacing, &[]),
     }
 }
@@ -189,6 +190,7 @@ fn spectra_of_functions(
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
+            steady_lines: &[],
         };
         candidates.fit(&mut readings);
         // There are modal constants where the form of every function is known.
@@ -211,6 +213,7 @@ fn spectra_of_functions(
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation,
     }
 }

@@ -22,6 +22,7 @@ mod observations;
 mod observed_mode;
 mod recording_result;
 mod results;
+mod scale;
 mod structure;
 mod warnings;
 mod wiring;
@@ -33,7 +34,9 @@ pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
-pub use measurement::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+pub use measurement::{
+    ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
+};
 use modes::{modes_of_bare, modes_of_test, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
@@ -44,6 +47,7 @@ pub use results::{
     MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
     SensitivitySection,
 };
+use scale::scale_doubts;
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
@@ -123,6 +127,7 @@ pub fn run_test(
     let method = identification.method(&structure, settings.method);
     warnings.extend(neglected_effects(test, &structure, method));
     warnings.extend(doubts);
+    warnings.extend(scale_doubts(test, &recordings, &identification));
     let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Ok(Analysis {

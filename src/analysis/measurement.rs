@@ -87,8 +87,20 @@ pub struct MeasuredSpectra {
     /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
     /// without a hammer or a quiet stretch before the first tap.
     pub force_noise: Option<Vec<f64>>,
+    /// The window about the force pulses; `None` without a hammer.
+    pub force_window: Option<ForceWindow>,
     /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
+}
+
+/// The window that keeps noise and offset of the hammer before and after a pulse out of the functions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceWindow {
+    /// Its length, half of the taper included, in the mean of the taps (s).
+    pub length: f64,
+    /// Largest change of H1 by the window over the resonances, |H1 with it/H1 without it - 1| (1); `None` without a
+    /// resonance.
+    pub h1_change: Option<f64>,
 }
 
 /// Reasons for which a measurement stops.
@@ -200,6 +212,16 @@ const AFTER_TRIGGER: f64 = 5e-3;
 /// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
 const LEAST_SAMPLES: u64 = 64;
 
+/// Averages over the accepted taps, and what is read from the transforms besides.
+struct Averages {
+    averages: AveragedSpectra,
+    /// Every tap's own transforms without a hammer, up to a bound on memory: their phases differ, so that they cannot be
+    /// averaged.
+    transforms: Vec<Vec<Complex64>>,
+    /// H1 of every response by the force without its window; `None` without a hammer.
+    ungated: Option<Vec<Vec<Complex64>>>,
+}
+
 /// Data that every step of one recording's measurement needs.
 struct Stage<'a> {
     recording: &'a Recording,
@@ -242,7 +264,7 @@ impl<'a> Stage<'a> {
     }
 
     fn record(&self, tap: &Tap) -> Result<Vec<Vec<f64>>, RecordingError> {
-        self.read(tap.record.start..tap.record.start + self.gate)
+        self.read(tap.usable_from()..tap.usable_from() + self.gate)
     }
 
     /// The quiet stretch before the first tap, at most a block.
@@ -299,17 +321,35 @@ impl<'a> Stage<'a> {
             Some(WindowKind::Hann) => Window::Hann,
             Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
         };
-        let (averages, transforms) = self.averages(window)?;
+        let Averages {
+            averages,
+            transforms,
+            ungated,
+        } = self.averages(window)?;
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = match self.free_decays()? {
-            Some(decays) => decays.fit(&mut readings, &self.lines, &self.settings.kinds),
+            Some(decays) => {
+                let steady = quiet.steady_lines(&readings, &self.settings.mains);
+                decays.fit(&mut readings, &self.lines, &self.settings.kinds, &steady)
+            }
             None => Stabilisation::default(),
         };
         for reading in &mut readings {
             reading.select_estimate(self.settings.reading);
+            if let Some(label) = quiet.steady_mains(reading, &self.settings.mains) {
+                reading.label = Some(label);
+                reading.fit = None;
+                reading.between = None;
+                reading.select_estimate(ReadBy::Line);
+            }
         }
+        label_harmonics(
+            &mut readings,
+            self.taps.accepted().any(|tap| tap.overload.is_some()),
+        );
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
+            force_window: self.force_window(&readings, &averages, ungated.as_deref()),
             averages,
             window,
             decay: Some(decay),
@@ -319,21 +359,21 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Returns the averages. Without a hammer it also returns every tap's own transforms, up to a bound on memory:
-    /// their phases differ, so that they cannot be averaged.
-    fn averages(
-        &self,
-        window: Window,
-    ) -> Result<(AveragedSpectra, Vec<Vec<Complex64>>), RecordingError> {
+    fn averages(&self, window: Window) -> Result<Averages, RecordingError> {
         let rate = self.recording.sample_rate();
         let mut averager = SpectralAverager::new(self.lines, self.responses());
+        let mut whole = SpectralAverager::new(self.lines, self.responses());
         let transformer = Transformer::new(rate, self.lines, self.gate as usize);
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
-            if let (Some(window), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
+            let mut ungated = None;
+            if let (Some(gate), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
                 remove_offset(force, rate);
-                window.apply(force);
+                let mut copy = force.clone();
+                window.apply(&mut copy, rate);
+                ungated = Some(transformer.transform(&mut copy));
+                gate.apply(force);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples
                 .iter_mut()
@@ -344,10 +384,13 @@ impl<'a> Stage<'a> {
                 .collect();
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
+            if let Some(force) = ungated {
+                whole.add(Some(&force), &responses);
+            }
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
                 // Time zero is moved to the trigger. The quiet stretch before it tilts the phase, and a fit of few
                 // lines could not follow that tilt as a background.
-                let delay = tap.time - tap.record.start as f64 / rate;
+                let delay = tap.time - tap.usable_from() as f64 / rate;
                 for mut transform in responses {
                     for (line, value) in transform.iter_mut().enumerate() {
                         let turn = TAU * self.lines.frequency(line) * delay;
@@ -361,7 +404,43 @@ impl<'a> Stage<'a> {
         let averages = averager
             .finish()
             .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
-        Ok((averages, kept))
+        Ok(Averages {
+            averages,
+            transforms: kept,
+            ungated: whole.finish().and_then(|whole| whole.h1),
+        })
+    }
+
+    /// Length of the force window, and the change that it makes to H1 at the resonances.
+    fn force_window(
+        &self,
+        readings: &[ModeReading],
+        averages: &AveragedSpectra,
+        ungated: Option<&[Vec<Complex64>]>,
+    ) -> Option<ForceWindow> {
+        let (gated, ungated) = (averages.h1.as_deref()?, ungated?);
+        let mut largest: Option<f64> = None;
+        for reading in readings.iter().filter(|reading| reading.label.is_none()) {
+            let line = averages.lines.nearest(reading.frequency);
+            let (mut change, mut all) = (0.0, 0.0);
+            for (with, without) in gated.iter().zip(ungated) {
+                change += (with[line] - without[line]).norm_sqr();
+                all += without[line].norm_sqr();
+            }
+            if all > 0.0 {
+                largest = Some(f64::max(largest.unwrap_or(0.0), (change / all).sqrt()));
+            }
+        }
+        let rate = self.recording.sample_rate();
+        let windows = self
+            .taps
+            .accepted()
+            .filter_map(|tap| pulse_window(tap, rate));
+        let lengths: Vec<f64> = windows.map(PulseWindow::length).collect();
+        Some(ForceWindow {
+            length: lengths.iter().sum::<f64>() / lengths.len() as f64 / rate,
+            h1_change: largest,
+        })
     }
 
     /// Peaks of the composite level over all sensors, read and labelled.
@@ -430,7 +509,10 @@ impl<'a> Stage<'a> {
     fn begin(&self, tap: &Tap) -> u64 {
         let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
         let trigger = (tap.time * self.recording.sample_rate()).round();
-        tap.pulse_end.unwrap_or((trigger + after) as u64)
+        let begin = tap.pulse_end.unwrap_or((trigger + after) as u64);
+        // Samples that were cut off are no decay.
+        let whole = tap.overload.map_or(begin, |overload| overload.whole_from);
+        begin.max(whole)
     }
 
     /// Reads the decays; `None` where they are too short for a fit.
@@ -438,7 +520,7 @@ impl<'a> Stage<'a> {
         let taps: Vec<&Tap> = self.taps.accepted().collect();
         let lengths = taps
             .iter()
-            .map(|tap| (tap.record.start + self.gate).saturating_sub(self.begin(tap)));
+            .map(|tap| (tap.usable_from() + self.gate).saturating_sub(self.begin(tap)));
         let shortest = lengths.min().unwrap_or(0);
         let samples = match largest_smooth_block(shortest as usize) {
             Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
@@ -577,11 +659,108 @@ impl PreTriggerNoise {
         mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
     }
 
+    /// Multiples of 50 and 60 Hz beside the readings (Hz) at which a steady line stands in the quiet stretch of some
+    /// response: it lies under the modes, with or without a peak of its own.
+    fn steady_lines(&self, readings: &[ModeReading], settings: &MainsSettings) -> Vec<f64> {
+        let mut lines = Vec::new();
+        for mains in [50.0, 60.0] {
+            for reading in readings {
+                let line = mains * (reading.frequency / mains).round();
+                let stands = |samples: &Vec<f64>| {
+                    let amplitude = line_amplitude(samples, self.sample_rate, line);
+                    let noise = noise_beside(samples, self.sample_rate, line);
+                    let both = amplitude.zip(noise);
+                    both.is_some_and(|(amplitude, noise)| amplitude > settings.over_noise * noise)
+                };
+                if line > 0.0 && self.responses.iter().any(stands) {
+                    lines.push(line);
+                }
+            }
+        }
+        lines.sort_by(f64::total_cmp);
+        lines.dedup();
+        lines
+    }
+
+    /// The label of a line at a mains frequency that hardly decays, where no quiet stretch shows what was there before the
+    /// tap.
+    fn steady_mains(&self, reading: &ModeReading, settings: &MainsSettings) -> Option<PeakLabel> {
+        let harmonic = near_mains(reading.frequency, 0.0, settings)?;
+        let quiet = self.responses.first()?;
+        let known = line_amplitude(quiet, self.sample_rate, reading.frequency).is_some();
+        let steady = reading.damping_ratio.is_some_and(|ratio| ratio < STEADY);
+        (!known && steady && reading.label.is_none()).then_some(PeakLabel::Mains(harmonic))
+    }
+
     /// Sum and sum of squares of the window over a block.
     fn window_sums(&self, window: Window) -> (f64, f64) {
         let mut weights = vec![1.0; self.block];
         window.apply(&mut weights, self.sample_rate);
         (weights.iter().sum(), weights.iter().map(|w| w * w).sum())
+    }
+}
+
+/// Damping ratio (1) below which a line at a mains frequency is hum. 0.05 %: a beam in a joint or with a cable has more,
+/// and a free steel bar has a tenth of it, but lies on such a line by chance alone.
+const STEADY: f64 = 5e-4;
+/// Highest harmonic that is looked for.
+const HIGHEST_ORDER: usize = 9;
+/// A harmonic stands at least this far below its line (dB).
+const BELOW_LINE: f64 = 10.0;
+/// Standard deviations within which poles are multiples of each other.
+const MULTIPLE: f64 = 3.0;
+/// Relative standard deviation of a damping (1) that can be compared: beyond it any damping would agree.
+const KNOWN_DAMPING: f64 = 0.1;
+
+/// Labels the readings that a channel which is not linear makes of a stronger line.
+///
+/// A term x^n makes of e^{p t} the pole n p: n times the frequency at the same damping ratio. Both must agree. Cut-off
+/// samples make multiples of the frequency as well; decays are fitted after them, so that what has a fit is no such
+/// multiple.
+fn label_harmonics(readings: &mut [ModeReading], is_cut_off: bool) {
+    let strong: Vec<(f64, f64, Option<f64>, f64)> = readings
+        .iter()
+        .filter(|reading| reading.label.is_none())
+        .filter_map(|reading| {
+            let height = reading.above_noise_db.or(reading.prominence_db)?;
+            Some((
+                reading.frequency,
+                reading.std?,
+                reading.damping_ratio,
+                height,
+            ))
+        })
+        .collect();
+    for reading in readings.iter_mut() {
+        let height = reading.above_noise_db.or(reading.prominence_db);
+        let resonance = matches!(reading.label, None | Some(PeakLabel::NoResonance));
+        let (Some(height), Some(std), true) = (height, reading.std, resonance) else {
+            continue;
+        };
+        let damping = reading.damping_ratio.zip(reading.damping_std);
+        for &(frequency, line_std, line_damping, line_height) in &strong {
+            let order = (reading.frequency / frequency).round();
+            let known = std.hypot(order * line_std);
+            let multiple = (reading.frequency - order * frequency).abs() <= MULTIPLE * known;
+            let alike = damping
+                .zip(line_damping)
+                .is_some_and(|((ratio, std), other)| {
+                    std < KNOWN_DAMPING * ratio && (ratio - other).abs() <= MULTIPLE * std
+                });
+            let of_cut = is_cut_off && reading.fit.is_none();
+            if (2.0..=HIGHEST_ORDER as f64).contains(&order)
+                && multiple
+                && (alike || of_cut)
+                && height + BELOW_LINE < line_height
+            {
+                let order = order as usize;
+                reading.label = Some(PeakLabel::Harmonic {
+                    order,
+                    of: frequency,
+                });
+                break;
+            }
+        }
     }
 }
 
@@ -617,6 +796,11 @@ impl PulseWindow {
         let start = self.start.min(force.len());
         force[..start].fill(0.0);
         apply_force_window(&mut force[start..], self.length, self.taper);
+    }
+
+    /// Length of the window (samples), half of its taper included.
+    fn length(self) -> f64 {
+        self.length as f64 + 0.5 * self.taper as f64
     }
 
     /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.

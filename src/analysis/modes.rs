@@ -16,7 +16,8 @@ use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, PeakStrength, ShapeAt};
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
-use tapjoint_numerics::stats::{median, times};
+use tapjoint_numerics::stats::{chi_square_tail, median, student, times};
+use tapjoint_signal::modal::fit::{scatter_about_mean, weighted_mean};
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
 
 /// Recordings count as tapped at the same level when their median peak forces differ by less than
@@ -134,8 +135,32 @@ pub fn modes_of_recordings(
             }
         }
         mode.between = between(&frequencies);
+        take_scatter(mode, &frequencies);
+        mode.lambda = Some(structure.beam.lambda_of(mode.frequency));
     }
     (modes, warnings)
+}
+
+/// A scatter between recordings less probable than this is not noise alone (1). More lenient than for one mode of a
+/// report: an interval that is too narrow makes effects out of nothing, one that is a little too wide costs little.
+const SCATTER_LEVEL: f64 = 0.05;
+
+/// Puts the mean over the recordings and its scatter into a mode, where they scatter more than their own standard
+/// deviations explain: they then repeat a structure that differs, and no reading is better than that.
+fn take_scatter(mode: &mut ModeResult, frequencies: &[(f64, f64)]) {
+    let freedom = frequencies.len() as f64 - 1.0;
+    if freedom < 1.0 || chi_square_tail(scatter_about_mean(frequencies), freedom) >= SCATTER_LEVEL {
+        return;
+    }
+    let (mean, std) = weighted_mean(frequencies);
+    let half = student::quantile(0.05, freedom) * std;
+    mode.frequency = mean;
+    mode.std = Some(std);
+    if let Some(reading) = &mut mode.reading {
+        reading.frequency = mean;
+        reading.std = Some(std);
+        reading.interval = (mean - half, mean + half);
+    }
 }
 
 /// The readings of a bare recording, numbered as they come.

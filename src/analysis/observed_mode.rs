@@ -254,7 +254,7 @@ impl<'a> ModeSeen<'a> {
                 AmplitudeVerdict::Beating { .. } | AmplitudeVerdict::Unresolved { .. } => {
                     DecayVerdict::Doubtful
                 }
-                AmplitudeVerdict::TooFewPoints => return None,
+                AmplitudeVerdict::PartOf { .. } | AmplitudeVerdict::TooFewPoints => return None,
             },
         })
     }

@@ -54,7 +54,7 @@ fn measure_described(
     test_file: &str,
 ) -> Result<RecordingResult, PipelineError> {
     let path = folder.join(&description.file);
-    let file = description.file.display().to_string();
+    let file = description.name();
     let read = ReadSettings {
         sample_rate: description.sample_rate,
         time_unit: description.time_unit,
@@ -94,10 +94,16 @@ fn measure_described(
         )));
     }
     let mut recording = Recording::open(&path, &read)?;
+    if !description.more_files.is_empty() {
+        let paths = description.files().map(|file| folder.join(file));
+        let parts = paths.map(|path| Recording::open(&path, &read));
+        recording = Recording::joined(file.as_str(), parts.collect::<Result<_, _>>()?)?;
+    }
     let wiring = described_wiring(test, &mut recording, test_file)?;
     let mut settings = MeasureSettings::new(wiring.source());
     settings.band = description.band;
     settings.block = description.block;
+    settings.taps.keep_overload = description.keep_overload;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
     if wiring.hammer.is_some() {

@@ -231,6 +231,8 @@ pub struct SensorDescription {
 pub struct RecordingDescription {
     /// File as written in the description, relative to it.
     pub file: PathBuf,
+    /// Further files of the same set-up, which follow it.
+    pub more_files: Vec<PathBuf>,
     /// Line of the description that names the file.
     pub line: usize,
     /// Position of the hammer's taps (m).
@@ -258,6 +260,8 @@ pub struct RecordingDescription {
     pub variables: Variables,
     /// The sensor of such a file.
     pub sensor: Option<String>,
+    /// True if taps that drove a channel to its limit are used from where their decays are whole.
+    pub keep_overload: bool,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,
     /// Carried to the outputs: temperature (degrees Celsius).

@@ -11,9 +11,10 @@ use super::{
     SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
-use tapjoint_signal::recording::TIME_UNITS;
+use tapjoint_signal::recording::{MOST_FILES, TIME_UNITS};
 use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
 
 /// Words of `kind` in `[[sensor]]`.
@@ -256,6 +257,9 @@ const FUNCTION_FORMS: [(&str, FunctionForm); 4] = [
     ),
     ("spectrum", FunctionForm::Spectrum),
 ];
+
+/// Words of `overload` in `[[recording]]`: whether overloaded taps are used.
+const OVERLOAD: [(&str, bool); 2] = [("keep", true), ("reject", false)];
 const BLOCK: Limits = Limits::between(
     LEAST_BLOCK as f64,
     MOST_BLOCK as f64,
@@ -296,7 +300,7 @@ pub(super) fn read_recording(
     sensors: &[SensorDescription],
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
-    let file = table.need("file", "a file", "file = \"taps.wav\"")?;
+    let (file, mut files) = read_files(&table)?;
     let position = along(beam.length);
     let mut at = BTreeMap::new();
     if let Some(entry) = table.get("at") {
@@ -344,7 +348,8 @@ pub(super) fn read_recording(
         ));
     }
     Ok(RecordingDescription {
-        file: file.text("a file such as \"taps.wav\"")?.into(),
+        file: files.remove(0),
+        more_files: files,
         line: file.line,
         tap: table.within("tap", Dimension::Length, &position)?,
         level: table.within("level", Dimension::Ratio, &LEVEL)?,
@@ -360,6 +365,7 @@ pub(super) fn read_recording(
             .optional("variables", read_variables)?
             .unwrap_or_default(),
         sensor,
+        keep_overload: table.choice("overload", &OVERLOAD)?.unwrap_or(false),
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
@@ -392,6 +398,37 @@ fn read_variables(entry: &Entry<'_>) -> Result<Variables, DescriptionError> {
         variables.insert(*role, names);
     }
     Ok(variables)
+}
+
+/// Reads `file` or `files`: the entry that names them, and at least one file.
+fn read_files<'t>(table: &Table<'t>) -> Result<(Entry<'t>, Vec<PathBuf>), DescriptionError> {
+    let wanted = "a file such as \"taps.wav\"";
+    let Some(entry) = table.get("files") else {
+        let file = table.need("file", "a file", "file = \"taps.wav\"")?;
+        let one = file.text(wanted)?.into();
+        return Ok((file, vec![one]));
+    };
+    if table.get("file").is_some() {
+        return Err(entry.error(
+            "`file` and `files` name the recording twice; keep `files` for one set-up in several files, else `file`",
+        ));
+    }
+    if table.get("form").is_some() {
+        return Err(entry.error(
+            "`form` belongs to a file of response functions, and several of these are no one recording; write a \
+             [[recording]] for each file",
+        ));
+    }
+    let list = entry.list_up_to(MOST_FILES, "a list of files such as [\"1.wav\", \"2.wav\"]")?;
+    let files: Vec<PathBuf> = list
+        .iter()
+        .map(|one| one.text(wanted).map(PathBuf::from))
+        .collect::<Result<_, _>>()?;
+    if files.is_empty() {
+        let remedy = "write `file = \"taps.wav\"` for a single one";
+        return Err(entry.wrong_count(0, "at least 1 file", remedy));
+    }
+    Ok((entry, files))
 }
 
 fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {

@@ -70,6 +70,7 @@ position = 0.338               # m
 
 [[recording]]                  # once for each file; the same file may be read in several bands
 file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
+#   files = ["1.wav", "2.wav"] instead of file: one set-up in several files, a tap each or repeats
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
@@ -77,6 +78,7 @@ file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, s
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none
 # mass = [{ position = 0.423, mass = "15 g" }]   # known masses fastened for this recording, default: none
 # sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
+# overload = "keep"            # use taps that drove a channel to its limit, from where their decays are whole; default: "reject"
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none

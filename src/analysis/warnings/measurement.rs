@@ -100,6 +100,20 @@ impl Warning {
         }
     }
 
+    /// The modal constants of a sensor are larger than those of the described beam by this factor (1).
+    pub(crate) fn scale(sensor: &str, factor: f64) -> Self {
+        let (how, factor) = match factor > 1.0 {
+            true => ("too large", factor),
+            false => ("too small", 1.0 / factor),
+        };
+        let text = format!(
+            "the response of {sensor} to the force is about {factor:.1} times {how} for the mass of the described beam; \
+             g taken for m/s2 makes 9.8 times, mV for V 1000 times: check the scales of {sensor} and of the hammer, and \
+             the beam's density and dimensions (frequencies do not depend on scales)"
+        );
+        Warning::new("scale", text)
+    }
+
     /// Peaks to which no mode of the jointed beam belongs; `None` where there are none.
     pub(crate) fn unpaired(count: usize) -> Option<Self> {
         let text = "as modes they would make every joint fit worse; torsion, another direction of bending, the \
@@ -392,8 +406,7 @@ fn dependence(mut group: Vec<(String, AmplitudeChanges)>) -> Warning {
     if let Some((_, first)) = changes.first() {
         text += &format!("; {}", first.way().cause());
     }
-    text += "; a recording at a second tap level would confirm it, and frequencies should be stated with their \
-             amplitude, or taken from softer taps";
+    text += "; a recording at a second tap level would confirm it; softer taps show the limit of small amplitudes";
     for (place, (file, changes)) in group.iter().enumerate() {
         let begin = if place == 0 { "; the same in" } else { ";" };
         let numbers: Vec<String> = changes.iter().map(|(mode, _)| mode.to_string()).collect();
@@ -524,6 +537,7 @@ mod tests {
     /// A change of frequency and damping as the amplitude falls.
     fn change(frequency: [f64; 2], damping_ratio: [f64; 2]) -> AmplitudeChange {
         AmplitudeChange {
+            holds_at: None,
             amplitude: [10.0, 1.0],
             unit: None,
             frequency,

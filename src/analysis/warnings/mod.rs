@@ -11,7 +11,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 59] = [
+pub const WARNING_CODES: [(&str, &str); 60] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -112,6 +112,10 @@ pub const WARNING_CODES: [(&str, &str); 59] = [
     ),
     ("linearity", "a frequency depends on the tap's level"),
     ("mass-loading", "a frequency depends on the sensors' places"),
+    (
+        "scale",
+        "a response is several times too large or too small for the described beam",
+    ),
     // Of the numbers of the modes.
     ("amplitude-dependent", "a mode changes with its amplitude"),
     ("unpaired", "peaks belong to no mode"),

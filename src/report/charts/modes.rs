@@ -403,6 +403,9 @@ fn verdict(curve: &AmplitudeCurve) -> String {
         AmplitudeVerdict::Unresolved { frequency } => {
             format!("not to be told from its neighbour at {frequency:.2} Hz")
         }
+        AmplitudeVerdict::PartOf { frequency } => {
+            format!("a part of the line at {frequency:.2} Hz")
+        }
         AmplitudeVerdict::TooFewPoints => "too few points for a trend".to_owned(),
     }
 }

@@ -15,6 +15,7 @@ use tapjoint_signal::recording::{
     Abscissa, ChannelInfo, Ordinate, Precision, UffCoding, UniversalFile,
 };
 use tapjoint_signal::spectral::Window;
+use tapjoint_signal::taps::Pulse;
 
 /// One recording.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -63,6 +64,8 @@ pub struct RecordingSection {
     pub window: Option<String>,
     /// Decay the window adds (1/s).
     pub window_decay: Option<f64>,
+    /// The force pulse in the mean of the accepted taps, and its window; null without a hammer.
+    pub hammer: Option<HammerSection>,
     /// Level at the record's end relative to its start, the largest of the responses.
     pub remaining_at_end: Option<f64>,
     /// This recording's own readings.
@@ -82,6 +85,21 @@ pub struct TapSection {
     pub accepted: bool,
     /// Why not.
     pub reason: Option<String>,
+    /// The force pulse; its keys are missing without a hammer.
+    #[serde(flatten)]
+    pub pulse: Option<Pulse>,
+}
+
+/// The force pulses of a recording.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct HammerSection {
+    /// Mean of the accepted taps.
+    #[serde(flatten)]
+    pub pulse: Pulse,
+    /// Length of the window about each pulse, outside of which the force counts as zero (s); null without spectra.
+    pub force_window: Option<f64>,
+    /// Largest change of H1 at a resonance by that window (%); null without a resonance.
+    pub h1_change_percent: Option<f64>,
 }
 
 /// One channel of a recording, in the unit that its values have.
@@ -151,6 +169,14 @@ impl RecordingSection {
             peak_response: (!recording.has_hammer).then_some(tap.peak),
             accepted: tap.accepted(),
             reason: tap.rejection.as_ref().map(ToString::to_string),
+            pulse: tap.pulse,
+        });
+        let gate = spectra.and_then(|spectra| spectra.force_window);
+        let mean_pulse = recording.measurement.taps.mean_pulse();
+        let hammer = mean_pulse.map(|pulse| HammerSection {
+            pulse,
+            force_window: gate.map(|gate| gate.length),
+            h1_change_percent: gate.and_then(|gate| Some(100.0 * gate.h1_change?)),
         });
         let readings = recording.readings().iter().zip(&recording.mode_numbers);
         let modes = readings.map(|(reading, &mode)| ModeSection {
@@ -182,6 +208,7 @@ impl RecordingSection {
             band: lines.map(|lines| [lines.low, lines.high]),
             window: spectra.map(|spectra| spectra.window.name().to_string()),
             window_decay: spectra.and_then(|spectra| added_decay(spectra.window)),
+            hammer,
             remaining_at_end: spectra.and_then(|spectra| Some(spectra.decay?.remaining)),
             modes: modes.collect(),
         }
@@ -276,6 +303,11 @@ pub struct ModeSection {
     pub damping: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_std: Option<f64>,
+    /// Peak amplitude of the strongest sensor (`amplitude_unit`) at which frequency and damping hold; null where the
+    /// decays were not followed.
+    pub amplitude: Option<f64>,
+    /// Unit of `amplitude`; null where it is not known.
+    pub amplitude_unit: Option<String>,
     /// The fit; null where the mode was not fitted.
     pub fit: Option<FitSection>,
     /// Coherence on the mode's line, of the sensor that knows it best; null below two averages.
@@ -336,7 +368,7 @@ pub struct FitSection {
 /// Frequency and damping of a mode along its decays.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct AmplitudeSection {
-    /// "changes", "steady", "beating", "unresolved" or "too-few-points".
+    /// "changes", "steady", "beating", "unresolved", "part-of" or "too-few-points".
     pub verdict: AmplitudeVerdict,
     /// Change of the frequency (Hz); null with too few points.
     pub frequency: Option<Trend>,
@@ -384,6 +416,9 @@ impl ModeSection {
         let quality = spectra.map(|spectra| spectra.averages.best_quality(reading.frequency));
         let change = recording.and_then(|recording| recording.amplitude_change(reading));
         let fit = reading.fit.as_deref();
+        let curve = fit.and_then(|fit| fit.amplitude.as_ref());
+        let curve = curve.filter(|_| reading.source == ReadBy::Fit);
+        let sensor = curve.and_then(|curve| recording?.responses.get(curve.sensor?));
         ModeSection {
             mode: None,
             frequency: reading.frequency,
@@ -397,6 +432,8 @@ impl ModeSection {
             high: Some(reading.interval.1),
             damping: reading.damping_ratio,
             damping_std: reading.damping_std,
+            amplitude: curve.and_then(|curve| curve.amplitude),
+            amplitude_unit: sensor.and_then(|sensor| sensor.unit.clone()),
             fit: fit.map(|fit| FitSection::of(fit, change)),
             coherence: quality.and_then(|quality| quality.coherence),
             random_error: quality.and_then(|quality| quality.random_error),
@@ -412,12 +449,13 @@ impl ModeSection {
 impl FitSection {
     fn of(fit: &FittedReading, change: Option<AmplitudeChange>) -> Self {
         let mode = &fit.mode;
+        let (frequency, damping_ratio) = fit.pole();
         FitSection {
-            damping_low: mode.damping_ratio.low,
-            damping_high: mode.damping_ratio.high,
-            uncertainty_from: mode.frequency.source,
-            freedom: mode.frequency.freedom,
-            scatter_probability: mode.frequency.scatter_probability,
+            damping_low: damping_ratio.low,
+            damping_high: damping_ratio.high,
+            uncertainty_from: frequency.source,
+            freedom: frequency.freedom,
+            scatter_probability: frequency.scatter_probability,
             residual_correlation: mode.residual_correlation,
             band: [mode.band.0, mode.band.1],
             taps: mode.taps.clone(),

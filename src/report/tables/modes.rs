@@ -68,6 +68,11 @@ pub fn mode_details(document: &Document) -> Option<Table> {
     if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
         notes.push(INTERVAL_NOTE);
     }
+    if modes.iter().any(|mode| mode.amplitude.is_some()) {
+        notes.push(
+            "Holds at: amplitude of the strongest sensor at which frequency and damping are those of the mode.",
+        );
+    }
     if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
         notes.push(TAPS_NOTE);
     }
@@ -87,8 +92,9 @@ pub fn reading_details(document: &Document) -> Option<Table> {
 
 /// Columns that say how a resonance was read: beside the others they would need a page wider than a
 /// screen.
-const DETAILS: [&str; 7] = [
+const DETAILS: [&str; 8] = [
     "Interval from",
+    "Holds at",
     "Tap deviation (Hz)",
     "p",
     "Prominence (dB)",
@@ -181,7 +187,7 @@ fn table<'a>(caption: &str, modes: impl Iterator<Item = &'a ModeSection>, note: 
     table.without_empty_columns()
 }
 
-fn row(mode: &ModeSection) -> [Cell; 14] {
+fn row(mode: &ModeSection) -> [Cell; 15] {
     // The highest line near a pole may be of another peak, and its bound says nothing of the pole then. A fit is taken
     // as off by three times its interval.
     let bounds = mode.half_line.zip(bound_of(mode));
@@ -199,6 +205,11 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         UncertaintySource::Residual => "residual",
         UncertaintySource::TapScatter => "taps",
     });
+    let holds_at = mode.amplitude.map(|amplitude| {
+        let unit = mode.amplitude_unit.as_deref().unwrap_or_default();
+        format!("{} {}", significant(amplitude, 2), unit_words(unit))
+    });
+    let holds_at = holds_at.map(|words| words.trim_end().to_owned());
     // The damping ratio (%) with its standard deviation.
     let std = mode.damping_std.map(|std| 100.0 * std);
     let damping = mode
@@ -221,6 +232,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         number("Frequency (Hz)", reading(mode).joined()),
         page_words("Method", method_name(mode.method)),
         page_words("Interval from", interval),
+        page_words("Holds at", or_missing(holds_at)),
         number("Line (Hz)", or_missing(line)),
         number("Damping (%)", or_missing(damping)),
         page_number("Tap deviation (Hz)", optional(tap_deviation(mode), 2)),

@@ -164,6 +164,22 @@ fn taps_of(
                 number("Time (s)", format!("{:.3}", tap.time)),
                 number("Peak", optional(peak(tap), 3)),
                 words("Unit", peak_unit(recording)),
+                page_number(
+                    "Pulse (ms)",
+                    optional(tap.pulse.map(|pulse| 1e3 * pulse.width), 3),
+                ),
+                page_number(
+                    "−10 dB (Hz)",
+                    optional(tap.pulse.and_then(|pulse| pulse.fall_10_db), 3),
+                ),
+                page_number(
+                    "−20 dB (Hz)",
+                    optional(tap.pulse.and_then(|pulse| pulse.fall_20_db), 3),
+                ),
+                page_number(
+                    "Usable to (Hz)",
+                    optional(tap.pulse.map(|pulse| pulse.usable_to), 3),
+                ),
                 words("Used", if tap.accepted { "yes" } else { "no" }),
                 words("Reason", tap.reason.clone().unwrap_or_default()),
             ]);
@@ -214,6 +230,31 @@ pub fn taps_used(document: &Document) -> Option<Table> {
         ]
     });
     some(Table::of("Taps used", rows, peaks_note(recordings)))
+}
+
+/// One row for each recording with a hammer: its force pulses in the mean; `None` without any.
+pub fn hammer(document: &Document) -> Option<Table> {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let rows = recordings.iter().filter_map(|one| {
+        let hammer = one.hammer.as_ref()?;
+        let pulse = &hammer.pulse;
+        Some([
+            of_several(one, recordings),
+            number("Pulse (ms)", significant(1e3 * pulse.width, 3)),
+            number("−10 dB (Hz)", optional(pulse.fall_10_db, 3)),
+            number("−20 dB (Hz)", optional(pulse.fall_20_db, 3)),
+            number("Usable to (Hz)", significant(pulse.usable_to, 3)),
+            number(
+                "Force window (ms)",
+                optional(hammer.force_window.map(|length| 1e3 * length), 3),
+            ),
+            number("H1 changes by (%)", optional(hammer.h1_change_percent, 2)),
+        ])
+    });
+    let note = "Mean of the taps used. Pulse: width at half height. −10 and −20 dB: where the force spectrum has \
+                fallen so far. Usable to: the latter, or where it comes within 10 dB of its noise. Outside the force \
+                window the force counts as zero; H1 changes by: what that does at the resonances, at most.";
+    some(Table::of("Hammer", rows, note))
 }
 
 /// One row for each dataset; `None` without any.

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use crate::recording::ResponseForm;
 use crate::spectral::{DecayCheck, Lines, Window};
-use crate::taps::{Rejection, SecondHit, Tap};
+use crate::taps::{Overload, Rejection, SecondHit, Tap};
 use tapjoint_numerics::stats::median;
 
 pub use verdict::{Check, Outcome, QualityVerdict, Subject};
@@ -54,6 +54,8 @@ pub struct TapEvidence {
     pub peak: f64,
     /// A second hit in its force, if any.
     pub second_hit: Option<SecondHit>,
+    /// Samples at the limit of a channel, if any.
+    pub overload: Option<Overload>,
     /// Why it was rejected; `None` = accepted.
     pub rejection: Option<Rejection>,
 }
@@ -63,6 +65,7 @@ impl From<&Tap> for TapEvidence {
         TapEvidence {
             peak: tap.peak,
             second_hit: tap.second_hit,
+            overload: tap.overload,
             rejection: tap.rejection.clone(),
         }
     }
@@ -205,9 +208,7 @@ pub mod limits {
     /// Fall of the force spectrum over the band (dB). 20: 10 to 20 dB are common, beyond that the far end
     /// is hardly excited (ISO 7626-5).
     pub const FORCE_FALL: f64 = 20.0;
-    /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
-    /// small by the share of its power, here a tenth.
-    pub const FORCE_OVER_NOISE: f64 = 10.0;
+    pub use crate::taps::FORCE_OVER_NOISE;
     /// Largest over smallest accepted tap. 3: 10 dB, one range of an amplifier; wider, a joint that is not
     /// linear shows in the averages.
     pub const TAP_LEVELS: f64 = 3.0;
@@ -230,9 +231,8 @@ pub mod limits {
     pub const WINDOW_SHARE: f64 = 0.5;
     /// Relative scatter of a frequency from tap to tap. 1 % (ASTM E1876: readings agree within 1 %).
     pub const FREQUENCY_SCATTER: f64 = 0.01;
-    /// Relative scatter below which there is no doubt, whatever noise explains. 0.005 %: a third of a kelvin does as
-    /// much to steel.
-    pub const LEAST_SCATTER: f64 = 5e-5;
+    /// Relative scatter below which there is no doubt, whatever noise explains: that of every change of a frequency.
+    pub const LEAST_SCATTER: f64 = crate::modal::amplitude::LEAST_CHANGE;
     /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
     pub const DEVIATIONS: f64 = 3.0;
     /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.

@@ -103,14 +103,15 @@ fn of_taps(
 /// No sample at a channel's limit.
 pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_taps(recording, Check::Overload, 0.0, |tap, verdict| {
-        match &tap.rejection {
-            Some(Rejection::Overload { channel, samples }) => verdict.found(
-                *samples as f64,
+        match tap.overload {
+            Some(found) => verdict.found(
+                found.samples as f64,
                 Outcome::Bad,
-                format!("Channel {channel} is at its limit for {samples} samples (limit 0)."),
+                format!(
+                    "Channel {} is at its limit for {} samples (limit 0).",
+                    found.channel, found.samples
+                ),
             ),
-            // Other reasons are looked for first: what they reject was not searched for an overload.
-            Some(_) => verdict.missing("Not applicable: rejected for another reason."),
             None => verdict.found(0.0, Outcome::Good, "No channel at its limit.".to_owned()),
         }
     })

@@ -25,6 +25,15 @@ const MIN_DROP_OF_PEAK: f64 = 1e-4;
 /// the idle side of a hammer signal is none.
 const MIN_LEVEL_OF_PEAK: f64 = 0.5;
 
+/// Samples this far below the extreme level are near it (part of the level).
+const NEAR_LEVEL: f64 = 0.01;
+
+/// Fewest separate runs at the extreme level that make a rail of single samples: by chance two crests may be equal.
+const LEAST_HITS: u64 = 4;
+
+/// Steps of the values coarser than this part of the level say nothing about single samples on it.
+const QUANTUM_OF_PEAK: f64 = 1e-3;
+
 /// Shortest run of equal samples that counts as dropped. Recorders lose whole buffers, of 32
 /// samples at least; a moving signal does not repeat a value that often by chance.
 const MIN_DROPOUT: u64 = 32;
@@ -158,6 +167,9 @@ pub struct ChannelHealth {
     /// Number of flat tops, beyond the list too.
     #[serde(rename = "flat_tops")]
     pub flat_top_count: u64,
+    /// Lower and upper rail (the channel's unit): the level at which samples were cut off, singly or in runs; null where
+    /// none was.
+    pub rails: [Option<f64>; 2],
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
     #[serde(skip)]
     pub dropped: Vec<EqualRun>,
@@ -180,10 +192,52 @@ impl ChannelHealth {
         scaled.rms *= factor.abs();
         scaled.peak *= factor.abs();
         (scaled.minimum, scaled.maximum) = (low.min(high), low.max(high));
+        scaled.rails = self.rails.map(|rail| rail.map(|level| level * factor));
+        if factor < 0.0 {
+            scaled.rails.reverse();
+        }
         for run in scaled.flat_tops.iter_mut().chain(&mut scaled.dropped) {
             run.value *= factor;
         }
         scaled
+    }
+
+    /// Returns the health of samples, `frames` of them, that are followed by `others` of another file.
+    pub(super) fn followed_by(&self, frames: u64, other: &Self, others: u64) -> Self {
+        let mut both = self.clone();
+        let (own, more) = (frames as f64, others as f64);
+        let total = own + more;
+        let difference = other.mean - self.mean;
+        both.mean += difference * more / total;
+        // As for the blocks of one file, see [`HealthMeter::add`].
+        let squares = own * self.rms.powi(2) + more * other.rms.powi(2);
+        both.rms = ((squares + difference.powi(2) * own * more / total) / total).sqrt();
+        both.peak = self.peak.max(other.peak);
+        both.minimum = self.minimum.min(other.minimum);
+        both.maximum = self.maximum.max(other.maximum);
+        both.full_scale_samples += other.full_scale_samples;
+        let later = other.first_full_scale.map(|first| first + frames);
+        both.first_full_scale = self.first_full_scale.or(later);
+        both.flat_top_count += other.flat_top_count;
+        both.dropout_count += other.dropout_count;
+        both.dropped_samples += other.dropped_samples;
+        for (runs, more) in [
+            (&mut both.flat_tops, &other.flat_tops),
+            (&mut both.dropped, &other.dropped),
+        ] {
+            let moved = more.iter().map(|run| EqualRun {
+                start: run.start + frames,
+                ..*run
+            });
+            runs.extend(moved);
+            runs.truncate(2 * PLACES_KEPT);
+        }
+        // The nearer rail is the limit wherever both were reached.
+        let [low, high] =
+            [0, 1].map(|side| [self.rails[side], other.rails[side]].into_iter().flatten());
+        both.rails = [low.reduce(f64::max), high.reduce(f64::min)];
+        both.constant = both.minimum == both.maximum;
+        both
     }
 
     /// Returns the doubts that this health gives rise to: their codes and what is wrong.
@@ -209,6 +263,19 @@ impl ChannelHealth {
                 "{} flat tops at its extreme level, the first at {:.6} s ({len} equal samples at {value}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
                 self.flat_top_count,
                 *start as f64 / sample_rate
+            );
+            doubts.push(("flat-tops", problem));
+        }
+        let rails: Vec<String> = self
+            .rails
+            .iter()
+            .flatten()
+            .map(|rail| format!("{rail:.4e}"))
+            .collect();
+        if self.flat_tops.is_empty() && self.first_full_scale.is_none() && !rails.is_empty() {
+            let problem = format!(
+                "single samples pile up at its extreme level {}; an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
+                rails.join(" and ")
             );
             doubts.push(("flat-tops", problem));
         }
@@ -268,6 +335,10 @@ struct Run {
 struct Side {
     sign: f64,
     level: f64,
+    /// Separate runs at the level, of single samples too.
+    hits: u64,
+    /// Samples within [`NEAR_LEVEL`] below it.
+    near: u64,
     places: Vec<EqualRun>,
     count: u64,
 }
@@ -277,18 +348,38 @@ impl Side {
         Self {
             sign,
             level: f64::NEG_INFINITY,
+            hits: 0,
+            near: 0,
             places: Vec::new(),
             count: 0,
         }
     }
 
-    /// Takes the next value; a higher level makes all runs at the old one ordinary.
+    /// Takes the next value that differs from the last; a higher level makes all runs at the old one ordinary.
     fn raise(&mut self, value: f64) {
-        if value * self.sign > self.level {
-            self.level = value * self.sign;
+        let height = value * self.sign;
+        if height > self.level {
+            self.near = match self.level >= height - NEAR_LEVEL * height.abs() {
+                true => self.near + self.hits,
+                false => 0,
+            };
+            (self.level, self.hits) = (height, 1);
             self.places.clear();
             self.count = 0;
+        } else if height == self.level {
+            self.hits += 1;
+        } else if height >= self.level - NEAR_LEVEL * self.level.abs() {
+            self.near += 1;
         }
+    }
+
+    /// Returns the rail of this side: a level with flat tops, or one on which samples pile up. Of a smooth signal that is
+    /// not cut off far more samples lie within 1 % below the highest than exactly on it. Coarse steps of the values
+    /// (`quantum`) would pile up by themselves.
+    fn rail(&self, quantum: f64) -> Option<f64> {
+        let fine = quantum < QUANTUM_OF_PEAK * self.level.abs();
+        let piled = fine && self.hits >= LEAST_HITS && self.hits >= self.near;
+        (self.count > 0 || piled).then_some(self.level * self.sign)
     }
 
     fn holds(&self, value: f64) -> bool {
@@ -417,11 +508,16 @@ impl HealthMeter {
         health.rms = (self.sum_of_squares / self.count as f64).sqrt();
         health.peak = health.maximum.abs().max(health.minimum.abs());
         health.constant = health.maximum == health.minimum;
-        for side in [self.high, self.low] {
+        for (side, rail) in [self.low, self.high].into_iter().zip(&mut health.rails) {
             if !health.constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * health.peak {
+                *rail = side.rail(self.quantum);
                 health.flat_top_count += side.count;
                 health.flat_tops.extend(side.places);
             }
+        }
+        // An integer format ends at full scale, reached or not by the other side.
+        if health.full_scale_samples > 0 {
+            health.rails = [Some(-health.peak), Some(health.peak)];
         }
         health.flat_tops.sort_by_key(|flat_top| flat_top.start);
         if self.still_samples as f64 > MAX_STILL_PART * self.count as f64 {

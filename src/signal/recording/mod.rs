@@ -25,6 +25,7 @@ mod csv;
 mod error;
 mod function_text;
 mod health;
+mod joined;
 mod lvm;
 mod mat;
 mod resample;
@@ -37,6 +38,7 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
+pub use joined::MOST_FILES;
 pub use mat::{VariableRole, Variables};
 pub use responses::{
     FrequencyResponse, FrequencyResponses, ValueColumns, open_frequency_responses,
@@ -667,6 +669,11 @@ impl Iterator for Blocks<'_> {
 trait Source: fmt::Debug + Send + Sync {
     /// Positions a reader at `frame`.
     fn cursor(&self, frame: u64) -> Result<Box<dyn Cursor + '_>, RecordingError>;
+
+    /// First frames of the files after the first.
+    fn seams(&self) -> &[u64] {
+        &[]
+    }
 }
 
 /// A reader somewhere in the samples; one per pass, since it moves.

@@ -6,9 +6,11 @@
 //! next tap comes.
 
 mod double_hit;
+mod pulse;
 mod search;
 
 pub use double_hit::SecondHit;
+pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
 use std::fmt;
 use std::ops::Range;
@@ -71,6 +73,8 @@ pub struct TapSettings {
     pub rearm: f64,
     /// Length of signal that the wanted block needs (s), where a block is given.
     pub wanted: Option<f64>,
+    /// True to accept taps that drove a channel to its limit: their decays are used from where they are whole.
+    pub keep_overload: bool,
 }
 
 impl Default for TapSettings {
@@ -85,6 +89,7 @@ impl Default for TapSettings {
             double_hit_warning: 0.04,
             rearm: 0.05,
             wanted: None,
+            keep_overload: false,
         }
     }
 }
@@ -98,13 +103,28 @@ pub struct Tap {
     pub peak: f64,
     /// Frame in which the force pulse, its ringing included, has died away; `None` without a hammer.
     pub pulse_end: Option<u64>,
+    /// Its force pulse in numbers; `None` without a hammer.
+    pub pulse: Option<Pulse>,
     /// Frames of its record: a little before the trigger to where the next tap comes.
     pub record: Range<u64>,
     /// A second hit within the record, from [`TapSettings::double_hit_warning`] of the peak up; `None`
     /// without one, and without a hammer, where it cannot be told from two modes that beat.
     pub second_hit: Option<SecondHit>,
+    /// Samples of its record that were cut off; `None` without any.
+    pub overload: Option<Overload>,
     /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
+}
+
+/// Samples of a tap's record at the limit of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overload {
+    /// The first such channel, 1-based.
+    pub channel: usize,
+    /// Its samples at the limit.
+    pub samples: usize,
+    /// Frame from which no response is cut off any more.
+    pub whole_from: u64,
 }
 
 impl Tap {
@@ -113,9 +133,18 @@ impl Tap {
         self.rejection.is_none()
     }
 
-    /// Length of its record (frames).
+    /// First frame that is used of its record: without a hammer an overloaded tap has only its decay, from where that is
+    /// whole.
+    pub fn usable_from(&self) -> u64 {
+        let whole = self.overload.map(|overload| overload.whole_from);
+        whole
+            .filter(|_| self.pulse_end.is_none())
+            .unwrap_or(self.record.start)
+    }
+
+    /// Length of what is used of its record (frames).
     pub fn frames(&self) -> u64 {
-        self.record.end - self.record.start
+        self.record.end - self.usable_from().min(self.record.end)
     }
 }
 
@@ -218,6 +247,11 @@ pub enum TapRemark {
         /// Number of times.
         count: usize,
     },
+    /// Taps that drove a channel to its limit were accepted: they were asked for, or there were no others.
+    OverloadKept {
+        /// Number of taps.
+        count: usize,
+    },
 }
 
 impl fmt::Display for TapRemark {
@@ -236,6 +270,12 @@ impl fmt::Display for TapRemark {
                 f,
                 "the force stayed up for more than 50 ms {count} time(s), longer than any hammer pulse; \
                  that was left out: a moved cable, a hand on the hammer, or the wrong channel"
+            ),
+            TapRemark::OverloadKept { count } => write!(
+                f,
+                "{count} tap(s) that drove a channel to its limit are used: frequencies and damping come from the \
+                 decays where they are whole, but spectra and frequency response functions hold the cut-off samples; \
+                 lower the gain or tap more softly"
             ),
         }
     }
@@ -262,6 +302,12 @@ impl Taps {
     /// Length of the shortest accepted record (frames).
     pub fn shortest(&self) -> Option<u64> {
         self.accepted().map(Tap::frames).min()
+    }
+
+    /// The force pulse in the mean of the accepted taps; `None` without a hammer.
+    pub fn mean_pulse(&self) -> Option<Pulse> {
+        let pulses: Vec<Pulse> = self.accepted().filter_map(|tap| tap.pulse).collect();
+        Pulse::mean(&pulses)
     }
 
     /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up.
@@ -315,11 +361,30 @@ pub fn find_taps(
     for index in 0..found.events.len() {
         taps.push(tap(recording, source, &found, index, weakest, settings)?);
     }
+    let mut remarks = found.remarks;
+    // Where no other tap is left, overloaded ones are better than none.
+    let none_left = !taps.iter().any(Tap::accepted);
+    let mut kept = 0;
+    for tap in &mut taps {
+        // Less than half of a record says little, and would shorten the blocks of all others.
+        let whole = tap.overload.map_or(0, |overload| {
+            tap.record.end.saturating_sub(overload.whole_from)
+        });
+        let enough = 2 * whole >= tap.record.end - tap.record.start;
+        let overloaded = matches!(tap.rejection, Some(Rejection::Overload { .. }));
+        if overloaded && enough && (settings.keep_overload || none_left) {
+            tap.rejection = None;
+            kept += 1;
+        }
+    }
+    if kept > 0 {
+        remarks.push(TapRemark::OverloadKept { count: kept });
+    }
     reject_short(&mut taps, recording.sample_rate(), settings.wanted);
     Ok(Taps {
         taps,
         noise: found.noise,
-        remarks: found.remarks,
+        remarks,
     })
 }
 
@@ -349,19 +414,30 @@ fn tap(
     let before = ((settings.pre_trigger * rate) as u64).max(16);
     let mut later = found.events.iter().skip(index + 1);
     let next = later.find(|next| next.answered && next.peak >= weakest);
-    let end = next.map_or(recording.frames(), |next| {
-        next.trigger.saturating_sub(before)
+    // Neither reaches into another file.
+    let seams = recording.seams();
+    let later = seams.partition_point(|seam| *seam <= event.trigger);
+    let file_end = seams.get(later).copied().unwrap_or(recording.frames());
+    let end = next.map_or(file_end, |next| {
+        next.trigger.saturating_sub(before).min(file_end)
     });
-    let start = event.trigger.saturating_sub(before);
+    let start = event
+        .trigger
+        .saturating_sub(before)
+        .max(file_start(recording, event.trigger));
     let record = start..end.max(start);
     // Least distance of two taps (frames).
     let least = (settings.least_distance * rate) as u64;
-    let (mut pulse_end, mut second) = (None, None);
+    let (mut pulse_end, mut pulse, mut second) = (None, None, None);
     if let Some(force) = force_of(recording, source, found, index, &record, least)? {
         let own = force.index(record.end.min(event.trigger + least));
-        pulse_end = Some(force.pulse_end(event, own));
+        let end = force.pulse_end(event, own);
+        let about = force.index(record.start)..force.index(end).max(force.index(record.start));
+        pulse = Pulse::of(&force.samples[about], force.noise, rate);
+        pulse_end = Some(end);
         second = second_hit(&force, event, own, settings);
     }
+    let overload = overload(recording, source, &record)?;
     let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
@@ -373,14 +449,19 @@ fn tap(
             ratio: double.ratio,
             limit: settings.double_hit,
         }),
-        None => overload(recording, source, &record)?,
+        None => overload.map(|found| Rejection::Overload {
+            channel: found.channel,
+            samples: found.samples,
+        }),
     };
     Ok(Tap {
         time: event.trigger as f64 / rate,
         peak: event.peak,
         pulse_end,
+        pulse,
         record,
         second_hit: second,
+        overload,
         rejection,
     })
 }
@@ -423,46 +504,51 @@ fn force_of(
     Ok(Some(force))
 }
 
-/// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat
-/// tops.
+/// First frame of the file that holds a frame.
+fn file_start(recording: &Recording, frame: u64) -> u64 {
+    let seams = recording.seams();
+    let later = seams.partition_point(|seam| *seam <= frame);
+    later.checked_sub(1).map_or(0, |place| seams[place])
+}
+
+/// Samples at a channel's rails, the frame after the last of them in any response, and the channel; `None` without
+/// any.
 fn overload(
     recording: &Recording,
     source: &TapSource,
     record: &Range<u64>,
-) -> Result<Option<Rejection>, RecordingError> {
+) -> Result<Option<Overload>, RecordingError> {
+    let mut found: Option<Overload> = None;
     for channel in source.channels() {
         let Some(info) = recording.channels().get(channel) else {
             continue;
         };
-        let health = &info.health;
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for top in &health.flat_tops {
-            if top.value > health.mean {
-                high = high.min(top.value);
-            } else {
-                low = low.max(top.value);
-            }
-        }
-        if health.full_scale_samples > 0 {
-            high = high.min(health.peak);
-            low = low.max(-health.peak);
-        }
-        if low.is_infinite() && high.is_infinite() {
+        let [low, high] = info.health.rails;
+        if low.is_none() && high.is_none() {
             continue;
         }
-        // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
-        let hair = 1e-9 * health.peak;
-        let (low, high) = (low + hair, high - hair);
+        // A hair inside, so that rescaling by a unit cannot make a sample slip through.
+        let hair = 1e-9 * info.health.peak;
+        let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
+        let high = high.map_or(f64::INFINITY, |high| high - hair);
         let samples = recording.read(channel, record.clone())?;
-        let count = samples.iter().filter(|&&x| x >= high || x <= low).count();
-        if count > 0 {
-            return Ok(Some(Rejection::Overload {
-                channel: channel + 1,
-                samples: count,
-            }));
+        let is_cut = |x: &f64| *x >= high || *x <= low;
+        let count = samples.iter().filter(|x| is_cut(x)).count();
+        let Some(last) = samples.iter().rposition(|x| is_cut(x)) else {
+            continue;
+        };
+        let is_force =
+            matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel);
+        let overload = found.get_or_insert(Overload {
+            channel: channel + 1,
+            samples: count,
+            whole_from: record.start,
+        });
+        if !is_force {
+            overload.whole_from = overload.whole_from.max(record.start + last as u64 + 1);
         }
     }
-    Ok(None)
+    Ok(found)
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
@@ -508,7 +594,7 @@ const STRETCH: f64 = 0.05;
 const RISE: f64 = 1.5;
 
 /// Returns `true` where any response rises, or does not ring on as before, when the force rises. A hammer laid down, a swinging hammer and an
-/// electrical spike move no sensor. Without responses, or at the very start of the recording, the
+/// electrical spike move no sensor. Without responses, or at the very start of the recording or a file of it, the
 /// benefit of the doubt is given.
 fn is_answered(
     recording: &Recording,
@@ -518,7 +604,8 @@ fn is_answered(
     let stretch = (STRETCH * recording.sample_rate()) as u64;
     // The filter's ringing ahead of the pulse belongs to neither side.
     let gap = stretch / 10;
-    if responses.is_empty() || stretch < 8 || event.trigger < 2 * stretch {
+    let since_start = event.trigger - file_start(recording, event.trigger);
+    if responses.is_empty() || stretch < 8 || since_start < 2 * stretch {
         return Ok(true);
     }
     let before = event.trigger - gap - stretch..event.trigger - gap;

@@ -71,6 +71,12 @@ impl Band {
         Complex64::new(pole.re, self.omega + pole.im).norm() / TAU
     }
 
+    /// Returns the band of a single mode with the others of a list whose first it is as its neighbours.
+    pub fn beside(mut self, modes: &[KnownMode]) -> Self {
+        self.neighbours = neighbours(modes, 0, f64::INFINITY);
+        self
+    }
+
     /// Number of values in the first decay time, at least six.
     fn early(&self) -> usize {
         ((self.scale / self.step) as usize).max(6)

@@ -25,13 +25,17 @@
 mod band;
 mod decay;
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_numerics::stats::student;
 
+use super::fit::FittedValue;
 use super::from_one;
+use band::Band;
 use decay::DecayModel;
 
 /// The ringing after one tap, force no longer acting.
@@ -52,6 +56,20 @@ pub struct KnownMode {
     pub frequency: f64,
     /// Damping ratio (1), within a factor of about three.
     pub damping_ratio: f64,
+}
+
+impl KnownMode {
+    /// Hum at a frequency (Hz), which does not decay.
+    pub fn steady(frequency: f64) -> Self {
+        KnownMode {
+            frequency,
+            damping_ratio: 0.0,
+        }
+    }
+
+    fn is_steady(&self) -> bool {
+        self.damping_ratio <= 0.0
+    }
 }
 
 // Times below are shares of the decay time 1/sigma, or of a quarter of the record where that is shorter.
@@ -121,6 +139,12 @@ pub enum AmplitudeVerdict {
         /// Frequency of that mode (Hz).
         frequency: f64,
     },
+    /// Another given mode whose frequency changes explains the decays better than that mode and this one: this one is a
+    /// part of its line.
+    PartOf {
+        /// Frequency of the other mode (Hz).
+        frequency: f64,
+    },
     /// Fewer points than a trend needs.
     TooFewPoints,
 }
@@ -132,6 +156,7 @@ impl From<AmplitudeVerdict> for &'static str {
             AmplitudeVerdict::Steady => "steady",
             AmplitudeVerdict::Beating { .. } => "beating",
             AmplitudeVerdict::Unresolved { .. } => "unresolved",
+            AmplitudeVerdict::PartOf { .. } => "part-of",
             AmplitudeVerdict::TooFewPoints => "too-few-points",
         }
     }
@@ -152,9 +177,26 @@ pub struct AmplitudeCurve {
     pub damping: Option<Trend>,
     /// Lines fitted along with the mode.
     pub companions: Vec<Companion>,
+    /// Amplitude (unit of the strongest sensor) at which the mode's one frequency holds; `None` where none was followed.
+    pub amplitude: Option<f64>,
+    /// Frequency and damping at that amplitude, where the pole changes along the decays; `None` where it does not.
+    pub stated: Option<StatedPole>,
     /// Verdict on the curve.
     pub verdict: AmplitudeVerdict,
 }
+
+/// Frequency and damping of a mode at one amplitude, from all decays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StatedPole {
+    /// Natural frequency (Hz).
+    pub frequency: FittedValue,
+    /// Damping ratio (1).
+    pub damping_ratio: FittedValue,
+}
+
+/// Smallest relative change of a frequency that matters (1): 0.05 %, the smallest by which Ingole & Chatterjee perturb
+/// frequencies. A steel beam does as much in 3 K.
+pub const LEAST_CHANGE: f64 = 5e-4;
 
 /// Farthest that a point may lie from its mode's frequency (1, relative). Joints that slip move a frequency by a few
 /// percent; a segment that is fitted farther off has followed noise or another mode.
@@ -165,61 +207,209 @@ const LEAST_POINTS: usize = 4;
 
 /// Follows frequency and damping against amplitude, for every mode.
 pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeCurve> {
-    let indices = (0..modes.len()).into_par_iter();
-    let curves = indices.map(|index| {
-        let taps = decays.iter().enumerate();
-        let bands: Vec<_> = taps
-            .filter_map(|(tap, decay)| band::extract_band(decay, tap, modes, index))
+    let parts = parts_of_lines(decays, modes);
+    let kept: Vec<usize> = (0..modes.len())
+        .filter(|index| parts[*index].is_none())
+        .collect();
+    let known: Vec<KnownMode> = kept.iter().map(|&index| modes[index]).collect();
+    let followed: Vec<AmplitudeCurve> = (0..known.len())
+        .into_par_iter()
+        .map(|index| follow_mode(decays, &known, index))
+        .collect();
+    let mut followed = followed.into_iter();
+    let curves = parts.iter().map(|part| match part {
+        Some(whole) => Some(AmplitudeCurve::without_points(AmplitudeVerdict::PartOf {
+            frequency: modes[*whole].frequency,
+        })),
+        None => followed.next(),
+    });
+    curves.flatten().collect()
+}
+
+/// Returns for each mode the index of the one whose changing frequency makes it; `None` for a mode of its own.
+///
+/// A line that is swept while it rings has several peaks, each of which looks like a mode. Of the modes about it the
+/// first is followed alone and with the others; they are parts where it alone explains the decays clearly better.
+fn parts_of_lines(decays: &[Decay], modes: &[KnownMode]) -> Vec<Option<usize>> {
+    let mut parts: Vec<Option<usize>> = vec![None; modes.len()];
+    for (index, mode) in modes.iter().enumerate() {
+        let near = |other: &KnownMode| {
+            !other.is_steady()
+                && (other.frequency - mode.frequency).abs() < FARTHEST * mode.frequency
+        };
+        let others: Vec<usize> = (0..modes.len())
+            .filter(|&other| other != index && parts[other].is_none() && near(&modes[other]))
             .collect();
-        let mut curve = AmplitudeCurve {
+        if others.is_empty() || mode.is_steady() || parts[index].is_some() {
+            continue;
+        }
+        let alone = [*mode];
+        let with: Vec<KnownMode> = std::iter::once(index)
+            .chain(others.iter().copied())
+            .map(|one| modes[one])
+            .collect();
+        let bands = decays.iter().enumerate();
+        let bands = bands.filter_map(|(tap, decay)| band::extract_band(decay, tap, &alone, 0));
+        let bands: Vec<Band> = bands.collect();
+        let Some(sensor) = band::strongest(&bands) else {
+            continue;
+        };
+        // The criteria of both models less each other, over the taps.
+        let mut gain = 0.0;
+        for band in bands {
+            let Some(series) = band::combine(&band, sensor) else {
+                continue;
+            };
+            let single = DecayModel::fit(&series, &band);
+            let band = band.beside(&with);
+            let several = DecayModel::fit(&series, &band);
+            let difference = several.criterion - single.criterion;
+            gain += if difference.is_finite() {
+                difference
+            } else {
+                0.0
+            };
+        }
+        if gain > CLEARLY {
+            for other in others {
+                parts[other] = Some(index);
+            }
+        }
+    }
+    parts
+}
+
+/// Improvement of a criterion that is clear: odds of 150 to one.
+const CLEARLY: f64 = 10.0;
+
+impl AmplitudeCurve {
+    fn without_points(verdict: AmplitudeVerdict) -> Self {
+        AmplitudeCurve {
             points: Vec::new(),
-            sensor: band::strongest(&bands),
+            sensor: None,
             filter_length: None,
             frequency: None,
             damping: None,
             companions: Vec::new(),
-            verdict: AmplitudeVerdict::TooFewPoints,
+            amplitude: None,
+            stated: None,
+            verdict,
+        }
+    }
+}
+
+/// Follows one of the modes.
+fn follow_mode(decays: &[Decay], modes: &[KnownMode], index: usize) -> AmplitudeCurve {
+    let mut curve = AmplitudeCurve::without_points(AmplitudeVerdict::TooFewPoints);
+    if modes[index].is_steady() {
+        return curve;
+    }
+    let taps = decays.iter().enumerate();
+    let bands: Vec<_> = taps
+        .filter_map(|(tap, decay)| band::extract_band(decay, tap, modes, index))
+        .collect();
+    curve.sensor = band::strongest(&bands);
+    let Some(sensor) = curve.sensor else {
+        return curve;
+    };
+    curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
+    let (mut doubts, mut followed) = (Vec::new(), 0);
+    let mut models = Vec::new();
+    for band in &bands {
+        let Some(series) = band::combine(band, sensor) else {
+            continue;
         };
-        let Some(sensor) = curve.sensor else {
-            return curve;
-        };
-        curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
-        let (mut doubts, mut followed) = (Vec::new(), 0);
-        for band in &bands {
-            let Some(series) = band::combine(band, sensor) else {
-                continue;
-            };
-            let model = DecayModel::fit(&series, band);
-            let mut points = decay::follow_decay(&series, band, &model);
-            let found = !points.is_empty();
-            points
-                .retain(|point| (point.frequency / modes[index].frequency - 1.0).abs() <= FARTHEST);
-            if found && points.is_empty() {
-                // The decay that was followed is not the mode's.
-                continue;
+        let model = DecayModel::fit(&series, band);
+        let mut points = decay::follow_decay(&series, band, &model);
+        let found = !points.is_empty();
+        points.retain(|point| (point.frequency / modes[index].frequency - 1.0).abs() <= FARTHEST);
+        if found && points.is_empty() {
+            // The decay that was followed is not the mode's.
+            continue;
+        }
+        curve.companions.extend(model.companions(band));
+        curve.points.extend(points);
+        doubts.extend(model.doubt(band));
+        models.push((band, model));
+        followed += 1;
+    }
+    // Unless another mode is as good an explanation, a decay that drifts makes them all be read at one amplitude.
+    curve.amplitude = holding_amplitude(decays, &models);
+    if let Some(amplitude) = curve.amplitude.filter(|_| doubts.len() < followed) {
+        curve.stated = stated_pole(amplitude, &models);
+    }
+    if curve.points.len() < LEAST_POINTS {
+        return curve;
+    }
+    curve.frequency = Trend::fit(&curve.points, |p| (p.frequency, p.frequency_std));
+    curve.damping = Trend::fit(&curve.points, |p| (p.damping_ratio, p.damping_std));
+    // Two tests share the level (Bonferroni).
+    let trends = [&curve.frequency, &curve.damping];
+    let changes = curve.stated.is_some()
+        || (trends.into_iter().flatten()).any(|trend| trend.p_value < 0.5 * LEVEL);
+    curve.verdict = match doubts.first() {
+        _ if !changes => AmplitudeVerdict::Steady,
+        // One decay without a doubt settles it for all.
+        Some(doubt) if doubts.len() == followed => *doubt,
+        _ => AmplitudeVerdict::Changes,
+    };
+    curve
+}
+
+/// The amplitude at which one pole fitted to all decays is that of the mode: the mean over the taps in the logarithm,
+/// with the squared amplitudes as weights; `None` of no decay.
+fn holding_amplitude(decays: &[Decay], models: &[(&Band, DecayModel)]) -> Option<f64> {
+    let (mut total, mut sum) = (0.0, 0.0);
+    for (band, model) in models {
+        let decay = decays.get(band.tap)?;
+        let samples = decay.responses.iter().map(Vec::len).min()?;
+        let (amplitude, rate) = model.beginning(band, decay.start);
+        let time = decay::holding_time(rate, samples as f64 / decay.sample_rate);
+        let weight = amplitude * amplitude;
+        total += weight;
+        sum += weight * (amplitude.ln() - rate * time);
+    }
+    let amplitude = (sum / total).exp();
+    (amplitude > 0.0 && amplitude.is_finite()).then_some(amplitude)
+}
+
+/// The pole at an amplitude, from the decays that pass it; `None` where none does, or where a pole that does not change
+/// explains them best.
+///
+/// It is the mean over all kinds of drift. Their weights are e^{-C/2} with Schwarz's criterion C of all decays together.
+/// The uncertainty holds their own ones and how far they disagree, as that of [`Curve`].
+fn stated_pole(amplitude: f64, models: &[(&Band, DecayModel)]) -> Option<StatedPole> {
+    let mut totals: BTreeMap<usize, (usize, f64)> = BTreeMap::new();
+    for (kind, criterion) in models.iter().flat_map(|(_, model)| model.criteria()) {
+        let total = totals.entry(kind).or_default();
+        *total = (total.0 + 1, total.1 + criterion);
+    }
+    // Criteria compare the same decays only.
+    totals.retain(|_, (count, _)| *count == models.len());
+    let (&best, &(_, least)) = totals.iter().min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+    if best == 0 {
+        return None;
+    }
+    let (mut frequencies, mut dampings) = (Vec::new(), Vec::new());
+    for (kind, (_, criterion)) in totals {
+        let weight = (0.5 * (least - criterion)).exp();
+        if weight < LEAST_WEIGHT {
+            continue;
+        }
+        let (mut of_frequency, mut of_damping) = (Vec::new(), Vec::new());
+        for (band, model) in models {
+            if let Some(found) = model.at_amplitude(kind, amplitude, band) {
+                of_frequency.push((found.frequency, found.frequency_std));
+                of_damping.push((found.damping_ratio, found.damping_std));
             }
-            curve.companions.extend(model.companions(band));
-            curve.points.extend(points);
-            doubts.extend(model.doubt(band));
-            followed += 1;
         }
-        if curve.points.len() < LEAST_POINTS {
-            return curve;
-        }
-        curve.frequency = Trend::fit(&curve.points, |p| (p.frequency, p.frequency_std));
-        curve.damping = Trend::fit(&curve.points, |p| (p.damping_ratio, p.damping_std));
-        // Two tests share the level (Bonferroni).
-        let trends = [&curve.frequency, &curve.damping];
-        let changes = (trends.into_iter().flatten()).any(|trend| trend.p_value < 0.5 * LEVEL);
-        curve.verdict = match doubts.first() {
-            _ if !changes => AmplitudeVerdict::Steady,
-            // One decay without a doubt settles it for all.
-            Some(doubt) if doubts.len() == followed => *doubt,
-            _ => AmplitudeVerdict::Changes,
-        };
-        curve
-    });
-    curves.collect()
+        frequencies.push((weight, FittedValue::of_taps(&of_frequency)?));
+        dampings.push((weight, FittedValue::of_taps(&of_damping)?));
+    }
+    Some(StatedPole {
+        frequency: FittedValue::mean_of_models(&frequencies)?,
+        damping_ratio: FittedValue::mean_of_models(&dampings)?,
+    })
 }
 
 // ---- Frequency and damping against log amplitude: weighted polynomials with covariance.

@@ -21,6 +21,8 @@ use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 const SCATTER_LEVEL: f64 = 0.01;
 /// A residual correlation beyond so many standard deviations is a misfit. 3: by chance one fit in 700.
 const CORRELATED: f64 = 3.0;
+/// Degrees of freedom of a standard deviation from many values: Student's t is normal there.
+const MANY: f64 = 1e4;
 /// Steps of the fit of one tap; it starts from the joint poles.
 const TAP_STEPS: usize = 6;
 
@@ -72,6 +74,19 @@ pub struct TapFit {
 }
 
 impl FittedValue {
+    /// Returns the weighted mean of values with their standard deviations; `None` of none. Where they scatter beyond these
+    /// the scatter counts.
+    pub(in super::super) fn of_taps(taps: &[(f64, f64)]) -> Option<Self> {
+        let total: f64 = taps.iter().map(|(_, std)| std.powi(-2)).sum();
+        let mean = taps
+            .iter()
+            .map(|(value, std)| value * std.powi(-2))
+            .sum::<f64>()
+            / total;
+        let known = mean.is_finite() && total.is_finite() && total > 0.0;
+        known.then(|| FittedValue::new(mean, total.sqrt().recip(), MANY, taps))
+    }
+
     /// Takes value and interval from the joint fit, or from the taps where they scatter beyond their own
     /// standard deviations. `taps` are values with their standard deviations.
     fn new(value: f64, std: f64, freedom: f64, taps: &[(f64, f64)]) -> Self {
@@ -100,6 +115,28 @@ impl FittedValue {
         fitted.low = fitted.value - half;
         fitted.high = fitted.value + half;
         fitted
+    }
+}
+
+impl FittedValue {
+    /// Returns the mean over models of one quantity with their weights; `None` without any. The standard deviation is
+    /// sqrt(sum w (s^2 + (v - mean)^2)) (Burnham & Anderson), the rest that of the model with the largest weight.
+    pub(in super::super) fn mean_of_models(models: &[(f64, FittedValue)]) -> Option<Self> {
+        let (_, best) = models.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let total: f64 = models.iter().map(|(weight, _)| weight).sum();
+        let sum: f64 = models.iter().map(|(weight, one)| weight * one.value).sum();
+        let value = sum / total;
+        let squares = models.iter();
+        let squares = squares.map(|(w, one)| w * (one.std.powi(2) + (one.value - value).powi(2)));
+        let std = (squares.sum::<f64>() / total).sqrt();
+        let half = student::quantile(0.05, best.freedom.max(1.0)) * std;
+        Some(FittedValue {
+            value,
+            std,
+            low: value - half,
+            high: value + half,
+            ..*best
+        })
     }
 }
 

@@ -606,6 +606,92 @@ fn regress_flat_tops_of_a_float_recording_are_an_overload() {
     }
 }
 
+/// Decays of 700 Hz at 2048 Hz, cut off at 0.8: three samples a period, so that each crest has one at most.
+fn cut_off(limit: f64) -> Recording {
+    let rate = 2048.0;
+    let mut samples = ringing(rate, 6.0, &[0.5, 3.0], &[(700.3, 0.002, 1.0)]);
+    add_noise(&mut samples, 1e-4, &mut random(5));
+    samples.iter_mut().for_each(|x| *x = x.clamp(-limit, limit));
+    recording(rate, vec![samples])
+}
+
+#[test]
+fn recover_taps_that_are_all_overloaded_from_where_they_are_whole() {
+    let recording = cut_off(0.8);
+    let [low, high] = recording.channels()[0].health.rails;
+    assert_eq!((low, high), (Some(-0.8), Some(0.8)));
+    let source = TapSource::Responses(vec![0]);
+    let taps = find_taps(&recording, &source, &TapSettings::default()).unwrap();
+    assert_eq!(taps.remarks, [TapRemark::OverloadKept { count: 2 }]);
+    assert_eq!(taps.accepted().count(), 2);
+    for tap in taps.accepted() {
+        // No sample that is used lies on a rail.
+        let used = recording
+            .read(0, tap.usable_from()..tap.record.end)
+            .unwrap();
+        let most = used.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        assert!(most < 0.8 && most > 0.7, "{most}");
+        assert_eq!(used.len() as u64, tap.frames());
+    }
+}
+
+#[test]
+fn limit_crests_are_no_rails() {
+    assert_eq!(cut_off(9.0).channels()[0].health.rails, [None, None]);
+    // A steady tone in steps of 16 bits has the same highest value again and again.
+    let tone = |n: u32| (8_000.0 * (0.1 * f64::from(n)).sin()).round() / 32_768.0;
+    let samples = (0..200_000).map(tone).collect();
+    let health = &recording(5120.0, vec![samples]).channels()[0]
+        .health
+        .clone();
+    assert_eq!(health.rails, [None, None]);
+}
+
+#[test]
+fn recover_one_overloaded_tap_on_request() {
+    let rate = 2048.0;
+    let mut samples = ringing(rate, 3.0, &[0.5], &[(75.0, 0.01, 1.0)]);
+    let other = ringing(rate, 3.0, &[0.5], &[(75.0, 0.01, 0.5)]);
+    samples.extend(other);
+    add_noise(&mut samples, 1e-4, &mut random(6));
+    samples.iter_mut().for_each(|x| *x = x.clamp(-0.8, 0.8));
+    let recording = recording(rate, vec![samples]);
+    let source = TapSource::Responses(vec![0]);
+    let taps = find_taps(&recording, &source, &TapSettings::default()).unwrap();
+    let rejection = only_rejected(&taps, 2, 0, "by default");
+    assert!(matches!(rejection, Rejection::Overload { channel: 1, .. }));
+    let keep = TapSettings {
+        keep_overload: true,
+        ..TapSettings::default()
+    };
+    let taps = find_taps(&recording, &source, &keep).unwrap();
+    assert_eq!(taps.accepted().count(), 2);
+}
+
+#[test]
+fn prop_taps_of_joined_files_end_with_their_files() {
+    let rate = 2048.0;
+    let parts: Vec<Recording> = (0..3)
+        .map(|seed| {
+            let mut samples = ringing(rate, 2.0, &[0.1], &[(75.0, 0.01, 1.0)]);
+            add_noise(&mut samples, 1e-3, &mut random(seed));
+            recording(rate, vec![samples])
+        })
+        .collect();
+    let joined = Recording::joined("all", parts).unwrap();
+    let source = TapSource::Responses(vec![0]);
+    let taps = find_taps(&joined, &source, &TapSettings::default()).unwrap();
+    let ends: Vec<u64> = taps.accepted().map(|tap| tap.record.end).collect();
+    assert_eq!(ends, [4096, 8192, 12288]);
+    assert!(
+        taps.taps
+            .iter()
+            .skip(1)
+            .zip([4096, 8192])
+            .all(|(tap, start)| tap.record.start >= start)
+    );
+}
+
 #[test]
 fn regress_a_weak_tap_is_named_as_such() {
     let (_, samples) = five_taps((5120.0, 31), Shape::SineSquared, |pulses| {

@@ -10,6 +10,7 @@ import json
 import math
 import struct
 import sys
+import zlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -108,6 +109,79 @@ def texts():
     yield "exponents", b"t,x\n0,1e-3\n1e-1,-2.5E+02\n2.0d-1,3\n"
 
 
+def labview(columns, names="Tip,Force", segments=2, separator="\t", mark="."):
+    """A file by LabVIEW: X in one column, before each channel ("Multi") or nowhere ("No")."""
+    text = f"LabVIEW Measurement\t\nSeparator\t{ {chr(9): 'Tab', ',': 'Comma', ';': 'Semicolon'}[separator] }\nDecimal_Separator\t{mark}\nX_Columns\t{columns}\n***End_of_Header***\t\n\t\n"
+    first, second = names.split(",")
+    for segment in range(segments):
+        text += "Channels\t2\t\nSamples\t8\t8\nY_Unit_Label\tg\tN\nX_Dimension\tTime\tTime\nX0\t0\t0\nDelta_X\t0.0005\t0.0005\n***End_of_Header***\t\t\n"
+        text += f"X_Value\t{first}\tX_Value\t{second}\tComment\n" if columns == "Multi" else f"X_Value\t{first}\t{second}\tComment\n"
+        for n in range(8):
+            x, a, b = f"{0.0005 * (n + 8 * segment):.6f}", f"{n % 3 - 1:.4f}", f"{n * segment:.4f}"
+            cells = {"Multi": [x, a, x, b], "No": ["", a, b], "One": [x, a, b]}[columns]
+            text += "\t".join(cells) + "\n"
+        text += "\n"
+    return text.replace("\t", separator).replace(".", mark).encode()
+
+
+def labview_files():
+    yield "labview-one", labview("One")
+    yield "labview-multi", labview("Multi", separator=";", mark=",")
+    yield "labview-no-x", labview("No", separator=",")
+    yield "labview-special", labview("One").replace(b"X_Value\tTip", b"***Start_Special***\nanything\n***End_Special***\nX_Value\tTip")
+    yield "labview-cut", labview("One")[:-70]
+    yield "headless", "".join(f"{n / 1280:.9f} {n % 3} {n % 5}\n" for n in range(30)).encode()
+    yield "counted", "".join(f"{n},{n % 3}\n" for n in range(30)).encode()
+    yield "uneven", b"t,x\n" + "".join(f"{(n + 0.004 * math.sin(n)) / 1280:.9f},{n % 5}\n" for n in range(90)).encode()
+
+
+# ---------------------------------------------------------------- MATLAB
+
+
+def mat_element(kind, data, mark):
+    return struct.pack(mark + "II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def mat_variable(name, rows, columns, parts, mark, code="d", cls=6):
+    kind = {"d": 9, "f": 7, "h": 3}[code]
+    body = mat_element(6, struct.pack(mark + "II", cls | (0x800 if len(parts) > 1 else 0), 0), mark)
+    body += mat_element(5, struct.pack(mark + "ii", rows, columns), mark)
+    body += mat_element(1, name.encode(), mark)
+    for part in parts:
+        body += mat_element(kind, struct.pack(mark + f"{len(part)}{code}", *part), mark)
+    return mat_element(14, body, mark)
+
+
+def mat_file(variables, mark, packed=False):
+    head = b"MATLAB 5.0 MAT-file, a seed".ljust(124) + (b"\0\1IM" if mark == "<" else b"\1\0MI")
+    if packed:
+        variables = [struct.pack(mark + "II", 15, len(zlib.compress(one))) + zlib.compress(one) for one in variables]
+    return head + b"".join(variables)
+
+
+def matlab_files():
+    numbers = [int(100 * math.sin(n)) for n in range(48)]
+    for mark in "<>":
+        for code in "dfh":
+            for packed in (False, True):
+                variables = [
+                    mat_variable("data", 24, 2, [numbers], mark, code),
+                    mat_variable("H", 24, 2, [numbers, numbers[::-1]], mark, code),
+                    mat_variable("fs", 1, 1, [[1280.0]], mark),
+                ]
+                whole = mat_file(variables, mark, packed)
+                yield f"{'little' if mark == '<' else 'big'}-{code}-{packed}", whole
+    yield "cut", whole[:-30]
+    small = struct.pack("<HH4s", 1, 2, b"fs")
+    name = mat_element(1, b"fs", "<")
+    yield "small", mat_file([mat_variable("fs", 1, 1, [[5.0]], "<").replace(name, small)], "<")
+    field = mat_variable("", 3, 1, [[1.0, 2.0, 3.0]], "<")
+    body = mat_element(6, struct.pack("<II", 2, 0), "<") + mat_element(5, struct.pack("<ii", 1, 1), "<") + mat_element(1, b"run", "<")
+    body += struct.pack("<HHi", 5, 4, 8) + mat_element(1, b"H\0\0\0\0\0\0\0", "<") + field
+    yield "structure", mat_file([mat_element(14, body, "<")], "<")
+    yield "text", mat_file([mat_variable("word", 1, 3, [[65, 66, 67]], "<", "h", 4)], "<")
+
+
 def functions_as_text():
     rows = "".join(f"{0.5 * n},{1 / (1 + n):.6g},{-0.1 * n:.6g}\n" for n in range(24))
     yield "columns", ("frequency (Hz),real,imag\n" + rows).encode()
@@ -115,6 +189,9 @@ def functions_as_text():
     yield "coherence", ("Freq (kHz);Real;Imag;Coherence\n" + "".join(f"{n};1;{n};0.9\n" for n in range(9))).encode()
     yield "angular", ("w (rad/s),Re (mm/s)/N,Im (mm/s)/N\n" + rows).encode()
     yield "points", ("Ref Chan:Resp Chan,1+Z:3+Z\nunit,m/N\nHz,Re,Im\n" + rows).encode()
+    yield "decibels", ("Frequency\tMagnitude\tPhase\n" + "".join(f"{n}\t{-60 + n % 7}\t{17 * n % 360 - 180}\n" for n in range(24))).encode()
+    yield "magnitudes", ("Hz,Level (dB)\n" + "".join(f"{n},{-n % 9}\n" for n in range(24))).encode()
+    yield "labview", labview("One", names="Tip (FFT - (RMS)),Force (FFT - (RMS))")
     yield "polar", ("Frequency (Hz),Magnitude,Phase (deg)\n" + rows).encode()
     yield "unit", ("f [Hz];Re [(m/s2)/N];Im [(m/s2)/N]\n" + rows.replace(",", ";")).encode()
 
@@ -388,7 +465,8 @@ def main():
     both = ("binary-with-coherence", binary58(4, 5, numbers, 1) + binary58(6, 2, [0.9] * 12, 1))
     targets = {
         "wav": [*wavs()],
-        "csv": [*texts()],
+        "csv": [*texts(), *labview_files()],
+        "matlab": [*matlab_files()],
         "universal": [*as_bytes(universal_series()), *series],
         "responses": [*functions_as_text(), *as_bytes(universal_functions()), *complex_functions, both],
         "description": [*descriptions()],

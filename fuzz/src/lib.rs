@@ -12,7 +12,8 @@ use serde_json::Value;
 use tapjoint::description::{ChannelRef, TestDescription};
 use tapjoint::pipeline::{IdentifySettings, ModeResult, run_recording, run_test, tested_structure};
 use tapjoint::recording::{
-    Channel, ReadSettings, Recording, list_datasets, open_frequency_responses, read_function,
+    Channel, ReadSettings, Recording, VariableRole, list_datasets, open_frequency_responses,
+    read_function,
 };
 use tapjoint::report::deck::{
     MOST_FREQUENCIES, deck_of, render_abaqus, render_nastran, source_in_report,
@@ -24,10 +25,11 @@ use tapjoint::study::blind_check::parse_truths;
 type Feed = fn(&[u8]);
 
 /// Every target with its name.
-pub const TARGETS: [(&str, Feed); 9] = [
+pub const TARGETS: [(&str, Feed); 10] = [
     ("wav", recording),
     ("csv", recording),
     ("universal", universal),
+    ("matlab", matlab),
     ("responses", responses),
     ("description", description),
     ("truths", truths),
@@ -145,6 +147,39 @@ fn universal(bytes: &[u8]) {
             );
         }
     }
+}
+
+/// Opens a MATLAB file as samples, functions and spectra. However it is compressed, it gives no more numbers than 32
+/// for each byte, and some.
+fn matlab(bytes: &[u8]) {
+    let path = file_of(bytes);
+    let most = (1 << 16) + 32 * bytes.len() as u64;
+    for (role, name) in [
+        (VariableRole::Samples, "data"),
+        (VariableRole::Frf, "H"),
+        (VariableRole::Spectrum, "data"),
+    ] {
+        let names = [(role, name), (VariableRole::Rate, "fs")];
+        let variables = names.map(|(role, name)| (role, vec![name.to_owned()]));
+        let settings = ReadSettings {
+            variables: variables.into_iter().collect(),
+            ..ReadSettings::default()
+        };
+        if let Ok(recording) = Recording::open(&path, &settings) {
+            assert!(recording.frames() * recording.channels().len() as u64 <= most);
+        }
+        if let Ok(found) = open_frequency_responses(&path, &settings) {
+            assert!(found.lines as u64 <= most && found.spacing > 0.0);
+            for response in &found.responses {
+                assert_eq!(response.values.len(), found.lines);
+            }
+        }
+    }
+    // Without names the error lists what there is.
+    assert!(
+        Recording::open(&path, &ReadSettings::default()).is_err()
+            || !bytes.starts_with(b"MATLAB 5.0")
+    );
 }
 
 /// Opens frequency response functions. All lines hold finite values.

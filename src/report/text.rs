@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::document::{Document, ReadBy, method_name};
+use crate::document::{Document, EstimateSection, ReadBy, method_name};
 use crate::format::{MISSING, capital, signed_percent, significant, trimmed};
 use crate::short_names::ways;
 use crate::tables::{self, Column, Place, Table, listed};
@@ -90,6 +90,7 @@ fn estimate(document: &Document) -> String {
         Some(Some(found)) => found,
     };
     let mut text = plain(tables::parameters(document));
+    text.push_str(&strong_correlations(found));
     if let Some(methods) = tables::methods(document) {
         text.push('\n');
         text.push_str(&render_table(&methods));
@@ -107,6 +108,25 @@ fn estimate(document: &Document) -> String {
         text.push_str(&wrapped(&note, 2));
     }
     text
+}
+
+/// Correlations from here on are said: the data fix one combination of the two five times as well as the other.
+const STRONG: f64 = 0.92;
+
+/// Says which estimates the frequencies hardly tell apart; empty where they do.
+fn strong_correlations(found: &EstimateSection) -> String {
+    let strong = found
+        .correlations
+        .iter()
+        .filter(|pair| pair.value.abs() >= STRONG);
+    let words = strong.map(|one| {
+        let (pair, value) = tables::correlation_words(one);
+        let words = format!(
+            "Correlation of {pair}: {value}; the frequencies tell a combination of the two rather than each."
+        );
+        wrapped(&words, 0)
+    });
+    words.collect()
 }
 
 /// The warnings that concern the result; empty without any. Those of the pair regression stand with it.

@@ -25,6 +25,7 @@ mod identify_consistent;
 mod identify_perturbation;
 mod interval_coverage;
 mod joint_law;
+mod laboratory;
 mod modal_fit;
 mod observations;
 mod pairing;

@@ -41,6 +41,27 @@ pub const WARNING_CODES: [(&str, &str); 60] = [
         "a given sample rate differs from the file's own",
     ),
     (
+        "time-assumed",
+        "no heading names the time: the first column is taken for it",
+    ),
+    (
+        "resampled",
+        "slightly uneven samples were resampled to even times",
+    ),
+    (
+        "segments-joined",
+        "segments of a LabVIEW file are joined that do not follow each other",
+    ),
+    (
+        "values-assumed",
+        "a column of a function is taken as linear magnitudes",
+    ),
+    (
+        "lines-assumed",
+        "functions of a MATLAB file are taken to reach to half the sample rate",
+    ),
+    ("coherence-left-out", "a coherence is left out"),
+    (
         "unknown-unit",
         "the unit of a channel or function is not known",
     ),

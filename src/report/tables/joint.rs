@@ -8,7 +8,7 @@ use crate::format::{
     MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
     rounded_to, signed, signed_percent, significant, trimmed, unit_words,
 };
-use tapjoint_identify::consistent::Parameter as Fitted;
+use tapjoint_identify::consistent::{Correlation, Parameter as Fitted};
 
 /// Most significant digits of an estimate.
 const MOST_DIGITS: i32 = 5;
@@ -188,23 +188,29 @@ pub fn parameters(document: &Document) -> Option<Table> {
     })
 }
 
+/// A correlation in words: "Kr and E", "\u{2212}0.97".
+pub fn correlation_words(found: &Correlation) -> (String, String) {
+    let [first, second] = [found.first, found.second].map(|parameter| match parameter {
+        Fitted::Kt => "Kt",
+        Fitted::Kr => "Kr",
+        Fitted::Modulus => "E",
+        Fitted::Density => "\u{3c1}",
+        other => other.name(),
+    });
+    // Near 1 the distance from 1 is what counts: two digits of it.
+    let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
+    (
+        format!("{first} and {second}"),
+        significant(found.value, digits),
+    )
+}
+
 /// Correlations of the estimates; `None` where fewer than two parameters were estimated.
 pub fn correlations(document: &Document) -> Option<Table> {
     let estimate = document.estimate.as_ref()?.as_ref()?;
     let rows = estimate.correlations.iter().map(|found| {
-        let [first, second] = [found.first, found.second].map(|parameter| match parameter {
-            Fitted::Kt => "Kt",
-            Fitted::Kr => "Kr",
-            Fitted::Modulus => "E",
-            Fitted::Density => "\u{3c1}",
-            other => other.name(),
-        });
-        // Near 1 the distance from 1 is what counts: two digits of it.
-        let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
-        [
-            words("Parameters", format!("{first} and {second}")),
-            number("Correlation (1)", significant(found.value, digits)),
-        ]
+        let (pair, value) = correlation_words(found);
+        [words("Parameters", pair), number("Correlation (1)", value)]
     });
     let note = "Near 1 or \u{2212}1 the frequencies tell a combination of the two rather than each; of the \
                 logarithms of the values.";

@@ -8,8 +8,8 @@ mod recordings;
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;
 pub use joint::{
-    Parameter, averages, correlations, estimated, methods, monte_carlo, pairs, parameters,
-    perturbation, sensitivity, spans,
+    Parameter, averages, correlation_words, correlations, estimated, methods, monte_carlo, pairs,
+    parameters, perturbation, sensitivity, spans,
 };
 pub use modes::{
     fitted_to, frfs, mode_details, modes, modes_from, prediction, reading_details, readings,

@@ -234,7 +234,7 @@ fn limit_broken_labview_text_is_answered_by_line() {
         ),
         (
             whole.replace(row, "0.000500"),
-            format!("tested.dat:{}: column 2", line(row)),
+            format!("tested.dat:{}: column 3", line(row)),
             "is missing",
         ),
         (

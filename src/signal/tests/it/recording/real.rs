@@ -1,7 +1,9 @@
 //! Recordings by others, in the folder that TAPJOINT_DATA names.
 
 use crate::shared::data;
-use tapjoint_signal::recording::{Format, ReadSettings, Recording, Separator, Timing};
+use tapjoint_signal::recording::{
+    Format, ReadSettings, Recording, Separator, Timing, VariableRole, open_frequency_responses,
+};
 
 /// Opens a file of the data folder.
 fn open(name: &str) -> Recording {
@@ -115,5 +117,84 @@ fn val_an_analysers_frequency_table_is_not_taken_for_time() {
     assert!(
         message.contains(".txt:10: the first column is a frequency"),
         "{message}"
+    );
+}
+
+/// Every function of the cantilever with masses, as the analyser wrote it: dB and degrees.
+#[test]
+#[ignore = "needs TAPJOINT_DATA"]
+fn val_functions_of_the_beam_with_masses_are_read_as_they_are() {
+    let mut count = 0;
+    for folder in ["healthy", "removed_1", "removed_2", "removed_3"] {
+        for entry in std::fs::read_dir(data("masses_beam").join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            let found = open_frequency_responses(&path, &ReadSettings::default());
+            let found = found.unwrap_or_else(|error| panic!("{error}"));
+            assert!(found.has_phase && found.warnings.is_empty(), "{path:?}");
+            assert_eq!(
+                (found.first_frequency, found.spacing, found.lines),
+                (0.3125, 0.3125, 6400)
+            );
+            count += 1;
+        }
+    }
+    assert_eq!(count, 48);
+    // The first lines of one of them: -67.90392 dB and -4.414915 degrees.
+    let path = data("masses_beam/healthy/P-1.txt");
+    let found = open_frequency_responses(&path, &ReadSettings::default()).unwrap();
+    let value = found.responses[0].values[0];
+    assert!((20.0 * value.norm().log10() + 67.903_92).abs() < 1e-9);
+    assert!((value.arg().to_degrees() + 4.414_915).abs() < 1e-9);
+}
+
+#[test]
+#[ignore = "needs TAPJOINT_DATA"]
+fn val_a_spectrum_by_labview_is_read_as_it_is() {
+    let path = data("usc_cantilever/FFT_data.lvm");
+    let found = open_frequency_responses(&path, &ReadSettings::default());
+    let found = found.unwrap_or_else(|error| panic!("{error}"));
+    assert!(!found.has_phase);
+    assert_eq!(found.lines, 150_000);
+    // Delta_X is printed as 0.085333; the column of X has 0.0853333.
+    assert!(
+        (found.spacing - 0.256 / 3.0).abs() < 1e-8,
+        "{}",
+        found.spacing
+    );
+    let highest = found.responses[0]
+        .values
+        .iter()
+        .map(|value| value.norm())
+        .fold(0.0, f64::max);
+    assert!(
+        (20.0 * highest.log10() + 52.883_209).abs() < 1e-6,
+        "{highest}"
+    );
+    let error = Recording::open(&path, &ReadSettings::default()).expect_err("no time series");
+    assert!(error.to_string().contains("FFT"), "{error}");
+}
+
+#[test]
+#[ignore = "needs TAPJOINT_DATA"]
+fn val_a_matlab_file_of_a_laboratory() {
+    let path = data("matlab/transfer_function_clean.mat");
+    let names = [
+        (VariableRole::Frf, vec!["yspec".to_owned()]),
+        (VariableRole::Rate, vec!["freq".to_owned()]),
+    ];
+    let settings = ReadSettings {
+        variables: names.into_iter().collect(),
+        ..ReadSettings::default()
+    };
+    let found =
+        open_frequency_responses(&path, &settings).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((found.lines, found.has_phase), (4501, true));
+    assert!((found.spacing - 0.333_37).abs() < 1e-5, "{}", found.spacing);
+    let error = Recording::open(&path, &ReadSettings::default()).expect_err("no names");
+    assert!(
+        error
+            .to_string()
+            .contains("frf = \"yspec\", rate = \"freq\""),
+        "{error}"
     );
 }

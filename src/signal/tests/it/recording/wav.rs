@@ -397,7 +397,7 @@ fn limit_a_sample_that_is_no_number_is_named() {
 fn limit_other_formats_are_named() {
     let cases: [(&str, &[u8]); 7] = [
         ("HDF5", b"\x89HDF\r\n\x1a\n\0\0\0\0"),
-        ("MATLAB", b"MATLAB 5.0 MAT-file, Platform: PCWIN64"),
+        ("MATLAB 7.3", b"MATLAB 7.3 MAT-file, Platform: PCWIN64"),
         ("FLAC", b"fLaC\0\0\0\x22"),
         ("MP3", b"ID3\x04\0\0\0\0\0\0"),
         ("W64", b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb"),

@@ -712,25 +712,50 @@ const MULTIPLE: f64 = 3.0;
 /// Relative standard deviation of a damping (1) that can be compared: beyond it any damping would agree.
 const KNOWN_DAMPING: f64 = 0.1;
 
+/// A line that may have harmonics.
+struct StrongLine {
+    frequency: f64,
+    std: f64,
+    /// Range of its frequency along the decay (Hz).
+    swept: (f64, f64),
+    /// Range of its damping ratio; `None` where it is not known.
+    dampings: Option<(f64, f64)>,
+    height: f64,
+}
+
+impl StrongLine {
+    /// The line of a reading; `None` of one that is no resonance.
+    fn of(reading: &ModeReading) -> Option<Self> {
+        let height = reading.above_noise_db.or(reading.prominence_db)?;
+        let mut line = StrongLine {
+            frequency: reading.frequency,
+            std: reading.std?,
+            swept: (reading.frequency, reading.frequency),
+            dampings: reading.damping_ratio.map(|ratio| (ratio, ratio)),
+            height,
+        };
+        let curve = reading.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
+        if let Some(curve) = curve.filter(|curve| curve.stated.is_some()) {
+            for point in &curve.points {
+                let frequency = point.frequency;
+                line.swept = (line.swept.0.min(frequency), line.swept.1.max(frequency));
+                let ratio = point.damping_ratio;
+                line.dampings = line
+                    .dampings
+                    .map(|(low, high)| (low.min(ratio), high.max(ratio)));
+            }
+        }
+        reading.label.is_none().then_some(line)
+    }
+}
+
 /// Labels the readings that a channel which is not linear makes of a stronger line.
 ///
 /// A term x^n makes of e^{p t} the pole n p: n times the frequency at the same damping ratio. Both must agree. Cut-off
 /// samples make multiples of the frequency as well; decays are fitted after them, so that what has a fit is no such
 /// multiple.
 fn label_harmonics(readings: &mut [ModeReading], is_cut_off: bool) {
-    let strong: Vec<(f64, f64, Option<f64>, f64)> = readings
-        .iter()
-        .filter(|reading| reading.label.is_none())
-        .filter_map(|reading| {
-            let height = reading.above_noise_db.or(reading.prominence_db)?;
-            Some((
-                reading.frequency,
-                reading.std?,
-                reading.damping_ratio,
-                height,
-            ))
-        })
-        .collect();
+    let strong: Vec<StrongLine> = readings.iter().filter_map(StrongLine::of).collect();
     for reading in readings.iter_mut() {
         let height = reading.above_noise_db.or(reading.prominence_db);
         let resonance = matches!(reading.label, None | Some(PeakLabel::NoResonance));
@@ -738,25 +763,26 @@ fn label_harmonics(readings: &mut [ModeReading], is_cut_off: bool) {
             continue;
         };
         let damping = reading.damping_ratio.zip(reading.damping_std);
-        for &(frequency, line_std, line_damping, line_height) in &strong {
-            let order = (reading.frequency / frequency).round();
-            let known = std.hypot(order * line_std);
-            let multiple = (reading.frequency - order * frequency).abs() <= MULTIPLE * known;
+        for line in &strong {
+            let order = (reading.frequency / line.frequency).round();
+            let reach = MULTIPLE * std.hypot(order * line.std);
+            let (low, high) = (order * line.swept.0 - reach, order * line.swept.1 + reach);
+            let multiple = (low..=high).contains(&reading.frequency);
             let alike = damping
-                .zip(line_damping)
-                .is_some_and(|((ratio, std), other)| {
-                    std < KNOWN_DAMPING * ratio && (ratio - other).abs() <= MULTIPLE * std
+                .zip(line.dampings)
+                .is_some_and(|((ratio, std), (low, high))| {
+                    let reach = MULTIPLE * std;
+                    std < KNOWN_DAMPING * ratio && (low - reach..=high + reach).contains(&ratio)
                 });
             let of_cut = is_cut_off && reading.fit.is_none();
             if (2.0..=HIGHEST_ORDER as f64).contains(&order)
                 && multiple
                 && (alike || of_cut)
-                && height + BELOW_LINE < line_height
+                && height + BELOW_LINE < line.height
             {
-                let order = order as usize;
                 reading.label = Some(PeakLabel::Harmonic {
-                    order,
-                    of: frequency,
+                    order: order as usize,
+                    of: line.frequency,
                 });
                 break;
             }

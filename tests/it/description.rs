@@ -147,7 +147,10 @@ fn regress_sensors_recordings_and_analysis_of_the_full_description() {
     assert_eq!(low.date.as_deref(), Some("2024-05-17"));
     assert_eq!(
         (frf.form, frf.sensor.as_deref()),
-        (Some(ResponseForm::Mobility), Some("A"))
+        (
+            Some(FunctionForm::Response(ResponseForm::Mobility)),
+            Some("A")
+        )
     );
     assert_eq!(frf.date.as_deref(), Some("a Friday"));
     assert_eq!(test.analysis.window, Some(WindowKind::Exponential));

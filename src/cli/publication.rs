@@ -9,7 +9,7 @@
 use super::output::{failed, not_writable};
 use super::overwrite::{CHECKSUMS, Files, carries_mark, checksum_list, signed};
 use super::place::{or_here, resolved};
-use super::staging::{JOURNAL, NEW, OLD, PREFIX, Staging, ledger, leftovers, sweep_files};
+use super::staging::{JOURNAL, Ledger, NEW, OLD, PREFIX, Staging, ledger, leftovers, sweep_files};
 use anyhow::{anyhow, bail};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
@@ -102,6 +102,8 @@ impl Target {
                 }
             }
         }
+        // A signal that has removed the folder must not find it made again.
+        let _ledger = ledger();
         for part in [NEW, OLD] {
             let made = fs::create_dir_all(staging.path().join(part));
             made.map_err(|cause| not_writable(path, &self.base, &cause))?;
@@ -129,7 +131,7 @@ fn recovered(mut staging: Staging, files: &Files) -> anyhow::Result<Staging> {
         .ok()
         .and_then(|bytes| serde_json::from_slice(&bytes).ok());
     if let Some((moves, stale)) = journal {
-        let ended = Journal { moves, stale }.carry_out(&mut staging, files);
+        let ended = Journal { moves, stale }.carry_out(&mut staging, files, &mut ledger());
         // Undone is as good as finished.
         if staging.is_kept() {
             ended?;
@@ -160,7 +162,9 @@ impl OutputFolder {
             staging,
             files: files.clone(),
         };
+        let ledger = ledger();
         let made = fs::create_dir_all(output.filled());
+        drop(ledger);
         made.map_err(|cause| not_writable(path, &output.target.base, &cause))?;
         Ok(output)
     }
@@ -235,10 +239,13 @@ impl OutputFolder {
         for name in names.map_err(|cause| failed(&self.path, &cause))? {
             check_target(&self.path.join(name), &self.files)?;
         }
+        // No signal comes between the journal and what it says.
+        let mut ledger = ledger();
         let journal = self.write_journal(stale);
         let journal = journal.map_err(|cause| failed(&self.path, &cause))?;
-        let left = journal.carry_out(&mut self.staging, &self.files)?;
-        ledger().written.push(self.path.clone());
+        let left = journal.carry_out(&mut self.staging, &self.files, &mut ledger)?;
+        ledger.written.push(self.path.clone());
+        drop(ledger);
         Ok((self.path, left))
     }
 
@@ -294,8 +301,8 @@ impl Journal {
         File::open(&path)?.sync_all()
     }
 
-    /// Moves everything that is still to be moved and removes what is stale; or moves everything back. No signal
-    /// comes between. Returns an error for stale files that stay.
+    /// Moves everything that is still to be moved and removes what is stale; or moves everything back. Whoever holds
+    /// the ledger keeps signals away meanwhile. Returns an error for stale files that stay.
     ///
     /// # Errors
     /// A file must not or cannot be replaced. If the others cannot be moved back either, the staging folder is kept.
@@ -303,8 +310,8 @@ impl Journal {
         &self,
         staging: &mut Staging,
         files: &Files,
+        ledger: &mut Ledger,
     ) -> anyhow::Result<Option<anyhow::Error>> {
-        let mut ledger = ledger();
         let path = staging.path().to_owned();
         let mut names = self.moves.iter();
         let Err(error) = names.try_for_each(|name| move_one(&path, name, files)) else {
@@ -317,7 +324,7 @@ impl Journal {
             let _ = fs::remove_file(path.join(JOURNAL));
             return Err(anyhow!("{error}; nothing was changed"));
         };
-        staging.keep(&mut ledger);
+        staging.keep(ledger);
         let (folder, kept) = (base_of(&path).display(), path.display());
         Err(anyhow!(
             "{error}; {folder} is half old and half new, since moving back failed: {cause}; the other halves are in {kept}; run again when the cause is gone, which ends it"

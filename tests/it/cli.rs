@@ -1356,12 +1356,12 @@ fn regress_plan_checks_its_joint_as_every_command_does() {
     plan(
         TEST,
         &["--kx", "0", "--ky", "1"],
-        "--kx 0: give a positive finite number",
+        "--kx 0.0: give a number from 1e-6 on, and finite",
     );
     plan(
         TEST,
         &["--kx", "inf", "--ky", "1"],
-        "--kx inf: give a positive finite number",
+        "--kx inf: give a number from 1e-6 on, and finite",
     );
     plan(TEST, &["--std", "1e9"], "give percent above 0, at most 10");
     let coupled = ["--kx", "5", "--ky", "1", "--kz", "9"];

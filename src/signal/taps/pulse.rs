@@ -43,7 +43,8 @@ impl Pulse {
             .max_by(|a, b| a.1.total_cmp(b.1))
             .filter(|(_, height)| **height > 0.0)?;
         // The pulse alone: what comes before and after is noise and drift of the channel.
-        let limit = (4.0 * noise).max(FOOT * samples[crest]);
+        let height = samples[crest];
+        let limit = (4.0 * noise).max(FOOT * height).min(0.5 * height);
         let before = samples[..crest].iter().rposition(|x| *x <= limit);
         let after = samples[crest..].iter().position(|x| *x <= limit);
         let start = before.map_or(0, |place| place + 1);

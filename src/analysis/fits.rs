@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{AmplitudeVerdict, Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, TapForce, Unfit, fit_modes, modal_constants,
+    PoleStart, TapForce, Unfit, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,
@@ -19,9 +19,12 @@ use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
-const MOST_EXTRA: usize = 12;
+const MOST_EXTRA: usize = 20;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 const APART: f64 = 3.0;
+/// A single response shows no shapes. There two modes are distinct beyond this multiple: each then has a maximum of
+/// its own, or a shoulder. The poles that mend the line of one mode lie within its half-power width.
+const APART_ALONE: f64 = 1.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
 /// whose frequency changes while it rings is fitted by two poles of one shape.
 const UNLIKE: f64 = 0.9;
@@ -30,6 +33,9 @@ const UNLIKE: f64 = 0.9;
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
+
+/// Least decay over the record (sigma T) of a peak that may be noise.
+const LEAST_DECAY: f64 = 2.0;
 
 /// Result of the polyreference fit over the band.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,6 +59,15 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
     Stabilisation {
         searches: found.unwrap_or_default(),
     }
+}
+
+/// A mode that is kept only if the data ask for it.
+struct Proposal {
+    start: PoleStart,
+    /// Height over the noise (dB).
+    above_noise_db: f64,
+    /// Index of the reading of its peak; `None` where it makes none.
+    peak: Option<usize>,
 }
 
 /// Data of the fit of all modes of one recording.
@@ -83,21 +98,34 @@ impl Candidates<'_> {
             ..FitSettings::default()
         };
         let proposed = all_modes(&self.stabilisation.searches);
-        let (mut starts, peaks, extras) = self.starts(readings, &proposed);
-        let (mut accepted, mut fits) = Accepted::new(self.data, &starts, &settings);
-        let mut added = Vec::new();
-        for extra in extras.into_iter().take(MOST_EXTRA) {
-            let start = start_of(extra);
-            let (test, together) = accepted.test(&start);
-            if self.is_mode(&test, &starts) {
-                starts.push(start);
-                added.push(extra);
-                accepted = together;
+        let (mut starts, peaks, mut proposals) = self.starts(readings, &proposed);
+        let peaks_alone = starts.len();
+        proposals.truncate(MOST_EXTRA);
+        // Modes that lie apart from all others are fitted at once: without them the lines of the others are not true.
+        let (mut together, mut others) = (Vec::new(), Vec::new());
+        for proposal in proposals {
+            if proposal.peak.is_some() || self.is_crowded(&proposal.start, &starts) {
+                others.push(proposal);
+            } else {
+                starts.push(proposal.start);
+                together.push(proposal);
             }
         }
-        let peaks_alone = starts.len() - added.len();
-        if !added.is_empty() {
-            fits = self.settled(&mut starts, &mut added, &settings);
+        let (mut accepted, mut fits) = self.settled(&mut starts, &mut together, &settings, &[]);
+        let fitted: Vec<bool> = fits.iter().map(Result::is_ok).collect();
+        // The rest is tested one by one beside them.
+        for proposal in others {
+            let (test, beside) = accepted.test(&proposal.start);
+            if self.is_mode(&test, &proposal, &starts) {
+                starts.push(proposal.start);
+                together.push(proposal);
+                accepted = beside;
+            }
+        }
+        if starts.len() > fitted.len() {
+            fits = self
+                .settled(&mut starts, &mut together, &settings, &fitted)
+                .1;
         }
         let (of_peaks, of_added) = fits.split_at(peaks_alone);
         for (index, fit) in peaks.into_iter().zip(of_peaks) {
@@ -105,9 +133,13 @@ impl Candidates<'_> {
                 self.adopt(&mut readings[index], fit);
             }
         }
-        // Modes that make no peak.
-        for (proposal, fit) in added.into_iter().zip(of_added) {
+        for (proposal, fit) in together.into_iter().zip(of_added) {
             let Ok(fit) = fit else { continue };
+            if let Some(peak) = proposal.peak {
+                self.adopt(&mut readings[peak], fit);
+                continue;
+            }
+            // A mode that makes no peak.
             let line = self.lines.nearest(fit.frequency.value);
             let mut reading =
                 ModeReading::on_line(self.lines.frequency(line), self.lines.half_line());
@@ -119,37 +151,44 @@ impl Candidates<'_> {
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
 
-    /// The fit of all together. Beside the others an added mode may leave the band that it kept to when it
-    /// was tested: then it goes, and the rest is fitted again without it.
+    /// The fit of all together. An added mode goes, and the rest is fitted again without it, where it leaves its place
+    /// beside the others, or where the data do not ask for it. The last one goes where a start that was `fitted` before
+    /// has no fit any more.
     fn settled(
         &self,
         starts: &mut Vec<PoleStart>,
-        added: &mut Vec<&PolyreferenceMode>,
+        added: &mut Vec<Proposal>,
         settings: &FitSettings,
-    ) -> Vec<Result<ModeFit, Unfit>> {
+        fitted: &[bool],
+    ) -> (Accepted<'_>, Vec<Result<ModeFit, Unfit>>) {
         let peaks = starts.len() - added.len();
         loop {
-            let fits = fit_modes(self.data, starts, settings);
-            let mut of_added = fits.iter().skip(peaks);
-            let stray =
-                of_added.position(|fit| fit.as_ref().is_ok_and(|fit| !self.may_be_added(fit)));
-            let Some(stray) = stray else {
-                return fits;
+            let (accepted, fits) = Accepted::new(self.data, starts, settings);
+            let stray = (peaks..starts.len()).rfind(|&index| match &fits[index] {
+                Ok(fit) => !(self.is_own(fit, &added[index - peaks]) && accepted.needs(index, fit)),
+                Err(_) => true,
+            });
+            let costly = starts.len() > fitted.len() && {
+                let mut pairs = fitted.iter().zip(&fits);
+                pairs.any(|(before, now)| *before && now.is_err())
             };
-            starts.remove(peaks + stray);
-            added.remove(stray);
+            let Some(stray) = stray.or(costly.then_some(starts.len() - 1)) else {
+                return (accepted, fits);
+            };
+            starts.remove(stray);
+            added.remove(stray - peaks);
         }
     }
 
     /// Starts of the fits: peaks first, each at its own reading or at the mode of the polyreference fit
-    /// beside it; the modes without a peak apart, the clearest first.
-    fn starts<'m>(
+    /// beside it. Modes without a peak and peaks that may be noise are proposals, the clearest first.
+    fn starts(
         &self,
         readings: &[ModeReading],
-        proposed: &'m [PolyreferenceMode],
-    ) -> (Vec<PoleStart>, Vec<usize>, Vec<&'m PolyreferenceMode>) {
+        proposed: &[PolyreferenceMode],
+    ) -> (Vec<PoleStart>, Vec<usize>, Vec<Proposal>) {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
-        let (mut starts, mut peaks) = (Vec::new(), Vec::new());
+        let (mut starts, mut peaks, mut proposals) = (Vec::new(), Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
             // The mode that belongs to a peak: the nearest within a line and its half-power width.
             let near = free.iter().enumerate().filter_map(|(place, mode)| {
@@ -160,19 +199,32 @@ impl Candidates<'_> {
             });
             let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
             let own = nearest.and_then(|(place, _)| free[place].take());
+            let alone = PoleStart {
+                frequency: reading.frequency,
+                damping_ratio: reading.damping_ratio,
+            };
             match (reading.label, own) {
-                (None, None) => starts.push(PoleStart {
-                    frequency: reading.frequency,
-                    damping_ratio: reading.damping_ratio,
-                }),
+                (None, None) => starts.push(alone),
                 (None | Some(PeakLabel::NoResonance), Some(own)) => starts.push(start_of(own)),
+                (Some(PeakLabel::NoResonance), None) => {
+                    proposals.extend(reading.above_noise_db.map(|above_noise_db| Proposal {
+                        start: alone,
+                        above_noise_db,
+                        peak: Some(index),
+                    }));
+                    continue;
+                }
                 _ => continue,
             }
             peaks.push(index);
         }
-        let mut extras: Vec<&PolyreferenceMode> = free.into_iter().flatten().collect();
-        extras.sort_by(|a, b| b.above_noise_db.total_cmp(&a.above_noise_db));
-        (starts, peaks, extras)
+        proposals.extend(free.into_iter().flatten().map(|mode| Proposal {
+            start: start_of(mode),
+            above_noise_db: mode.above_noise_db,
+            peak: None,
+        }));
+        proposals.sort_by(|a, b| b.above_noise_db.total_cmp(&a.above_noise_db));
+        (starts, peaks, proposals)
     }
 
     /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
@@ -188,18 +240,45 @@ impl Candidates<'_> {
         (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < MOST_DAMPING
     }
 
+    /// Returns true if a fit is a clear mode where it was proposed: within its half-power width.
+    fn is_own(&self, fit: &ModeFit, proposal: &Proposal) -> bool {
+        let found = fit.frequency.value;
+        let width = found
+            * proposal
+                .start
+                .damping_ratio
+                .unwrap_or(0.0)
+                .max(fit.damping_ratio.value);
+        let near = (found - proposal.start.frequency).abs() <= 2.0 * self.lines.half_line() + width;
+        // A peak of noise is as narrow as the record allows.
+        let decay = -fit.pole.re * self.lines.duration;
+        let rings_down = proposal.peak.is_none() || decay >= LEAST_DECAY;
+        near && rings_down && self.may_be_added(fit) && is_clear(fit)
+    }
+
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
-    fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
+    fn is_mode(&self, test: &ExtraMode, proposal: &Proposal, accepted: &[PoleStart]) -> bool {
         let (true, Ok(fit)) = (test.needed, &test.fit) else {
             return false;
         };
-        let own = fit.frequency.value * fit.damping_ratio.value;
-        let crowded = accepted.iter().any(|other| {
-            let theirs = other.frequency * other.damping_ratio.unwrap_or(0.0);
-            (fit.frequency.value - other.frequency).abs() < APART * (own + theirs)
-        });
+        let found = PoleStart {
+            frequency: fit.frequency.value,
+            damping_ratio: Some(fit.damping_ratio.value),
+        };
         let unlike = test.likeness.is_some_and(|likeness| likeness < UNLIKE);
-        is_clear(fit) && self.may_be_added(fit) && (!crowded || unlike)
+        self.is_own(fit, proposal) && (unlike || !self.is_crowded(&found, accepted))
+    }
+
+    /// Returns true where a mode is too near to another for their frequencies alone to tell them apart.
+    fn is_crowded(&self, mode: &PoleStart, others: &[PoleStart]) -> bool {
+        let least = match self.data.columns() {
+            [_] => APART_ALONE,
+            _ => APART,
+        };
+        others.iter().any(|other| {
+            let widths = [mode, other].map(|one| one.frequency * one.damping_ratio.unwrap_or(0.0));
+            (mode.frequency - other.frequency).abs() < least * (widths[0] + widths[1])
+        })
     }
 
     /// Takes the fit of a peak, if it belongs to it; a peak that was no clear resonance becomes one where its fit is

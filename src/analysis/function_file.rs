@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::{
-    CompositeLevel, PeakSettings, find_peaks, read_magnitude_peaks, read_peaks,
+    CompositeLevel, PeakSettings, find_peaks, noise_of_function, read_magnitude_peaks, read_peaks,
 };
 use tapjoint_signal::recording::{Format, FrequencyResponses, ResponseForm};
 use tapjoint_signal::spectral::{
@@ -170,7 +170,8 @@ fn spectra_of_functions(
         .map(|h| h.iter().map(Complex64::norm_sqr).collect())
         .collect();
     let columns: Vec<&[Complex64]> = values.iter().map(Vec::as_slice).collect();
-    let level = CompositeLevel::new(lines, &powers, None);
+    let noise: Vec<Vec<f64>> = columns.iter().map(|h| noise_of_function(h)).collect();
+    let level = CompositeLevel::new(lines, &powers, Some(&noise));
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
     let stabilisation = stabilisation(lines.low, lines.spacing, &columns);

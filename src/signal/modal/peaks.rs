@@ -2,6 +2,10 @@
 //!
 //! Mains hum: 50 and 60 Hz and their multiples, steady and there before the tap, as a line over the noise.
 
+use std::f64::consts::LN_2;
+
+use num_complex::Complex64;
+
 use crate::spectral::Lines;
 use tapjoint_numerics::stats::median;
 
@@ -34,6 +38,35 @@ impl CompositeLevel {
             noise_db: noise.map(|noise| weighted_db(noise, &weights, lines.points())),
         }
     }
+}
+
+/// Lines to either side over which the noise of a function is taken. 50: a resonance some lines wide among them
+/// does not move their median.
+const NOISE_REACH: usize = 50;
+/// Lines between the values of a difference. 2: neighbours share a part of their noise under a Hann window.
+const NOISE_STEP: usize = 2;
+
+/// Returns the noise power of a frequency response function, line by line (its unit squared).
+///
+/// Modes are smooth over the lines, noise is not. The third difference H(k) - 3 H(k+2) + 3 H(k+4) - H(k+6) has
+/// 1 + 9 + 9 + 1 = 20 times the power of white noise. The median of an exponential distribution is ln 2 of its mean.
+/// Under a Hann window the result is 1.3 dB too low, because lines two apart still share a sixth of their noise.
+/// A function without any noise gets the little that its curvature leaves.
+pub fn noise_of_function(values: &[Complex64]) -> Vec<f64> {
+    let rough: Vec<f64> = values
+        .windows(3 * NOISE_STEP + 1)
+        .map(|line| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|place| line[place * NOISE_STEP]);
+            (a - d + 3.0 * (c - b)).norm_sqr()
+        })
+        .collect();
+    let mut noise = Vec::with_capacity(values.len());
+    for line in 0..values.len() {
+        let end = (line + NOISE_REACH).min(rough.len());
+        let first = line.saturating_sub(NOISE_REACH).min(end.saturating_sub(1));
+        noise.push(median(&mut rough[first..end].to_vec()) / (20.0 * LN_2));
+    }
+    noise
 }
 
 fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> {

@@ -582,40 +582,46 @@ impl<'a> Accepted<'a> {
             .map_or(1, |group| group.fit.problem.lines.stride);
         if let (Some(group), Ok(mode)) = (&group, &test.fit)
             && let Some(place) = group.members.iter().position(|&index| index == last)
-            && let Some((probability, information_gain)) = beside.gain(group, place)
+            && let Some((probability, information_gain)) =
+                beside.gain(&group.members, place, group.fit.terms)
         {
             test.probability = probability;
             test.likeness = likeness(self.data, &group.fit, place);
-            let amplitudes = mode.amplitudes.iter();
-            let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
-            test.needed = probability < LEVEL
-                && information_gain > 0.0
-                && root_mean_square(&ratios) > LEAST_AMPLITUDE
-                && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
+            test.needed = is_needed(mode, probability, information_gain);
         }
         (test, beside, stride)
     }
 
-    /// Compares the fits with and without the pole at `place`; `None` where one of them fails. Returns the
-    /// probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
-    /// criterion.
+    /// Returns true where the data ask for the fitted mode of start `index`, as [`test`](Self::test) judges it.
+    pub fn needs(&self, index: usize, mode: &ModeFit) -> bool {
+        let members = &mode.joint_with;
+        let place = members.iter().position(|&member| member == index);
+        place
+            .and_then(|place| self.gain(members, place, mode.background_terms))
+            .is_some_and(|(probability, gain)| is_needed(mode, probability, gain))
+    }
+
+    /// Compares the fits of a group with and without its pole at `place`; `None` where one of them fails. Returns
+    /// the probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
+    /// criterion. The background has `terms` terms.
     ///
     /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
     /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
     /// n ln S + k ln n.
-    fn gain(&self, group: &Group, place: usize) -> Option<(f64, f64)> {
-        let fit = &group.fit;
-        let band = BandData::new(self, &group.members).ok()?;
-        let mut fewer: Vec<Complex64> = fit.at.poles.clone();
-        fewer.remove(place);
-        let columns = fit.used.len() as f64;
+    fn gain(&self, members: &[usize], place: usize, terms: usize) -> Option<(f64, f64)> {
+        let band = BandData::new(self, members).ok()?;
+        let noise = self.noise(members, &band.used)?;
+        let mut poles = self.poles(members);
+        // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
+        let with = band.fit(&poles, terms, &noise).ok()?;
+        poles = with.at.poles.clone();
+        poles.remove(place);
+        let columns = band.used.len() as f64;
         let unknowns = 2.0 + 2.0 * columns;
         let values = 2.0 * band.lines.count() as f64 * columns;
-        // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
-        let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
-        let without = match fewer.is_empty() {
-            true => band.square_sum_without(fit.terms, &fit.noise),
-            false => band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum,
+        let without = match poles.is_empty() {
+            true => band.square_sum_without(terms, &noise),
+            false => band.fit(&poles, terms, &noise).ok()?.at.square_sum,
         };
         let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
         let fall = (without - with.at.square_sum) / unknowns / with.variance;
@@ -623,6 +629,16 @@ impl<'a> Accepted<'a> {
         let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
         Some((probability, criterion))
     }
+}
+
+/// Returns true where noise alone does not explain the fall of the residual, and the mode is certain to decay.
+fn is_needed(mode: &ModeFit, probability: f64, information_gain: f64) -> bool {
+    let amplitudes = mode.amplitudes.iter();
+    let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
+    probability < LEVEL
+        && information_gain > 0.0
+        && root_mean_square(&ratios) > LEAST_AMPLITUDE
+        && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std
 }
 
 /// Returns the likeness of the shapes of a pole and of the nearest pole of its group, in units of noise.

@@ -32,10 +32,11 @@ mod selection;
 mod stabilisation;
 
 use std::f64::consts::TAU;
+use std::slice::from_ref;
 
 use num_complex::Complex64;
 
-use super::{CompositeLevel, PeakSettings, find_peaks};
+use super::{CompositeLevel, PeakSettings, find_peaks, noise_of_function};
 use crate::spectral::{DISPLAY_RATIO, Lines};
 
 pub use selection::{PolyreferenceMode, select_modes};
@@ -238,6 +239,12 @@ const LEAST_BAND_LINES: f64 = 120.0;
 /// background.
 const HALF_POWER_WIDTHS: f64 = 16.0;
 
+/// Largest ratio of the reaches of two peaks that share a band. 4: over a band
+/// wider than that the lags of an order no longer reach the decay of the lighter mode.
+const MOST_UNEQUAL: f64 = 4.0;
+/// Most functions whose peaks are looked for one by one. 12: more taps and sensors repeat each other.
+const MOST_ALONE: usize = 12;
+
 /// A band of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SubBand {
@@ -318,26 +325,44 @@ fn peak_groups(matrix: &ResponseMatrix) -> Vec<PeakGroup> {
     let powers: Vec<Vec<f64>> = entries
         .map(|entry| entry.iter().map(Complex64::norm_sqr).collect())
         .collect();
-    let level = CompositeLevel::new(lines, &powers, None);
-    // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a mode costs time only.
+    let noise = matrix.entries.iter().map(|entry| noise_of_function(entry));
+    let noise: Vec<Vec<f64>> = noise.collect();
+    // Less than the 15 dB that count as a resonance unseen: a band without a mode costs time only.
     let settings = PeakSettings {
-        blind_prominence_db: 6.0,
         above_noise_db: 10.0,
         ..PeakSettings::default()
     };
+    let level = CompositeLevel::new(lines, &powers, Some(&noise));
+    let mut peaks: Vec<(usize, f64)> = Vec::new();
+    // A mode that moves one sensor alone may make no peak over all of them.
+    let alone = powers
+        .iter()
+        .zip(&noise)
+        .take(MOST_ALONE)
+        .map(|(power, noise)| CompositeLevel::new(lines, from_ref(power), Some(from_ref(noise))));
+    for level in std::iter::once(level).chain(alone) {
+        for peak in find_peaks(&level, &settings) {
+            // Lines over which the level stays within 3 dB of the peak.
+            let (before, after) = level.level_db.split_at(peak.index);
+            let least = after[0] - 3.0;
+            let below = before.iter().rev().take_while(|level| **level >= least);
+            let above = after.iter().take_while(|level| **level >= least);
+            peaks.push((peak.index, (below.count() + above.count()) as f64));
+        }
+    }
+    peaks.sort_by_key(|peak| peak.0);
+    peaks.dedup_by_key(|peak| peak.0);
     let mut groups: Vec<PeakGroup> = Vec::new();
-    for peak in find_peaks(&level, &settings) {
-        let frequency = matrix.frequency(peak.index);
-        // Lines over which the level stays within 3 dB of the peak.
-        let (before, after) = level.level_db.split_at(peak.index);
-        let least = after[0] - 3.0;
-        let below = before.iter().rev().take_while(|level| **level >= least);
-        let above = after.iter().take_while(|level| **level >= least);
-        let width = (below.count() + above.count()) as f64;
+    for (index, width) in peaks {
+        let frequency = matrix.frequency(index);
         let reach = 0.5 * (HALF_POWER_WIDTHS * width).max(LEAST_BAND_LINES) * matrix.spacing;
         match groups.last_mut() {
-            // A group is not longer than half a reach, so that its band stays narrow.
-            Some(group) if frequency - group.first < 0.5 * group.reach.min(reach) => {
+            // A group is not longer than half a reach, so that its band stays narrow. A light mode beside a plateau
+            // has a band of its own.
+            Some(group)
+                if frequency - group.first < 0.5 * group.reach.min(reach)
+                    && group.reach.max(reach) <= MOST_UNEQUAL * group.reach.min(reach) =>
+            {
                 group.last = frequency;
                 group.reach = group.reach.max(reach);
             }

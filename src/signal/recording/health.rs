@@ -25,6 +25,9 @@ const MIN_DROP_OF_PEAK: f64 = 1e-4;
 /// the idle side of a hammer signal is none.
 const MIN_LEVEL_OF_PEAK: f64 = 0.5;
 
+/// An extreme this near to the peak (part of it) is the other end of the same integer format.
+const FULL: f64 = 0.99;
+
 /// Samples this far below the extreme level are near it (part of the level).
 const NEAR_LEVEL: f64 = 0.01;
 
@@ -337,6 +340,8 @@ struct Side {
     level: f64,
     /// Separate runs at the level, of single samples too.
     hits: u64,
+    /// Runs of two or more samples at the level: a computed tone repeats its crest exactly, one sample at a time.
+    pairs: u64,
     /// Samples within [`NEAR_LEVEL`] below it.
     near: u64,
     places: Vec<EqualRun>,
@@ -349,6 +354,7 @@ impl Side {
             sign,
             level: f64::NEG_INFINITY,
             hits: 0,
+            pairs: 0,
             near: 0,
             places: Vec::new(),
             count: 0,
@@ -363,7 +369,7 @@ impl Side {
                 true => self.near + self.hits,
                 false => 0,
             };
-            (self.level, self.hits) = (height, 1);
+            (self.level, self.hits, self.pairs) = (height, 1, 0);
             self.places.clear();
             self.count = 0;
         } else if height == self.level {
@@ -378,7 +384,7 @@ impl Side {
     /// (`quantum`) would pile up by themselves.
     fn rail(&self, quantum: f64) -> Option<f64> {
         let fine = quantum < QUANTUM_OF_PEAK * self.level.abs();
-        let piled = fine && self.hits >= LEAST_HITS && self.hits >= self.near;
+        let piled = fine && self.pairs > 0 && self.hits >= LEAST_HITS && self.hits >= self.near;
         (self.count > 0 || piled).then_some(self.level * self.sign)
     }
 
@@ -438,6 +444,11 @@ impl HealthMeter {
             };
             if at > 0 && step == 0.0 {
                 self.run.len += 1;
+                if self.run.len == 2 {
+                    for side in [&mut self.high, &mut self.low] {
+                        side.pairs += u64::from(side.holds(value));
+                    }
+                }
             } else {
                 if at > 0 {
                     self.quantum = self.quantum.min(step);
@@ -517,7 +528,10 @@ impl HealthMeter {
         }
         // An integer format ends at full scale, reached or not by the other side.
         if health.full_scale_samples > 0 {
-            health.rails = [Some(-health.peak), Some(health.peak)];
+            let near = |level: f64| level.abs() >= FULL * health.peak;
+            let ends =
+                [health.minimum, health.maximum].map(|end| Some(end).filter(|end| near(*end)));
+            health.rails = [health.rails[0].or(ends[0]), health.rails[1].or(ends[1])];
         }
         health.flat_tops.sort_by_key(|flat_top| flat_top.start);
         if self.still_samples as f64 > MAX_STILL_PART * self.count as f64 {

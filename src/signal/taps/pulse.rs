@@ -27,8 +27,8 @@ pub struct Pulse {
 /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
 /// small by the share of its power, here a tenth.
 pub const FORCE_OVER_NOISE: f64 = 10.0;
-/// Share of its height at which a pulse begins and ends, where that is above the noise.
-const FOOT: f64 = 0.01;
+/// Share of its height at which a pulse begins and ends.
+const FOOT: f64 = 0.02;
 /// Lines of the transform to each sample of the pulse: its main lobe then has some eight.
 const PADDING: usize = 4;
 /// Fewest lines of the transform.
@@ -43,13 +43,12 @@ impl Pulse {
             .max_by(|a, b| a.1.total_cmp(b.1))
             .filter(|(_, height)| **height > 0.0)?;
         // The pulse alone: what comes before and after is noise and drift of the channel.
-        let height = samples[crest];
-        let limit = (4.0 * noise).max(FOOT * height).min(0.5 * height);
+        let width = half_width(samples, crest) / rate;
+        let limit = FOOT * samples[crest];
         let before = samples[..crest].iter().rposition(|x| *x <= limit);
         let after = samples[crest..].iter().position(|x| *x <= limit);
         let start = before.map_or(0, |place| place + 1);
         let samples = &samples[start..after.map_or(samples.len(), |place| crest + place)];
-        let crest = crest - start;
         let size = (PADDING * samples.len())
             .max(2 * LEAST_LINES)
             .next_power_of_two();
@@ -83,7 +82,7 @@ impl Pulse {
         }
         let ends = [falls[1], sinks].into_iter().flatten();
         Some(Pulse {
-            width: half_width(samples, crest) / rate,
+            width,
             fall_10_db: falls[0],
             fall_20_db: falls[1],
             usable_to: ends.fold(0.5 * rate, f64::min),

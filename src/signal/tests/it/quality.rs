@@ -329,14 +329,14 @@ fn val_scatter_beside_what_noise_explains() {
     };
     // Its standard deviation is exactly the step; noise explains 2e-5; chance reaches
     // sqrt(13.28/4) = 1.82 times that (chi2 of 4 at 99 %).
-    let real = judged(&spread(2e-4), Check::FrequencyScatter);
+    let real = judged(&spread(2e-3), Check::FrequencyScatter);
     assert_doubt(
         &real,
         Outcome::Doubtful,
         &[
             "110.00 Hz",
-            "0.0200 %",
-            "10 times",
+            "0.2000 %",
+            "100 times",
             "chance reaches 1.8",
             "bad from 1 %",
         ],
@@ -345,14 +345,14 @@ fn val_scatter_beside_what_noise_explains() {
         judged(&spread(3e-5), Check::FrequencyScatter).outcome,
         Outcome::Good
     );
-    // 2.25 and 2.75 times what noise explains, below and above what a little warmth does.
-    let warm = judged(&spread(4.5e-5), Check::FrequencyScatter);
+    // Far beyond noise, below and above the change that matters.
+    let warm = judged(&spread(4.5e-4), Check::FrequencyScatter);
     assert_eq!(warm.outcome, Outcome::Good, "{warm}");
-    assert!(warm.happened.contains("up to 0.005 %"), "{warm}");
-    let more = judged(&spread(5.5e-5), Check::FrequencyScatter);
+    assert!(warm.happened.contains("up to 0.050 %"), "{warm}");
+    let more = judged(&spread(5.5e-4), Check::FrequencyScatter);
     assert_eq!(more.outcome, Outcome::Doubtful, "{more}");
     let chance = (13.277 / 4.0_f64).sqrt();
-    assert_shown(&more, [2.75, chance], "times noise");
+    assert_shown(&more, [27.5, chance], "times noise");
     assert_doubt(
         &judged(&spread(0.02), Check::FrequencyScatter),
         Outcome::Bad,

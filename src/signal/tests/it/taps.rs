@@ -606,10 +606,10 @@ fn regress_flat_tops_of_a_float_recording_are_an_overload() {
     }
 }
 
-/// Decays of 700 Hz at 2048 Hz, cut off at 0.8: three samples a period, so that each crest has one at most.
+/// Decays of 300 Hz at 2048 Hz, cut off: seven samples a period, so that each crest has one or two.
 fn cut_off(limit: f64) -> Recording {
     let rate = 2048.0;
-    let mut samples = ringing(rate, 6.0, &[0.5, 3.0], &[(700.3, 0.002, 1.0)]);
+    let mut samples = ringing(rate, 6.0, &[0.5, 3.0], &[(300.3, 0.002, 1.0)]);
     add_noise(&mut samples, 1e-4, &mut random(5));
     samples.iter_mut().for_each(|x| *x = x.clamp(-limit, limit));
     recording(rate, vec![samples])

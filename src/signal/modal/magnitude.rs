@@ -6,7 +6,7 @@
 //! from the pole as in any other way of reading it, and does not suffer from the background.
 
 use super::peaks::{CompositeLevel, Peak};
-use super::reading::{Interpolation, ModeReading, NoInterpolation, PeakLabel, ReadBy};
+use super::reading::{Interpolation, ModeReading, NoInterpolation, PeakLabel, reading};
 use crate::spectral::Lines;
 use nalgebra::{DMatrix, DVector};
 
@@ -53,22 +53,7 @@ pub fn read_magnitude_peaks(level: &CompositeLevel, peaks: &[Peak]) -> Vec<ModeR
                 (None, (!clear).then_some(PeakLabel::NoResonance))
             }
         };
-        // A reading counts where its bound is below the half line, or below half of the half-power width.
-        let half_line = lines.half_line();
-        let sharp = between.filter(|found| {
-            let half_width = found.damping_ratio.unwrap_or(0.0) * found.frequency;
-            found.bound < half_line.max(half_width)
-        });
-        let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
-        let mut reading = ModeReading {
-            between: sharp,
-            prominence_db: Some(peak.prominence_db),
-            above_noise_db: peak.above_noise_db,
-            label,
-            ..ModeReading::on_line(lines.frequency(line), half_line)
-        };
-        reading.select_estimate(ReadBy::Interpolated);
-        readings.push(reading);
+        readings.push(reading(level, peak, between, label));
     }
     readings
 }

@@ -233,7 +233,7 @@ pub fn read_peaks(
 /// Puts a reading together. The reading between the lines counts where its bound is below the half
 /// line or below half the half-power width: over a wide resonance in noise the highest line is no
 /// better than that.
-fn reading(
+pub(super) fn reading(
     level: &CompositeLevel,
     peak: &Peak,
     between: Option<Interpolation>,

@@ -113,6 +113,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
             ("--sample-rate", bare.sample_rate.is_some()),
             ("--time-unit", bare.time_unit.is_some()),
             ("--values", bare.values.is_some()),
+            ("--variable", !bare.variable.is_empty()),
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),
@@ -120,7 +121,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let given = described.iter().chain(&own_options);
         if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
             bail!(
-                "{name} is for bare recordings; a test description says it itself: `channel`, `scale`, `sample_rate`, `band`, `block`, `window`"
+                "{name} is for bare recordings; a test description says it itself: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `band`, `block`, `window`"
             );
         }
         let file = read_test(file, terminal)?;

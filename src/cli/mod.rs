@@ -159,6 +159,9 @@ fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outco
             let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
             Files::of(own, read, expanded)
         });
+    for folder in files.folders() {
+        publication::end_begun(folder, &files)?;
+    }
     files.check()?;
     line.common.set_threads()?;
     let terminal = Terminal::new(&line.common, files)?;

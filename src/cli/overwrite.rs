@@ -8,13 +8,13 @@
 //! A file that tapjoint made has a mark: in the file, or in a list of checksums beside it.
 
 use super::arguments::JsonDestination;
-use super::place::Place;
+use super::place::{Place, folder_of};
 use anyhow::bail;
 use clap::ArgMatches;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -80,6 +80,12 @@ impl Files {
                 .collect(),
             force: matches.get_flag("force"),
         }
+    }
+
+    /// Returns the folders of all outputs.
+    pub(super) fn folders(&self) -> BTreeSet<&Path> {
+        let outputs = self.outputs.iter();
+        outputs.map(|(_, path)| folder_of(path)).collect()
     }
 
     /// Checks all inputs against all outputs.

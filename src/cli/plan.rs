@@ -18,7 +18,7 @@ use tapjoint::study::plan::{PlanSettings, judge_plan};
 ///
 /// Run it before anything is measured. Recordings, sensors, taps and levels are those of the description. The recordings need not exist.
 /// Virtual tests with effects of every kind are drawn, observed as planned, and diagnosed. The table
-/// counts the first answer of each diagnosis. --kx and --ky must be positive and finite here.
+/// counts the first answer of each diagnosis. --kx and --ky are finite here, from 1e-6 on.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint plan test.toml --modes 7 --std 0.02")]
 pub(super) struct PlanArguments {

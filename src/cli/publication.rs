@@ -119,6 +119,31 @@ fn busy(path: &Path) -> anyhow::Error {
     )
 }
 
+/// Carries out what a dead process has begun to publish into this folder. Until then the list of checksums may be
+/// older than the files beside it.
+///
+/// # Errors
+/// Another run is publishing there, or what was begun can be neither finished nor undone.
+pub(super) fn end_begun(path: &Path, files: &Files) -> anyhow::Result<()> {
+    // A folder that cannot be an output is refused later, with better words.
+    let Ok(target) = Target::of(path) else {
+        return Ok(());
+    };
+    for folder in target.base.ancestors() {
+        let own = target.staging_in(folder);
+        if !own.join(JOURNAL).is_file() {
+            continue;
+        }
+        match Staging::take(&own) {
+            Ok(Some(dead)) => drop(recovered(dead, files)?),
+            Ok(None) => return Err(busy(path)),
+            // Of somebody else.
+            Err(_) => {}
+        }
+    }
+    Ok(())
+}
+
 /// Carries out the journal of a dead process, if there is one, and empties the staging folder.
 ///
 /// # Errors
@@ -239,28 +264,33 @@ impl OutputFolder {
         for name in names.map_err(|cause| failed(&self.path, &cause))? {
             check_target(&self.path.join(name), &self.files)?;
         }
+        let journal = self.journal(stale);
+        let journal = journal.map_err(|cause| failed(&self.path, &cause))?;
         // No signal comes between the journal and what it says.
         let mut ledger = ledger();
-        let journal = self.write_journal(stale);
-        let journal = journal.map_err(|cause| failed(&self.path, &cause))?;
+        let written = journal.write(self.staging.path());
+        written.map_err(|cause| failed(&self.path, &cause))?;
         let left = journal.carry_out(&mut self.staging, &self.files, &mut ledger)?;
         ledger.written.push(self.path.clone());
         drop(ledger);
         Ok((self.path, left))
     }
 
-    fn write_journal(&self, stale: Vec<String>) -> io::Result<Journal> {
+    /// Returns what is to be done, once all that it speaks of would outlive a loss of power.
+    fn journal(&self, stale: Vec<String>) -> io::Result<Journal> {
         let stale = stale.into_iter().map(PathBuf::from);
         let stale = stale.filter(|name| !self.filled().join(name).exists());
-        let mut moves = moves(&self.staging.path().join(NEW), &self.target.base)?;
+        let new = self.staging.path().join(NEW);
+        for name in files_below(&new)? {
+            File::open(new.join(name))?.sync_all()?;
+        }
+        let mut moves = moves(&new, &self.target.base)?;
         // The old list of checksums stays until the last, since it says which old files may be replaced.
         moves.sort_by_key(|name| name.ends_with(CHECKSUMS));
-        let journal = Journal {
+        Ok(Journal {
             stale: stale.map(|name| self.target.rest.join(name)).collect(),
             moves,
-        };
-        journal.write(self.staging.path())?;
-        Ok(journal)
+        })
     }
 
     /// Adds a list of checksums if a file has no mark of the program. Returns the names of all files.
@@ -290,12 +320,8 @@ struct Journal {
 }
 
 impl Journal {
-    /// Writes the journal, with all that it speaks of, so that it outlives a loss of power.
+    /// Writes the journal so that it outlives a loss of power.
     fn write(&self, staging: &Path) -> io::Result<()> {
-        let new = staging.join(NEW);
-        for name in files_below(&new)? {
-            File::open(new.join(name))?.sync_all()?;
-        }
         let path = staging.join(JOURNAL);
         fs::write(&path, serde_json::to_vec(&(&self.moves, &self.stale))?)?;
         File::open(&path)?.sync_all()
@@ -596,6 +622,37 @@ mod tests {
         };
         journal.write(&staging).unwrap();
         staging
+    }
+
+    #[test]
+    fn regress_a_begun_publication_is_ended_before_its_files_are_judged() {
+        use super::super::overwrite::is_made_here;
+        let folder = tempfile::tempdir().unwrap();
+        let staging = Target::of(folder.path())
+            .unwrap()
+            .staging_in(&folder.path().canonicalize().unwrap());
+        let recording = folder.path().join("a.wav");
+        for (place, text) in [
+            (folder.path().to_owned(), OLD_TEXT),
+            (staging.join(NEW), NEW_TEXT),
+        ] {
+            fs::create_dir_all(&place).unwrap();
+            let name = PathBuf::from("a.wav");
+            fs::write(place.join(&name), text).unwrap();
+            let list = checksum_list("", &[(name.clone(), place.join(&name))]).unwrap();
+            fs::write(place.join(CHECKSUMS), list).unwrap();
+        }
+        fs::create_dir_all(staging.join(OLD)).unwrap();
+        let journal = Journal {
+            moves: ["a.wav", CHECKSUMS].map(PathBuf::from).to_vec(),
+            stale: Vec::new(),
+        };
+        journal.write(&staging).unwrap();
+        // The kill comes between the recording and the list.
+        move_one(&staging, Path::new("a.wav"), &Files::default()).unwrap();
+        assert!(!is_made_here(&recording));
+        end_begun(folder.path(), &Files::default()).unwrap();
+        assert!(is_made_here(&recording) && !staging.exists());
     }
 
     #[test]

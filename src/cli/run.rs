@@ -33,7 +33,7 @@ use tapjoint::report::{
 )]
 pub(super) struct RunArguments {
     /// Test description (.toml), recording (WAV, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
-    /// text)
+    /// text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Folder of the report; default: NAME-report beside FILE

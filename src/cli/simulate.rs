@@ -526,6 +526,9 @@ impl LaboratoryArguments {
         }
         match self.rayleigh[..] {
             [] => {}
+            [_, stiffness] if stiffness > 1.0 => bail!(
+                "--rayleigh: the stiffness part is {stiffness:?} s; give 0 to 1 s, such as 0.5,1e-6"
+            ),
             [mass, stiffness] => {
                 laboratory.specimen.damping = Damping::Rayleigh { mass, stiffness };
             }

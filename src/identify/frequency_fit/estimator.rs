@@ -66,9 +66,9 @@ impl Neighbourhood {
     /// Returns the starts that can lead to the deepest minimum once the data have moved by this norm (standard
     /// deviations).
     ///
-    /// The norm of the residuals changes nowhere by more than the data move. Of two minima that are more than twice
-    /// as far apart, the deeper one stays the deeper. A valley without a floor has minima without number: the
-    /// deepest [`FOLLOWED`] stand for them.
+    /// The norm of the residuals changes nowhere by more than the data move. Where the norms of two minima differ by
+    /// more than twice that, the deeper one stays the deeper. A valley without a floor has minima without number.
+    /// The deepest [`FOLLOWED`] stand for them.
     fn starts_after(&self, moved: f64) -> Vec<Point> {
         let least = self.norms.first().copied().unwrap_or(0.0);
         let starts = self.starts.iter().zip(&self.norms);
@@ -192,7 +192,7 @@ impl ConsistentEstimator {
         self.deepest(self.solve(frequencies).1)
     }
 
-    /// Returns the points from which repetitions of the estimate start: all minima of this one.
+    /// Returns the points from which repetitions of the estimate start: the minima of this one.
     pub fn neighbourhood(&self) -> Neighbourhood {
         let (model, minima) = self.solve(&self.frequencies());
         Neighbourhood {
@@ -479,8 +479,8 @@ const CHUNK: usize = 256;
 
 impl ConsistentEstimator {
     /// Repeats the estimate `samples` times with independent normal errors. The frequencies have their stated
-    /// standard deviations, and the beam's properties their tolerances. Each repetition starts from every minimum of
-    /// the first estimate, its [`ConsistentEstimator::neighbourhood`]. The body is that of the first estimate, and
+    /// standard deviations, and the beam's properties their tolerances. Each repetition starts from those minima of the
+    /// first estimate that its errors can make the deepest, four at most. The body is that of the first estimate, and
     /// changes of the beam are followed to first order. This leaves less than a thousandth of a standard deviation.
     /// The result depends on the seed, not on the number of threads. Repetitions that do not converge count as
     /// failed.

@@ -8,18 +8,18 @@ would do it, with `tapjoint spectrum FILE --json -`, on the whole band and on fo
 test of the folder `independent_cantilever` also with `tapjoint run`. A mode within 2 % of a band's end is not counted,
 neither as missing nor as further.
 
-For each file and band it prints what was expected, found, missing and further; then the recall over all files, the
-precision where the README calls its list complete, and elsewhere whether each further mode has a stable column and
-stands 10 dB over the floor. Stable columns are the program's own (`recordings[].stabilisation` in its JSON) or
-pyEMA's. pyEMA's stable poles on the same functions stand beside (`pip install pyema` in any environment); without
-the module they are left out. A file that the program cannot read counts as failed in each band, and all its modes as
-missing.
+For each file and band that is not as expected it prints what was expected, found, missing and further (`--modes`:
+for all). Then it prints the recall over all files, and the precision where the README calls its list complete.
+Elsewhere each further mode must stand 10 dB over the floor, and have a stable column of pyEMA where pyEMA is
+installed (`pip install pyema`). Without it columns are not judged. A file that cannot be read counts as failed, and
+all its modes as missing.
 
-The three fits of the README usc_cantilever are made with `tapjoint run`. The bolted beam is also run through `tapjoint run` under several descriptions and bands: its bending modes at 80.47,
-297.66, 580.66 and 845.7 Hz must be numbered 1 to 4, or the ambiguity said, and no joint may be called known to better
-than the misfit that it must leave.
+The three fits of the README usc_cantilever are made with `tapjoint run`. So are several descriptions of the bolted
+beam in several bands. Its bending modes at 80.47, 297.66, 580.66 and 845.7 Hz must be numbered 1 to 4, or the
+ambiguity said. No joint may be called known to better than the misfit that it must leave.
 
-Exit code 1 where recall, precision, the bolted beam or the clamped beam fail.
+Exit code 1 where more than one mode is missing over all files and bands, where the precision is below its limit,
+where a further mode is doubtful, where a file cannot be read, or where the bolted or the clamped beam fail.
 """
 
 import argparse
@@ -71,13 +71,13 @@ def relative(frequencies, share, least=0.0):
 
 
 def masses(folder, suffix, frequencies):
-    """One state of the beam with masses: medians over all samples, which scatter by 0.25 to 0.6 % (README)."""
+    """One state of the beam with masses: medians over all samples (README)."""
     return Set(
         name=f"masses {folder}",
         files=[f"masses_beam/{folder}/P-{n}{suffix}.txt" for n in range(1, 13)],
-        # Three times the largest scatter of single samples about the median.
-        expected=relative(frequencies, 0.018),
-        reason="3 x the 0.6 % by which samples scatter",
+        # The masses hang at other places in each sample: peaks lie up to 3.9 % from the median.
+        expected=relative(frequencies, 0.04),
+        reason="4 %: masses are moved between samples",
         bands=["10:1500", "5:600", "100:1300", "300:2000"],
         complete=(10.0, 1300.0),
     )
@@ -132,8 +132,7 @@ SETS = [
     Set(
         name="UFF impact test",
         files=["ufffiles_jl_uff/dataset58_FRF.unv", "ufffiles_jl_uff/dataset58_FRF_UTF.unv"],
-        # 377 +-11 Hz is the width in which this mode's peak lies.
-        expected=[(f, 11.0 if f == 376.2 else max(0.01 * f, 0.5)) for f in FRF],
+        expected=relative(FRF, 0.01, 0.5),
         reason="1 % or a line: heavily damped modes whose list holds line readings",
         bands=["20:600", "20:800", "200:600", "50:400"],
         form="mobility",
@@ -160,13 +159,14 @@ SETS = [
         arguments=["--hammer", "1"],
         own={"independent_cantilever/r4.wav": relative(INDEPENDENT_MOVED, 0.001)},
     ),
-    # Nothing is stated of its frequencies: it is read, and its further modes are judged.
+    # Nothing is stated of its frequencies: all its modes are further ones, and judged.
     Set(
         name="MATLAB",
         files=["matlab/transfer_function_clean.mat"],
         expected=[],
         reason="",
         bands=["50:1000", "50:500", "200:1400", "10:1500"],
+        arguments=[f"--variable={role}" for role in ("frf=yspec", "rate=freq", "points=npts")],
     ),
 ]
 
@@ -213,7 +213,7 @@ def modes_of(recording):
 
 
 def pyema_poles(columns, form, band):
-    """Frequencies of pyEMA's stable columns; None without the module or where it fails."""
+    """Frequencies of pyEMA's stable columns; None without the module, on few lines, or where it fails."""
     try:
         import numpy as np
         import pyEMA
@@ -226,7 +226,7 @@ def pyema_poles(columns, form, band):
     inside = (frequencies >= low) & (frequencies <= high)
     functions = np.array([[value for _, value in column] for column in columns])
     if inside.sum() < 100:
-        return []
+        return None
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
             model = pyEMA.Model(
@@ -234,7 +234,7 @@ def pyema_poles(columns, form, band):
             )
             model.get_poles(method="lscf", show_progress=False)
     except Exception:
-        return []
+        return None
     return stable(list(zip(model.pole_freq, model.pole_xi)), low, high)
 
 
@@ -288,6 +288,7 @@ class Outcome:
     wrong: int = 0
     further: int = 0
     doubtful: int = 0
+    unread: int = 0
     peer_found: int = 0
     peer_expected: int = 0
 
@@ -347,12 +348,10 @@ def try_band(program, one, file, path, zoom, columns, show):
         notes = [f"{mode['frequency']:.2f}" for mode in further]
     else:
         result.further = len(further)
-        own = recording.get("stabilisation") if recording else None
         for mode in further:
             frequency = mode["frequency"]
             width = max((mode["damping"] or 0.0) * frequency, recording["half_line"])
-            stables = [pole["frequency"] for pole in own] if isinstance(own, list) else peers
-            column = None if stables is None else any(abs(f - frequency) <= max(width, 0.005 * frequency) for f in stables)
+            column = None if peers is None else any(abs(f - frequency) <= max(width, 0.005 * frequency) for f in peers)
             height = mode["above_noise_db"] or over_floor(columns, frequency, width)
             sure = column is not False and height is not None and height >= OVER_FLOOR
             result.doubtful += not sure
@@ -360,6 +359,7 @@ def try_band(program, one, file, path, zoom, columns, show):
             notes.append(f"{frequency:.2f} ({words}, {'?' if height is None else round(height)} dB)")
     verdict = "ok" if not missing and not (one.complete and further) else "--"
     if recording is None:
+        result.unread += 1
         lines = [line for line in problem.splitlines() if line.startswith("error")]
         notes, verdict = [lines[0] if lines else "no answer"], "!!"
     peer = "" if peers is None else f"; pyEMA {result.peer_found} of {result.peer_expected}"
@@ -395,7 +395,7 @@ def run_independent(program, data, one):
     total = Outcome()
     if answer is None:
         print(f"  !! run test.toml: {problem.splitlines()[:1]}")
-        total.expected = 6 * len(one.files)
+        total.expected, total.unread = 6 * len(one.files), 1
         return total
     for file, recording in zip(one.files, answer["recordings"]):
         expected, read = one.of(file), [mode["frequency"] for mode in modes_of(recording)]
@@ -417,8 +417,8 @@ DESCRIPTIONS = {
     "first four modes": "",
 }
 BANDS = [None, "[20, 700]", "[20, 1000]", "[50, 2000]", "[20, 1700]"]
-# The best two-spring joint misses these frequencies by 5 % (README): Kr goes as the square of the frequency at most,
-# and no bound below 5 % to either side can be true.
+# The best two-spring joint misses these frequencies by 5 % (README). Kr goes as the square of the frequency at least,
+# so no bound below 10 % to either side can be true. Half of that is called tight.
 TIGHT = 0.05
 
 
@@ -554,10 +554,10 @@ def main():
         chosen.json.write_text(json.dumps({name: vars(one) for name, one in counts.items()}, indent=2) + "\n")
     read = total.right + total.wrong
     precise = not read or total.right / read >= PRECISION
-    # All but one frequency of the lists, whatever the band: five bands may each miss it.
+    # One miss in all, over all files and bands.
     complete = total.expected - total.found <= 1
-    print(f"recall {'ok' if complete else 'FAILS'}, precision {'ok' if precise else 'FAILS'}, bolted beam and usc: {failed} fail")
-    return 0 if complete and precise and not failed and not total.doubtful else 1
+    print(f"recall {'ok' if complete else 'FAILS'}, precision {'ok' if precise else 'FAILS'}, bolted beam and usc: {failed} fail, doubtful: {total.doubtful}, unread: {total.unread}")
+    return 0 if complete and precise and not (failed or total.doubtful or total.unread) else 1
 
 
 if __name__ == "__main__":

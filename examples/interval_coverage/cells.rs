@@ -23,7 +23,7 @@ use tapjoint::recording::{Channel, ReadSettings, Recording, RecordingError, WavF
 pub enum Cell {
     /// Records that ring down, damping 0.1 to 1 %, 35 to 70 dB.
     Clean,
-    /// Pairs 0.3 % apart, damping 0.1 to 1 %, 60 dB.
+    /// Pairs 0.3 % apart, damping 0.1 to 1.25 %, 60 dB.
     CloseModes,
     /// Frequencies that change with the amplitude by 10^-5 to 6 % along the decay.
     Drift,
@@ -37,7 +37,7 @@ pub enum Cell {
     Rails80,
     /// Responses that end at 0.5 of their peak.
     Rails50,
-    /// Records that keep 10 to 75 % of their amplitude.
+    /// Records that end where the slowest mode keeps 10 to 75 % of its amplitude, but not before 0.45 s.
     Undecayed,
     /// WAV files of 16 bits of which the peak uses 1 to 90 %.
     SixteenBit,
@@ -81,7 +81,7 @@ impl Cell {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Noise {
     White,
-    /// White noise through a pole at 0.9: 20 dB more at the lowest than at the highest frequencies.
+    /// White noise through a pole at 0.9: 26 dB more at the lowest than at the highest frequencies.
     Red,
     /// Differences of white noise.
     Blue,

@@ -211,9 +211,14 @@ pub fn template_of(kind: Assembly, files: &[FoundRecording]) -> String {
             &instruments[head.len() + "\n[hammer]".len()..]
         ),
     };
+    // Functions are of the first sensor.
+    let names = instruments.split("[[sensor]]\nname = ").nth(1);
+    let sensor = names
+        .and_then(|text| text.lines().next())
+        .unwrap_or("\"A\"");
     let mut tables = String::new();
     for (at, found) in files.iter().enumerate() {
-        tables.push_str(&recording_found(found));
+        tables.push_str(&recording_found(found, sensor));
         // The comments on all other keys stand once.
         if at == 0 {
             let others = comments
@@ -320,8 +325,8 @@ fn title(channel: &FoundChannel) -> String {
     parts.join(", ").replace(char::is_control, " ")
 }
 
-/// Returns the table of a recording as found.
-fn recording_found(found: &FoundRecording) -> String {
+/// Returns the table of a recording as found; `sensor` is the name of the functions' sensor as TOML has it.
+fn recording_found(found: &FoundRecording, sensor: &str) -> String {
     let mut text = format!(
         "{RECORDING}\nfile = {}\n",
         toml::Value::from(found.file.as_str())
@@ -356,7 +361,7 @@ fn recording_found(found: &FoundRecording) -> String {
                     "form = \"accelerance\"           # the file does not say: or \"mobility\", \"receptance\"\n"
                 }
             };
-            text += "sensor = \"A\"\n";
+            text += &format!("sensor = {sensor}\n");
         }
         FoundContent::Unread(problem) => {
             let problem = problem.replace(char::is_control, " ");

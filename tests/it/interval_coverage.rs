@@ -36,14 +36,11 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
             .iter()
             .filter(|answer| answer.is_inside() == Some(true));
         let inside = inside.count() as u64;
-        // So few inside by chance where 93 % hold the truth, so many where 97 % do: both improbable.
+        // So few inside by chance where 93 % hold the truth. A hundred modes show gross errors alone: a coverage of
+        // 85 % is seen in one draw of three. The long run is the example's.
         let few = Binomial::new(0.93, found).unwrap().cdf(inside);
-        let many = match inside {
-            0 => 1.0,
-            _ => Binomial::new(0.97, found).unwrap().sf(inside - 1),
-        };
         assert!(
-            few > CHANCE && many > CHANCE,
+            few > CHANCE,
             "{}: {inside} of {found} intervals hold the truth",
             cell.name()
         );

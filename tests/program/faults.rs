@@ -107,7 +107,8 @@ fn recover_signals_leave_nothing_and_kills_are_swept() {
     assert!(made.unwrap().success());
     for (signal, code) in [("HUP", 129), ("INT", 130), ("TERM", 143), ("KILL", -1)] {
         // The picture's temporary file is made; then the program waits for a reader of the pipe.
-        // Under `nohup` and in the background of a shell some signals are turned off, and would stay so.
+        // Under `nohup` and in the background of a shell some signals are turned off, and would stay so. This option
+        // of `env` is that of GNU coreutils from 8.31 on.
         let mut command = Command::new("env");
         command.arg("--default-signal=HUP,INT,TERM").arg(program());
         command.current_dir(folder.path()).stdout(Stdio::null());

@@ -107,7 +107,7 @@ impl Role {
             Self::Phase
         } else if word == "im" || holds(&["imag"]) {
             Self::Imaginary
-        } else if word == "re" || word == "real" {
+        } else if word == "re" || holds(&["real"]) {
             Self::Real
         } else if matches!(word, "mag" | "amp" | "abs" | "db" | "level" | "gain")
             || holds(&[
@@ -126,6 +126,12 @@ impl Role {
             Self::Unnamed
         }
     }
+}
+
+/// Returns true for a heading that holds this word.
+fn has_word(heading: &str, word: &str) -> bool {
+    let mut words = heading.split(|c: char| !c.is_alphanumeric());
+    words.any(|own| own == word)
 }
 
 /// Returns true for a heading that means a function of frequency.
@@ -184,7 +190,8 @@ impl FunctionTable {
         let scale = unit.as_ref().map_or(1.0, |(_, scale, _)| *scale);
         let (reference, response) = self.points();
         let mut warnings = Vec::new();
-        let coherence = self.coherence(&roles, &mut warnings);
+        let coherences = self.coherences(&roles, arrangements.len(), &mut warnings);
+        let mut coherences = coherences.into_iter();
         let mut has_phase = true;
         let mut responses = Vec::with_capacity(arrangements.len());
         for arrangement in &arrangements {
@@ -206,7 +213,7 @@ impl FunctionTable {
                 form: unit.as_ref().map(|(.., form)| *form),
                 unit: unit.as_ref().map(|(written, ..)| written.clone()),
                 values,
-                coherence: coherence.clone(),
+                coherence: coherences.next(),
             });
         }
         Ok(FrequencyResponses {
@@ -267,8 +274,17 @@ impl FunctionTable {
             }
             _ => {}
         }
-        if let (Some(real), Some(imaginary)) = (of(Role::Real).next(), of(Role::Imaginary).next()) {
-            return Ok(vec![Arrangement::Parts { real, imaginary }]);
+        let [reals, imaginaries] =
+            [Role::Real, Role::Imaginary].map(|role| of(role).collect::<Vec<_>>());
+        let apart = "the headings do not say which columns belong together";
+        if !reals.is_empty() || !imaginaries.is_empty() {
+            // Magnitude and phase beside them say the same again.
+            if reals.len() != imaginaries.len() || of(Role::Unnamed).next().is_some() {
+                return Err(self.wrong(apart));
+            }
+            let pairs = reals.into_iter().zip(imaginaries);
+            let parts = pairs.map(|(real, imaginary)| Arrangement::Parts { real, imaginary });
+            return Ok(parts.collect());
         }
         let mut magnitudes: Vec<usize> = of(Role::Magnitude).collect();
         let phases: Vec<usize> = of(Role::Phase).collect();
@@ -276,6 +292,8 @@ impl FunctionTable {
         if magnitudes.is_empty() && unnamed.len() == 1 {
             // One value beside a frequency, a phase or a coherence is the magnitude.
             magnitudes.clone_from(&unnamed);
+        } else if !magnitudes.is_empty() && !unnamed.is_empty() {
+            return Err(self.wrong(apart));
         }
         match (magnitudes.as_slice(), phases.as_slice(), unnamed.as_slice()) {
             ([magnitude], [phase], _) => Ok(vec![polar(*magnitude, Some(*phase))]),
@@ -297,7 +315,7 @@ impl FunctionTable {
                     "there are {count} columns and no heading says what they are"
                 )))
             }
-            _ => Err(self.wrong("the headings do not say which columns belong together")),
+            _ => Err(self.wrong(apart)),
         }
     }
 
@@ -340,7 +358,7 @@ impl FunctionTable {
                     .contains(&unit)
                     .then(|| unit.to_owned())
             });
-            [cells.unwrap_or_default(), below.unwrap_or_default()].concat()
+            [cells.unwrap_or_default(), below.unwrap_or_default()].join(" ")
         };
         let negative = levels.iter().position(|level| *level < 0.0);
         let in_decibels = match stated {
@@ -356,7 +374,7 @@ impl FunctionTable {
                     return Err(RecordingError::at_line(&self.file, self.lines[at], problem));
                 }
             },
-            None if heading(magnitude).contains("db") => true,
+            None if has_word(&heading(magnitude), "db") => true,
             None => {
                 let message = match negative {
                     Some(_) => None,
@@ -378,6 +396,9 @@ impl FunctionTable {
             );
             return Err(RecordingError::at_line(&self.file, self.lines[at], problem));
         }
+        // A power is the square of the magnitude; in dB both are one number.
+        let marks = ["psd", "power", "autospect", "/hz"];
+        let is_power = !in_decibels && marks.iter().any(|mark| heading(magnitude).contains(mark));
         let to_radians = phase.map_or(0.0, |column| {
             let heading = heading(column);
             let largest = self.columns[column]
@@ -387,8 +408,17 @@ impl FunctionTable {
                 Some(ValueColumns::DecibelDegrees) => true,
                 _ if heading.contains("deg") || heading.contains('\u{b0}') => true,
                 _ if heading.contains("rad") => false,
-                // Beyond a turn in radians; the hundredth is for printed digits.
-                _ => largest > PI + 0.01,
+                // Beyond half a turn in radians; the hundredth is for printed digits.
+                _ => {
+                    if (PI + 0.01..2.0 * TAU).contains(&largest) {
+                        let message = format!(
+                            "column {} is taken as a phase in degrees: its heading has no unit; write (rad) into it if these are radians beyond half a turn",
+                            column + 2
+                        );
+                        warnings.push(RecordingWarning::new("values-assumed", message));
+                    }
+                    largest > PI + 0.01
+                }
             };
             if in_degrees { TAU / 360.0 } else { 1.0 }
         });
@@ -396,6 +426,7 @@ impl FunctionTable {
         let values = levels.iter().enumerate().map(|(at, level)| {
             let size = match in_decibels {
                 true => 10_f64.powf(level / 20.0),
+                false if is_power => level.sqrt(),
                 false => *level,
             };
             let phase = phases.map_or(0.0, |phases| phases[at]);
@@ -404,19 +435,27 @@ impl FunctionTable {
         Ok(values.collect())
     }
 
-    /// Returns the column of the coherence, where there is a usable one.
-    fn coherence(&self, roles: &[Role], warnings: &mut Vec<RecordingWarning>) -> Option<Vec<f64>> {
-        let column = roles.iter().position(|role| *role == Role::Coherence)?;
-        let values = &self.columns[column];
-        if all_within_coherence(values) {
-            return Some(values.clone());
+    /// Returns the columns of the coherence in the order of the functions; none where they are not usable.
+    fn coherences(
+        &self,
+        roles: &[Role],
+        functions: usize,
+        warnings: &mut Vec<RecordingWarning>,
+    ) -> Vec<Vec<f64>> {
+        let columns = roles.iter().zip(&self.columns);
+        let found = columns.filter(|(role, _)| **role == Role::Coherence);
+        let mut found: Vec<Vec<f64>> = found.map(|(_, values)| values.clone()).collect();
+        let are_usable =
+            found.len() == functions && found.iter().all(|one| all_within_coherence(one));
+        if !found.is_empty() && !are_usable {
+            let message = "the coherence is left out: it has not one column for each function, or a value is not between 0 and 1; export it again if it is needed";
+            warnings.push(RecordingWarning::new(
+                "coherence-left-out",
+                message.to_owned(),
+            ));
+            found.clear();
         }
-        let message = "the column of the coherence is left out: its values are not all between 0 and 1; export it again if it is needed";
-        warnings.push(RecordingWarning::new(
-            "coherence-left-out",
-            message.to_owned(),
-        ));
-        None
+        found
     }
 
     /// Reads reference and response from a line such as "Ref Chan:Resp Chan", "1+Z:3+Z".

@@ -118,13 +118,14 @@ pub(super) fn open_functions(
     let mut all: Option<FrequencyResponses> = None;
     for (number, segment) in (1..).zip(segments) {
         let first_line = segment.first_line();
-        let mut read = segment.function_table(&file).read(settings)?;
+        let mut read = segment.function_table(&file)?.read(settings)?;
         let Some(all) = &mut all else {
             all = Some(read);
             continue;
         };
         let same = all.lines == read.lines
             && (all.spacing - read.spacing).abs() <= SAME_RATE * all.spacing
+            && (all.first_frequency - read.first_frequency).abs() <= SAME_RATE * all.spacing
             && all.has_phase == read.has_phase;
         if !same {
             let problem = format!(
@@ -136,6 +137,7 @@ pub(super) fn open_functions(
             response.name = format!("{} ({number})", response.name);
         }
         all.responses.append(&mut read.responses);
+        all.warnings.append(&mut read.warnings);
     }
     all.ok_or_else(|| RecordingError::no_samples(&file))
 }
@@ -291,14 +293,20 @@ impl Segment {
         taken.collect()
     }
 
-    /// The columns as functions of frequency.
-    fn function_table(self, file: &str) -> FunctionTable {
+    /// Returns the columns as functions of frequency.
+    ///
+    /// # Errors
+    /// Neither a column of frequencies nor a step of them.
+    fn function_table(self, file: &str) -> Result<FunctionTable, RecordingError> {
         let channels = self.channels();
         let frequencies = match self.columns.first() {
             Some(x) if is_x(&self.names[0]) && x.len() == self.rows() => x.clone(),
             _ => {
                 let first = self.number("X0").unwrap_or(0.0);
-                let step = self.number("Delta_X").unwrap_or(1.0);
+                let step = self.number("Delta_X").ok_or_else(|| {
+                    let problem = "the segment has neither a column X_Value nor Delta_X: its frequencies are not known; export one of them";
+                    RecordingError::at_line(file, self.first_line(), problem.to_owned())
+                })?;
                 (0..self.rows())
                     .map(|line| first + step * line as f64)
                     .collect()
@@ -306,7 +314,7 @@ impl Segment {
         };
         let mut headings = vec!["Frequency".to_owned()];
         headings.extend(channels.iter().map(|at| self.names[*at].clone()));
-        FunctionTable {
+        Ok(FunctionTable {
             file: file.to_owned(),
             frequencies,
             columns: channels
@@ -315,7 +323,7 @@ impl Segment {
                 .collect(),
             header: vec![headings],
             lines: self.lines,
-        }
+        })
     }
 }
 

@@ -31,6 +31,9 @@ const MOST_EXPANSION: usize = 32;
 /// Bytes that any file may expand to.
 const LEAST_ROOM: usize = 1 << 16;
 
+/// Longest name of a variable, with those of the structures around it (bytes). MATLAB allows 63 for each.
+const MOST_NAME: usize = 256;
+
 /// Structures within structures that are followed.
 const MOST_DEPTH: usize = 4;
 
@@ -775,6 +778,15 @@ impl<'a> Elements<'a> {
             .filter(|c| !c.is_control())
             .collect();
         let name = [prefix, &own].concat();
+        if name.len() > MOST_NAME {
+            return Err(self.error(
+                0,
+                &format!(
+                    "a name of {} bytes; allowed: at most {MOST_NAME}",
+                    name.len()
+                ),
+            ));
+        }
         if class == "structure" && sizes.iter().all(|size| *size == 1) && depth < MOST_DEPTH {
             return self.fields(&name, depth, into);
         }

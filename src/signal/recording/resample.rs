@@ -22,7 +22,7 @@ const TABLE_STEPS: usize = 1024;
 /// Passes that add what is missing. Steps of 2 % leave 5 % of a sine at the band's end, so each pass takes some 26 dB.
 const PASSES: usize = 4;
 
-/// Most samples on which the effect is measured; steps deviate there as elsewhere.
+/// Most samples on which the effect is measured: those about the step that deviates most.
 const MEASURED: usize = 1 << 16;
 
 /// Highest frequency shown of a rate: the analysers' 2.56.
@@ -80,7 +80,14 @@ pub(super) fn resample(times: &[f64], channels: &[Vec<f64>], deviation: f64) -> 
 
 /// Returns the largest error of sine and cosine at the band's end (dB of their amplitude), away from the ends.
 fn error_at_band_end(places: &[f64], kernel: &Kernel) -> f64 {
+    let steps = places
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0] - 1.0).abs());
+    let worst = steps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = worst.map_or(0, |(at, _)| at);
     let count = places.len().min(MEASURED);
+    let start = worst.saturating_sub(MEASURED / 2).min(places.len() - count);
+    let places = &places[start..];
     let origin = places.first().copied().unwrap_or(0.0);
     let last = places[..count].last().copied().unwrap_or(0.0);
     // Part of the grid of its own, so that its points are as many as the samples.

@@ -261,7 +261,7 @@ pub(super) fn parse_fortran(text: &[u8]) -> Option<f64> {
 const TOLERANCE: f64 = 1e-3;
 
 /// The same where samples are resampled: far below the half step from which on neighbours could not be told from a
-/// lost sample, and small enough for the resampling to converge in three passes.
+/// lost sample, and small enough for the resampling to converge in a few passes.
 const RESAMPLED: f64 = 0.02;
 
 /// A rate this near to a whole number, relatively, may be that whole number: a tenth of the

@@ -250,7 +250,7 @@ impl CsvSource {
                 return Ok(given);
             }
             return Err(self.error(format!(
-                "the first column rises evenly, as a time of {by_column} Hz, and sample_rate states {given} Hz; allowed: two that agree, in s, ms or us; correct sample_rate, or give the columns headings"
+                "the first column rises evenly, as a time of {by_column} Hz, and sample_rate states {given} Hz; allowed: two that agree, in s, ms, us or ns; correct sample_rate, or give the columns headings"
             )));
         }
         if counts {

@@ -364,3 +364,40 @@ fn limit_columns_that_are_not_clear_are_asked_for() {
         &["two"],
     );
 }
+
+#[test]
+fn regress_headings_decide_which_columns_belong_together() {
+    let table = |header: &str, row: &str| {
+        let rows: String = (1..40).map(|line| format!("{line},{row}\n")).collect();
+        format!("{header}\n{rows}")
+    };
+    let found = functions(&table("Frequency (Hz),FRF real,FRF imag", "-3,4"), None).unwrap();
+    assert!(found.has_phase);
+    assert_eq!(
+        found.responses[0].values[0],
+        num_complex::Complex64::new(-3.0, 4.0)
+    );
+    let found = functions(&table("Hz,Re 1,Im 1,Re 2,Im 2", "1,2,3,4"), None).unwrap();
+    assert_eq!(found.responses.len(), 2);
+    assert_eq!(
+        found.responses[1].values[0],
+        num_complex::Complex64::new(3.0, 4.0)
+    );
+    let apart = table("Hz,Re 1,Im 1,Re 2", "1,2,3");
+    assert_message(
+        &functions(&apart, None).unwrap_err(),
+        "tested.txt:2: the headings do not say",
+        &["allowed"],
+    );
+    // Each function has its own coherence, and a power is a square.
+    let header = "Hz,Mag 1,Phase 1,Coh 1,Mag 2,Phase 2,Coh 2";
+    let found = functions(&table(header, "1,0,0.25,1,0,0.75"), None).unwrap();
+    let coherences: Vec<f64> = found
+        .responses
+        .iter()
+        .map(|one| one.coherence.as_ref().unwrap()[0])
+        .collect();
+    assert_eq!(coherences, [0.25, 0.75]);
+    let found = functions(&table("Hz,PSD ((m/s2)^2/Hz)", "9"), None).unwrap();
+    assert_eq!(found.responses[0].values[0].re, 3.0);
+}

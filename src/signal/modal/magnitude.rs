@@ -9,6 +9,7 @@ use super::peaks::{CompositeLevel, Peak};
 use super::reading::{Interpolation, ModeReading, NoInterpolation, PeakLabel, reading};
 use crate::spectral::Lines;
 use nalgebra::{DMatrix, DVector};
+use tapjoint_numerics::stats::student;
 
 /// Unknowns of the quotient.
 const UNKNOWNS: usize = 5;
@@ -134,15 +135,20 @@ fn fit(power: &[f64], peak: usize, reach: usize) -> Option<Pole> {
     let stride = reach.div_ceil(MOST_LINES);
     let steps = (reach / stride) as i64;
     let scale = power[peak];
+    // Distances are parts of the reach: of lines, the unknowns would differ by many powers of ten.
+    let unit = reach as f64;
     let mut points = Vec::with_capacity(2 * steps as usize + 1);
     for step in -steps..=steps {
-        let u = step as f64 * stride as f64;
+        let u = step as f64 * stride as f64 / unit;
         let line = peak as i64 + step * stride as i64;
         let value = power[usize::try_from(line).ok()?] / scale;
         // A line without power has no level that could weigh.
         points.push((u, value.max(1e-12)));
     }
-    let (mut c1, mut c0) = (0.0, 1.0);
+    if !points.iter().all(|(_, value)| value.is_finite()) {
+        return None;
+    }
+    let (mut c1, mut c0) = (0.0, 1.0 / (unit * unit));
     let mut covariance = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for _ in 0..REWEIGHTINGS {
         let rows = points.len();
@@ -150,7 +156,7 @@ fn fit(power: &[f64], peak: usize, reach: usize) -> Option<Pole> {
         let mut right = DVector::zeros(rows);
         for (row, (u, value)) in points.iter().enumerate() {
             // Noise beside the response: the squared magnitude scatters with its root.
-            let weight = 1.0 / ((u * u + c1 * u + c0).abs().max(1e-9) * value.sqrt());
+            let weight = 1.0 / ((u * u + c1 * u + c0).abs().max(1e-12) * value.sqrt());
             let terms = [value * u, *value, -1.0, -u, -u * u];
             for (column, term) in terms.into_iter().enumerate() {
                 matrix[(row, column)] = weight * term;
@@ -179,11 +185,13 @@ fn fit(power: &[f64], peak: usize, reach: usize) -> Option<Pole> {
             width_variance += a * b * covariance[(row, column)];
         }
     }
+    // So many standard deviations are 95 % by Student's distribution where few lines tell the noise; two of many.
+    let widened = 0.5 * student::quantile(0.05, (points.len() - UNKNOWNS) as f64);
     Some(Pole {
-        place,
-        place_std: 0.5 * covariance[(0, 0)].max(0.0).sqrt(),
-        width,
-        width_std: width_variance.max(0.0).sqrt(),
+        place: unit * place,
+        place_std: widened * unit * 0.5 * covariance[(0, 0)].max(0.0).sqrt(),
+        width: unit * width,
+        width_std: widened * unit * width_variance.max(0.0).sqrt(),
     })
 }
 

@@ -63,24 +63,23 @@ pub(super) struct Candidates<'a> {
     pub data: &'a ModalData,
     /// Result of the polyreference fit.
     pub stabilisation: &'a Stabilisation,
+    /// Frequencies of mains hum (Hz).
+    pub hum: Vec<f64>,
 }
 
 impl Candidates<'_> {
     /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
     pub fn fit(&self, readings: &mut Vec<ModeReading>) {
-        let labels = readings.iter().filter_map(|reading| reading.label);
-        let mains = labels.filter_map(|label| match label {
-            PeakLabel::Mains(harmonic) => Some(harmonic),
-            _ => None,
-        });
         let settings = FitSettings {
-            steady_lines: mains.collect(),
+            steady_lines: self.hum.clone(),
             ..FitSettings::default()
         };
         let proposed = all_modes(&self.stabilisation.searches);
         let (mut starts, peaks, extras) = self.starts(readings, &proposed);
         let (mut accepted, mut fits) = Accepted::new(self.data, &starts, &settings);
         let mut added = Vec::new();
+        // Pairs of poles for which the data ask where one mode is listed.
+        let mut pairs = Vec::new();
         for extra in extras.into_iter().take(MOST_EXTRA) {
             let start = start_of(extra);
             let (test, together) = accepted.test(&start);
@@ -88,11 +87,47 @@ impl Candidates<'_> {
                 starts.push(start);
                 added.push(extra);
                 accepted = together;
+            } else if let (true, Ok(fit), Some(neighbour)) = (test.needed, test.fit, test.neighbour)
+                && self.may_be_added(&fit)
+            {
+                pairs.push([fit, neighbour]);
             }
         }
         let peaks_alone = starts.len() - added.len();
         if !added.is_empty() {
             fits = self.settled(&mut starts, &mut added, &settings);
+        }
+        for fit in fits.iter().flatten().filter(|fit| fit.inflation > 1.0) {
+            // One pole leaves more than noise, and no search proposed a second: it is looked for half a width away.
+            let (frequency, ratio) = (fit.frequency.value, fit.damping_ratio.value);
+            let near = |pole: &ModeFit| {
+                (pole.frequency.value - frequency).abs() < APART * ratio * frequency
+            };
+            let known = pairs.iter().flatten().any(near);
+            for side in [-0.5, 0.5].iter().filter(|_| !known) {
+                let (test, _) = accepted.test(&PoleStart {
+                    frequency: frequency * (1.0 + side * ratio),
+                    damping_ratio: Some(ratio),
+                });
+                if let (true, Ok(extra), Some(neighbour)) = (test.needed, test.fit, test.neighbour)
+                {
+                    pairs.push([extra, neighbour]);
+                    break;
+                }
+            }
+        }
+        for [one, other] in &pairs {
+            let distance = |fit: &ModeFit| {
+                let frequency = fit.frequency.value;
+                (frequency - one.frequency.value)
+                    .abs()
+                    .min((frequency - other.frequency.value).abs())
+            };
+            let nearest = fits.iter_mut().flatten();
+            let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some(fit) = nearest {
+                fit.widen_to([one, other]);
+            }
         }
         let (of_peaks, of_added) = fits.split_at(peaks_alone);
         for (index, fit) in peaks.into_iter().zip(of_peaks) {
@@ -293,12 +328,13 @@ impl FreeDecays {
     }
 
     /// Fits the decays, and puts into the readings the fits with what else the decays give: modal constants, and
-    /// frequency and damping against amplitude.
+    /// frequency and damping against amplitude. `hum`: frequencies of mains hum (Hz).
     pub(super) fn fit(
         &self,
         readings: &mut Vec<ModeReading>,
         lines: &Lines,
         kinds: &[Option<ResponseForm>],
+        hum: Vec<f64>,
     ) -> Stabilisation {
         let functions = self.functions();
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
@@ -308,6 +344,7 @@ impl FreeDecays {
             lines,
             data: &self.data,
             stabilisation: &stabilisation,
+            hum,
         };
         candidates.fit(readings);
         let fitted: Vec<&mut FittedReading> = readings

@@ -189,6 +189,7 @@ fn spectra_of_functions(
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
+            hum: Vec::new(),
         };
         candidates.fit(&mut readings);
         // There are modal constants where the form of every function is known.

@@ -302,7 +302,10 @@ impl<'a> Stage<'a> {
         let (averages, transforms) = self.averages(window)?;
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = match self.free_decays()? {
-            Some(decays) => decays.fit(&mut readings, &self.lines, &self.settings.kinds),
+            Some(decays) => {
+                let hum = quiet.hum_beside(&readings, &self.lines, &self.settings.mains);
+                decays.fit(&mut readings, &self.lines, &self.settings.kinds, hum)
+            }
             None => Stabilisation::default(),
         };
         for reading in &mut readings {
@@ -494,6 +497,11 @@ impl<'a> Stage<'a> {
     }
 }
 
+/// Hum is looked for within so many half widths of a resonance and so many lines: the band of its fit.
+const HUM_REACH: (f64, f64) = (10.0, 12.0);
+/// Most multiples of the mains frequency that are looked for near one resonance. A damped one at 5 kHz has more.
+const MOST_HARMONICS: usize = 40;
+
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
 struct PreTriggerNoise {
     /// Force, where there is a hammer.
@@ -575,6 +583,42 @@ impl PreTriggerNoise {
             noise: noise_beside(samples, self.sample_rate, frequency)?,
         };
         mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
+    }
+
+    /// Returns the multiples of 50 and 60 Hz (Hz) near the readings that were there before the taps, in any response.
+    ///
+    /// Under the peak of a resonance hum makes no peak of its own, and has no label. A fit without it would be wrong.
+    fn hum_beside(
+        &self,
+        readings: &[ModeReading],
+        lines: &Lines,
+        settings: &MainsSettings,
+    ) -> Vec<f64> {
+        let mut found = Vec::new();
+        for reading in readings {
+            if let Some(PeakLabel::Mains(harmonic)) = reading.label {
+                found.push(harmonic);
+                continue;
+            }
+            let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
+            let reach = HUM_REACH.0 * width + HUM_REACH.1 * 2.0 * lines.half_line();
+            for mains in [50.0, 60.0] {
+                let first = ((reading.frequency - reach) / mains).ceil().max(1.0) as usize;
+                let last = ((reading.frequency + reach) / mains).floor().max(0.0) as usize;
+                let harmonics = (first..=last).take(MOST_HARMONICS);
+                found.extend(harmonics.map(|number| mains * number as f64));
+            }
+        }
+        found.sort_by(f64::total_cmp);
+        found.dedup();
+        found.retain(|&harmonic| {
+            self.responses.iter().any(|samples| {
+                let before = line_amplitude(samples, self.sample_rate, harmonic);
+                let noise = noise_beside(samples, self.sample_rate, harmonic);
+                (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)
+            })
+        });
+        found
     }
 
     /// Sum and sum of squares of the window over a block.

@@ -113,9 +113,14 @@ impl Files {
     /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
-    /// The output is an input, a folder, or a file that the program did not make.
+    /// The output is `-`, an input, a folder, or a file that the program did not make.
     fn check_output(&self, path: &Path, option: &str) -> anyhow::Result<()> {
         let shown = path.display();
+        if path == Path::new("-") {
+            bail!(
+                "{option} -: only --json - writes to standard output; give the name of a file, or /dev/stdout"
+            );
+        }
         if path.is_dir() {
             bail!(
                 "{shown}: is a folder, but a file is needed ({option}); move it away, or give another name"

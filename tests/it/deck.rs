@@ -159,7 +159,7 @@ fn regress_reports_with_values_that_no_report_has_are_refused() {
         ),
         (
             format!("{{\"estimate\": {{{joint}, \"beam\": {{\"length\": \"long\"}}}}}}"),
-            "`estimate.beam.length` is \"long\"; allowed: a positive number",
+            "`estimate.beam.length` is \"long\"; allowed: a hundredth to a hundred times what the description says",
         ),
         (
             format!("{{\"estimate\": {{{joint}}}, \"prediction\": {many}}}"),
@@ -167,7 +167,7 @@ fn regress_reports_with_values_that_no_report_has_are_refused() {
         ),
         (
             format!("{{\"estimate\": {{{joint}, \"beam\": {{\"length\": 1e-200}}}}}}"),
-            "Hz; allowed: positive finite frequencies",
+            "`estimate.beam.length` is 1e-200; allowed: a hundredth to a hundred times",
         ),
     ];
     for (text, words) in cases {

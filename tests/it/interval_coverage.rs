@@ -25,6 +25,9 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
         Cell::HeavyDamping,
         Cell::SixteenBit,
         Cell::ExponentialWindow,
+        Cell::CloseModes,
+        Cell::Hum,
+        Cell::TwoTaps,
     ];
     for cell in cells {
         let answers = answers(cell, 100);
@@ -44,6 +47,11 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
             "{}: {inside} of {found} intervals hold the truth",
             cell.name()
         );
+        // Two values that scatter tell their standard deviation from one difference: Student's t with one degree of
+        // freedom lies beyond three standard deviations of the same 95 % interval in 3 % of all cases.
+        if cell == Cell::TwoTaps {
+            continue;
+        }
         let far = answers
             .iter()
             .filter(|answer| answer.deviations() > Some(3.0));

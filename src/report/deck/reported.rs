@@ -204,11 +204,11 @@ fn all_limits(estimate: &Value) -> Vec<String> {
 /// Returns the described beam with the properties that the report estimates.
 fn reported_beam(estimate: &Value, described: &Beam) -> Result<Beam, ReportError> {
     let mut beam = *described;
-    if let Some(modulus) = positive(estimate, "modulus.value")? {
+    if let Some(modulus) = beam_value(estimate, "modulus.value", described.modulus)? {
         beam.modulus = modulus;
     }
     // A free beam's closed form gives its modulus, or else its density, never both.
-    if let Some(density) = positive(estimate, "density.value")?
+    if let Some(density) = beam_value(estimate, "density.value", described.density)?
         && estimate["method"] != "free-beam"
     {
         beam.density = density;
@@ -220,11 +220,19 @@ fn reported_beam(estimate: &Value, described: &Beam) -> Result<Beam, ReportError
         ("beam.modulus", &mut beam.modulus),
         ("beam.density", &mut beam.density),
     ] {
-        if let Some(value) = positive(estimate, path)? {
+        if let Some(value) = beam_value(estimate, path, *property)? {
             *property = value;
         }
     }
     Ok(beam)
+}
+
+/// Returns a property of the reported beam. A beam much unlike the described one is another structure, and numbers near
+/// the end of their range have no natural frequencies.
+fn beam_value(estimate: &Value, path: &str, described: f64) -> Result<Option<f64>, ReportError> {
+    let allowed = "a hundredth to a hundred times what the description says";
+    let near = 0.01 * described..=100.0 * described;
+    number(estimate, path, allowed, |x| near.contains(&x))
 }
 
 /// Returns the joint of a report, non-dimensional by its beam; `None` where a stiffness is unknown.
@@ -265,17 +273,12 @@ fn reported_stiffness(estimate: &Value, key: &str) -> Result<Option<f64>, Report
     }
 }
 
-/// Returns the positive number at a path of keys below the estimate; `None` where it is missing or null.
-fn positive(estimate: &Value, path: &str) -> Result<Option<f64>, ReportError> {
-    number(estimate, path, "a positive number", |x| x > 0.0)
-}
-
 /// Returns the number at a path of keys below the estimate; `None` where it is missing or null.
 fn number(
     estimate: &Value,
     path: &str,
     allowed: &'static str,
-    is_allowed: fn(f64) -> bool,
+    is_allowed: impl Fn(f64) -> bool,
 ) -> Result<Option<f64>, ReportError> {
     // Characters of a value that a message shows.
     const SHOWN: usize = 40;

@@ -198,6 +198,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
     let interval = fit.map_or(MISSING, |fit| match fit.uncertainty_from {
         UncertaintySource::Residual => "residual",
         UncertaintySource::TapScatter => "taps",
+        UncertaintySource::TwoPoles => "two poles",
     });
     // The damping ratio (%) with its standard deviation.
     let std = mode.damping_std.map(|std| 100.0 * std);

@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use tapjoint_numerics::stats::chi_square_tail;
 
 use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes};
-use super::{FitSettings, ModalData, PoleStart, StopReason, Unfit};
+use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 use crate::modal::Subspace;
 
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
@@ -34,6 +34,11 @@ const TERM_LEVEL: f64 = 0.05;
 /// Largest error of a sensor's noise power before the weights are set anew. 20 %: that costs less than a
 /// percent of the precision, and a short band does not know its noise better.
 const NOISE_CHANGE: f64 = 0.2;
+
+/// Two modes share at least so much of their taps' powers: 1 where every tap excites them in the same proportion.
+const SAME_TAPS: f64 = 0.5;
+/// Likeness from which two shapes count as one.
+const SAME_SHAPE: f64 = 0.9;
 
 /// Effective half width of a pole (lines): its decay, and half a line where that is less.
 pub(super) fn half_width(pole: Complex64) -> f64 {
@@ -357,6 +362,69 @@ impl GroupFit {
         all
     }
 
+    /// Returns the place of the pole nearest to that at `place`; `None` without another.
+    pub fn nearest(&self, place: usize) -> Option<usize> {
+        let poles = &self.at.poles;
+        let distance = |other: &usize| (poles[*other] - poles[place]).norm();
+        let others = (0..poles.len()).filter(|other| *other != place);
+        others.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Returns the likeness of the shapes of two poles, in units of noise; `None` with one sensor.
+    ///
+    /// It is sum_tu |sum_s conj(b_ts) c_us|^2/(sum_t sum_s |b_ts|^2 sum_u sum_s |c_us|^2) over all pairs of taps t, u and
+    /// sensors s. Each tap excites the two in a proportion of its own where one mode moves from tap to tap. Frequency
+    /// response functions count as one tap: the places of their taps are part of a shape.
+    pub fn likeness(&self, data: &ModalData, one: usize, other: usize) -> Option<f64> {
+        let as_one = matches!(data.basis(), Basis::FrequencyResponse { .. });
+        let taps: Vec<usize> = (self.used.iter())
+            .map(|&column| data.columns()[column].tap)
+            .collect();
+        let columns: Vec<usize> = (0..taps.len()).collect();
+        let shapes = columns.chunk_by(|&a, &b| as_one || taps[a] == taps[b]);
+        let shapes: Vec<&[usize]> = shapes.filter(|shape| shape.len() > 1).collect();
+        let (mut alike, mut whole) = (0.0, 0.0);
+        for mine in &shapes {
+            for theirs in shapes.iter().filter(|theirs| theirs.len() == mine.len()) {
+                let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
+                for (&a, &b) in mine.iter().zip(*theirs) {
+                    let (own, other) = (self.amplitude(one, a), self.amplitude(other, b));
+                    product += own.conj() * other;
+                    own_power += own.norm_sqr();
+                    other_power += other.norm_sqr();
+                }
+                alike += product.norm_sqr();
+                whole += own_power * other_power;
+            }
+        }
+        (whole > 0.0).then(|| alike / whole)
+    }
+
+    /// Returns true where two poles are one mode that rings at another frequency after some of the taps: they have one
+    /// shape, but not the same taps excite them. A tap excites two modes beside each other in the same proportion
+    /// always.
+    fn is_one_mode(&self, data: &ModalData, one: usize, other: usize) -> bool {
+        let taps = data.columns().iter().map(|column| column.tap + 1).max();
+        let taps = taps.unwrap_or(0);
+        if matches!(data.basis(), Basis::FrequencyResponse { .. }) || taps < 2 {
+            return false;
+        }
+        let mut powers = vec![[0.0; 2]; taps];
+        for (index, &column) in self.used.iter().enumerate() {
+            let power = &mut powers[data.columns()[column].tap];
+            power[0] += self.amplitude(one, index).norm_sqr();
+            power[1] += self.amplitude(other, index).norm_sqr();
+        }
+        let whole = powers.iter().fold([0.0, 0.0], |sum, power| {
+            [sum[0] + power[0], sum[1] + power[1]]
+        });
+        let shares = powers
+            .iter()
+            .map(|power| (power[0] / whole[0]).min(power[1] / whole[1]));
+        let alike = self.likeness(data, one, other);
+        shares.sum::<f64>() < SAME_TAPS && alike.is_none_or(|alike| alike > SAME_SHAPE)
+    }
+
     /// Standard deviations of position and decay of each pole (lines), from the residual.
     ///
     /// NaN where two poles cannot be separated.
@@ -616,6 +684,13 @@ impl Accepted<'_> {
                 && refused.as_ref().is_none_or(|(other, _)| index >= *other)
             {
                 refused = Some((index, reason));
+            }
+        }
+        for (place, &index) in members.iter().enumerate() {
+            let mut before = 0..place;
+            if refused.is_none() && before.any(|other| fit.is_one_mode(self.data, other, place)) {
+                let later = members[..place].iter().fold(index, |a, &b| a.max(b));
+                refused = Some((later, Unfit::NotIndependent));
             }
         }
         if let Some((index, reason)) = refused {

@@ -12,17 +12,30 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, Matrix2};
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-use tapjoint_numerics::stats::{chi_square_tail, root_mean_square, student};
+use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail, root_mean_square, student};
 
-use super::group::{Accepted, BandData, Group, GroupFit, ModeState, complex_row};
+use super::group::{Accepted, BandData, Group, GroupFit, ModeState, complex_row, half_width};
+use super::variable_projection::PoleProblem;
 use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
-/// A scatter of the taps less probable than this is more than noise.
-const SCATTER_LEVEL: f64 = 0.01;
+/// The taps scatter beyond noise where the scatter of all modes together is less probable than this. A fifth: a scatter
+/// as large as the noise is seldom clear in a few taps, and an interval from the noise alone then holds the truth in
+/// 70 to 90 %. At this level it is 93 % or more over any distribution of the scatter that spans some decades, and one
+/// recording in five without scatter has intervals that are too long.
+const SCATTERS: f64 = 0.2;
+/// A scatter of one mode less probable than this asks for the mean of its taps. Below, the joint fit is more precise.
+const SCATTERS_CLEARLY: f64 = 0.01;
+/// Factor on two intervals of 95 % that shall both hold their values in 95 %: each must in 97.5 %, 2.241/1.960.
+const BOTH: f64 = 1.143;
 /// A residual correlation beyond so many standard deviations is a misfit. 3: by chance one fit in 700.
 const CORRELATED: f64 = 3.0;
-/// Steps of the fit of one tap; it starts from the joint poles.
+/// Steps of the fit of one tap; it starts from the joint poles, or within a half width of its own.
 const TAP_STEPS: usize = 6;
+/// Half widths by which a tap's frequencies may be away from the joint ones. The band of the fit reaches to 10.
+const MOST_MOVED: u8 = 8;
+/// Fall of a tap's residual that a start elsewhere must bring, in variances of the residual there. 25: noise alone brings
+/// it at one of the 16 places in ten thousand taps.
+const CLEARLY_LESS: f64 = 25.0;
 
 /// Origin of a standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -33,6 +46,8 @@ pub enum UncertaintySource {
     /// The scatter of the taps, where it exceeds that noise.
     #[serde(rename = "taps")]
     TapScatter,
+    /// Two poles of one shape that explain the data better than one: two modes, or one whose frequency changes.
+    TwoPoles,
 }
 
 /// A value with its uncertainty.
@@ -40,7 +55,8 @@ pub enum UncertaintySource {
 pub struct FittedValue {
     /// Value (Hz, or a ratio).
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation. From the scatter of a few taps: that of a normal distribution with the same 95 % interval,
+    /// because Student's t has wide tails and whatever uses the value later takes it as normal.
     pub std: f64,
     /// Lower end of the 95 % interval.
     pub low: f64,
@@ -72,14 +88,14 @@ pub struct TapFit {
 }
 
 impl FittedValue {
-    /// Takes value and interval from the joint fit, or from the taps where they scatter beyond their own
-    /// standard deviations. `taps` are values with their standard deviations.
+    /// Takes value and interval from the joint fit. `taps` are values with their standard deviations.
     fn new(value: f64, std: f64, freedom: f64, taps: &[(f64, f64)]) -> Self {
-        let mut fitted = FittedValue {
+        let half = student::quantile(0.05, freedom.max(1.0)) * std;
+        FittedValue {
             value,
             std,
-            low: value,
-            high: value,
+            low: value - half,
+            high: value + half,
             source: UncertaintySource::Residual,
             freedom,
             // By the chi-squared test of the taps about their weighted mean.
@@ -87,19 +103,105 @@ impl FittedValue {
                 .then(|| scatter_about_mean(taps))
                 .filter(|scatter| scatter.is_finite())
                 .map(|scatter| chi_square_tail(scatter, taps.len() as f64 - 1.0)),
-        };
-        if (fitted.scatter_probability).is_some_and(|p| p < SCATTER_LEVEL) {
-            let (mean, scatter) = weighted_mean(taps);
-            fitted.value = mean;
-            // Scatter cannot make a value better than the noise permits.
-            fitted.std = scatter.max(std);
-            fitted.freedom = taps.len() as f64 - 1.0;
-            fitted.source = UncertaintySource::TapScatter;
         }
-        let half = student::quantile(0.05, fitted.freedom.max(1.0)) * fitted.std;
-        fitted.low = fitted.value - half;
-        fitted.high = fitted.value + half;
-        fitted
+    }
+
+    /// Takes the interval from the scatter of the taps, and the value too where they scatter clearly.
+    fn take_scatter(&mut self, taps: &[(f64, f64)], clearly: bool) {
+        if self.scatter_probability.is_none() {
+            return;
+        }
+        let (mean, scatter) = weighted_mean(taps);
+        let freedom = taps.len() as f64 - 1.0;
+        let half = student::quantile(0.05, freedom) * scatter;
+        // The mean of vague dampings may lie below zero.
+        if clearly && mean > 0.0 {
+            self.value = mean;
+        }
+        // Scatter cannot make a value better than the noise permits.
+        let noise = 0.5 * (self.high - self.low);
+        if half > noise {
+            self.std = half / NORMAL_95;
+            self.freedom = freedom;
+            self.source = UncertaintySource::TapScatter;
+        }
+        (self.low, self.high) = (self.value - half.max(noise), self.value + half.max(noise));
+    }
+}
+
+/// Frequencies and damping ratios of single taps, with their standard deviations.
+fn values_of(taps: &[TapFit]) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    let taps = taps.iter();
+    taps.map(|tap| {
+        let damping = (tap.damping_ratio, tap.damping_std);
+        ((tap.frequency, tap.frequency_std), damping)
+    })
+    .unzip()
+}
+
+/// Takes the intervals of all modes of a recording from the scatter of their taps, where the taps scatter.
+///
+/// Whether they do is judged by all modes together: what moves one tap, such as a hand or a temperature, moves more than
+/// one mode. How much is each mode's own matter.
+fn take_scatter(fits: &mut [Option<ModeFit>]) {
+    let (mut squares, mut freedom) = ([0.0; 2], 0.0);
+    for mode in fits.iter().flatten().filter(|mode| mode.taps.len() > 1) {
+        let (frequencies, dampings) = values_of(&mode.taps);
+        let scatters = [frequencies, dampings].map(|taps| scatter_about_mean(&taps));
+        if scatters.iter().all(|scatter| scatter.is_finite()) {
+            squares = [squares[0] + scatters[0], squares[1] + scatters[1]];
+            freedom += mode.taps.len() as f64 - 1.0;
+        }
+    }
+    if freedom == 0.0 {
+        return;
+    }
+    let [frequencies_do, dampings_do] = squares.map(|sum| chi_square_tail(sum, freedom) < SCATTERS);
+    for mode in fits.iter_mut().flatten() {
+        let (frequencies, dampings) = values_of(&mode.taps);
+        let [frequency, damping] = [&mut mode.frequency, &mut mode.damping_ratio];
+        let is_clear =
+            |value: &FittedValue| (value.scatter_probability).is_some_and(|p| p < SCATTERS_CLEARLY);
+        let apart = frequencies_do && is_clear(frequency);
+        if frequencies_do {
+            frequency.take_scatter(&frequencies, apart);
+        }
+        // A joint fit of taps with different frequencies takes their distance for damping.
+        if apart || dampings_do {
+            damping.take_scatter(&dampings, apart || is_clear(damping));
+        }
+    }
+}
+
+impl FittedValue {
+    fn widen_to(&mut self, other: &FittedValue) {
+        let half = BOTH * 0.5 * (other.high - other.low);
+        let middle = 0.5 * (other.high + other.low);
+        self.low = self.low.min(middle - half);
+        self.high = self.high.max(middle + half);
+        let farther = (self.value - self.low).max(self.high - self.value);
+        self.std = self.std.max(farther / NORMAL_95);
+        self.source = UncertaintySource::TwoPoles;
+    }
+}
+
+impl ModeFit {
+    /// Widens the intervals so that they hold two poles that explain the data better than this one alone.
+    ///
+    /// Two modes of one shape so near each other, and one mode whose frequency changes while it rings, look alike.
+    /// Either is inside. A pole of less than a tenth of the other's amplitude bends the line of the other, and is not
+    /// what was read.
+    pub fn widen_to(&mut self, poles: [&ModeFit; 2]) {
+        let sizes = poles.map(|pole| {
+            let values = pole.amplitudes.iter();
+            root_mean_square(&values.map(|a| a.value.norm()).collect::<Vec<_>>())
+        });
+        for (pole, size) in poles.into_iter().zip(sizes) {
+            if size > 0.1 * sizes[0].max(sizes[1]) {
+                self.frequency.widen_to(&pole.frequency);
+                self.damping_ratio.widen_to(&pole.damping_ratio);
+            }
+        }
     }
 }
 
@@ -209,6 +311,34 @@ struct TapPoles {
     tap: usize,
     poles: Vec<Complex64>,
     covariance: DMatrix<f64>,
+    /// Relative change of all frequencies from the joint fit to the start of this one.
+    moved: f64,
+}
+
+/// Returns where the fit of one tap begins, and the relative change of all frequencies up to there: none, or a change
+/// by some half widths where that leaves clearly less residual. From half widths away no search finds the pole.
+fn moved_start(problem: &PoleProblem, joint: &[Complex64]) -> (Vec<Complex64>, f64) {
+    let narrowest = joint.iter().map(|pole| half_width(*pole) / pole.im);
+    let step = narrowest.fold(f64::INFINITY, f64::min);
+    let square_sum = |moved: f64| {
+        let poles = joint
+            .iter()
+            .map(|pole| pole + Complex64::new(0.0, moved * pole.im));
+        let poles: Vec<Complex64> = poles.collect();
+        let at = problem.amplitudes_at(&poles);
+        (at.map_or(f64::INFINITY, |at| at.square_sum), poles)
+    };
+    let (here, poles) = square_sum(0.0);
+    let (mut best, mut least) = ((poles, 0.0), here);
+    for half_widths in (1..=MOST_MOVED).flat_map(|count| [-f64::from(count), f64::from(count)]) {
+        let moved = half_widths * step;
+        let (sum, poles) = square_sum(moved);
+        let variance = sum / problem.columns.len() as f64;
+        if sum < least && here - sum > CLEARLY_LESS * variance {
+            (best, least) = ((poles, moved), sum);
+        }
+    }
+    best
 }
 
 /// Reads the modes of one group's fit.
@@ -240,13 +370,19 @@ impl<'a> GroupReader<'a> {
         let mut taps = Vec::new();
         for (tap, places) in places {
             problem.columns = fit.problem.columns.select_columns(&places);
-            if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
-                && let Some(covariance) = best.slopes.covariance(fit.variance)
+            let (start, moved) = moved_start(&problem, &fit.at.poles);
+            if let Some(best) = problem.search(&start, fit.freedom, TAP_STEPS)
+                && let Some(covariance) = best.slopes.covariance(match moved {
+                    0.0 => fit.variance,
+                    // The joint fit does not describe this tap, and its residual is no noise.
+                    _ => best.at.square_sum / problem.columns.len() as f64,
+                })
             {
                 taps.push(TapPoles {
                     tap,
                     poles: best.at.poles,
                     covariance,
+                    moved,
                 });
             }
         }
@@ -275,12 +411,7 @@ impl<'a> GroupReader<'a> {
         let stds = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
         let freedom = (fit.freedom / self.repetition).max(1.0);
         let taps = self.taps_of(place);
-        let (frequencies, dampings): (Vec<_>, Vec<_>) = (taps.iter())
-            .map(|tap| {
-                let damping = (tap.damping_ratio, tap.damping_std);
-                ((tap.frequency, tap.frequency_std), damping)
-            })
-            .unzip();
+        let (frequencies, dampings) = values_of(&taps);
         let damping_ratio = FittedValue::new(joint.damping_ratio, stds[1], freedom, &dampings);
         // Less than two standard deviations beside the window's decay are no damping.
         let hidden = damping_ratio.value <= 0.0 || damping_ratio.value < 2.0 * damping_ratio.std;
@@ -313,12 +444,14 @@ impl<'a> GroupReader<'a> {
         })
     }
 
-    /// Frequency and damping of each tap alone, where its pole stays within a half width of the joint one.
+    /// Frequency and damping of each tap alone, where its pole stays within a half width of the joint one, or moved
+    /// away with all others.
     fn taps_of(&self, place: usize) -> Vec<TapFit> {
         let joint = self.group.fit.at.poles[place];
         let mut taps = Vec::new();
         for tap in &self.taps {
-            let near = (tap.poles[place] - joint).norm() <= 1.0 + joint.re.abs();
+            let from = joint + Complex64::new(0.0, tap.moved * joint.im);
+            let near = (tap.poles[place] - from).norm() <= 1.0 + joint.re.abs();
             if !near {
                 continue;
             }
@@ -455,6 +588,8 @@ pub struct ExtraMode {
     pub likeness: Option<f64>,
     /// Fit of the mode together with the others.
     pub fit: Result<ModeFit, Unfit>,
+    /// Fit of the nearest other mode of its group beside it.
+    pub neighbour: Option<ModeFit>,
 }
 
 /// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
@@ -501,6 +636,7 @@ impl<'a> Accepted<'a> {
                 }
             }
         }
+        take_scatter(&mut fits);
         let fits = fits.into_iter().zip(&self.modes);
         fits.map(|(fit, state)| fit.ok_or_else(|| state.reason()))
             .collect()
@@ -527,7 +663,7 @@ impl<'a> Accepted<'a> {
         let mut beside = self.clone();
         beside.most_lines = most_lines;
         let group = beside.add(extra);
-        let fits = group
+        let mut fits = group
             .as_ref()
             .map(|group| beside.read(std::slice::from_ref(group)));
         let last = self.modes.len();
@@ -535,10 +671,11 @@ impl<'a> Accepted<'a> {
             needed: false,
             probability: 1.0,
             likeness: None,
-            fit: match fits {
-                Some(mut fits) => fits.swap_remove(last),
+            fit: match &mut fits {
+                Some(fits) => fits.swap_remove(last),
                 None => Err(beside.modes[last].reason()),
             },
+            neighbour: None,
         };
         let stride = group
             .as_ref()
@@ -548,7 +685,11 @@ impl<'a> Accepted<'a> {
             && let Some((probability, information_gain)) = beside.gain(group, place)
         {
             test.probability = probability;
-            test.likeness = likeness(self.data, &group.fit, place);
+            if let Some(nearest) = group.fit.nearest(place) {
+                test.likeness = group.fit.likeness(self.data, place, nearest);
+                let index = group.members[nearest];
+                test.neighbour = fits.and_then(|mut fits| fits.swap_remove(index).ok());
+            }
             let amplitudes = mode.amplitudes.iter();
             let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
             test.needed = probability < LEVEL
@@ -586,37 +727,4 @@ impl<'a> Accepted<'a> {
         let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
         Some((probability, criterion))
     }
-}
-
-/// Returns the likeness of the shapes of a pole and of the nearest pole of its group, in units of noise.
-///
-/// It is sum_t |sum_s conj(b) c|^2/(sum_t sum_s |b|^2 sum_s |c|^2) over taps t and sensors s. Frequency
-/// response functions count together: the places of their taps are part of a shape.
-fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
-    let poles = &fit.at.poles;
-    let distances = poles.iter().map(|pole| (pole - poles[place]).norm());
-    let others = distances.enumerate().filter(|(other, _)| *other != place);
-    let (nearest, _) = others.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let one_shape = matches!(data.basis(), Basis::FrequencyResponse { .. });
-    let taps: Vec<usize> = (fit.used.iter())
-        .map(|&column| data.columns()[column].tap)
-        .collect();
-    let columns: Vec<usize> = (0..taps.len()).collect();
-    let (mut alike, mut whole) = (0.0, 0.0);
-    for shape in columns.chunk_by(|&a, &b| one_shape || taps[a] == taps[b]) {
-        if shape.len() < 2 {
-            continue;
-        }
-        let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
-        for &column in shape {
-            let own = fit.amplitude(place, column);
-            let other = fit.amplitude(nearest, column);
-            product += own.conj() * other;
-            own_power += own.norm_sqr();
-            other_power += other.norm_sqr();
-        }
-        alike += product.norm_sqr();
-        whole += own_power * other_power;
-    }
-    (whole > 0.0).then(|| alike / whole)
 }

@@ -302,16 +302,13 @@ fn number_jointed(
     recordings: &[&RecordingResult],
 ) -> Vec<Warning> {
     let free = unlabelled(modes);
-    let fit = details.fit.as_deref().unwrap_or_default();
-    if fit.contains(&FitParameter::Modulus) || fit.contains(&FitParameter::Density) {
-        // Beside an unknown beam the joint's bounds say nothing of a mode's number.
-        number_in_order(modes);
-        return Vec::new();
-    }
     let mut peaks = Vec::with_capacity(free.len());
     for &index in &free {
         peaks.push(measured_peak(index, modes, recordings));
     }
+    let fit = details.fit.as_deref().unwrap_or_default();
+    let common_factor =
+        fit.contains(&FitParameter::Modulus) || fit.contains(&FitParameter::Density);
     // The joint is estimated and held as the estimate has it.
     let units = StiffnessUnits::of(&structure.beam);
     let known = &structure.known;
@@ -325,6 +322,7 @@ fn number_jointed(
             known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
             known.cross_compliance.map(|c| units.ktr / c),
         ],
+        common_factor,
         bands: recordings
             .iter()
             .filter_map(|one| one.looked_at())

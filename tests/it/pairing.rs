@@ -228,6 +228,26 @@ fn recover_numbers_over_random_joints() {
 }
 
 #[test]
+fn recover_numbers_beside_an_unknown_modulus() {
+    // All frequencies are off by a factor in common, with a standard deviation of 10 %.
+    let (mut right, mut wrong) = (0, 0);
+    for seed in 0..40 {
+        let mut case = case(Assembly::Cantilever, Change::Added, Seen::Frequencies, seed);
+        let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+        let factor = (0.1 * normal(&mut random)).exp();
+        for peak in &mut case.peaks {
+            peak.frequency *= factor;
+        }
+        case.settings.common_factor = true;
+        let pairing = pair(&case);
+        let mut all = std::iter::once(&pairing.chosen).chain(&pairing.others);
+        right += usize::from(pairing.chosen.numbers == case.truth);
+        wrong += usize::from(!all.any(|one| one.numbers == case.truth));
+    }
+    assert!(right >= 30 && wrong <= 2, "{right} right, {wrong} wrong");
+}
+
+#[test]
 fn regress_a_tuned_fork_of_two_peaks_is_named_with_both_numberings() {
     // Two peaks 3 % apart where mode 2 is: either may be it.
     let mut case = case(Assembly::Cantilever, Change::Nothing, Seen::Frequencies, 5);

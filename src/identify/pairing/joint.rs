@@ -15,9 +15,17 @@ use tapjoint_numerics::stats::student;
 const FREEDOM: f64 = 4.0;
 /// Density of Student's t with that many at its middle: 3/8.
 const DENSITY: f64 = 0.375;
-/// Prior means of ln Kx, ln Ky and atanh of the coupling, and their standard deviations: joints of
-/// built structures lie within some decades of the beam's own stiffness, couplings within 0.3.
-const PRIOR: [(f64, f64); 3] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3)];
+/// Numbers that are looked for: ln Kx, ln Ky, atanh of the coupling, and ln of the factor that all frequencies have in
+/// common.
+pub(super) type Place = [f64; 4];
+/// Index of the common factor.
+const FACTOR: usize = 3;
+/// Prior means of a place, and their standard deviations: joints of built structures lie within some decades of the
+/// beam's own stiffness, couplings within 0.3. A modulus wrong by a quarter moves all frequencies by 12 %.
+const PRIOR: [(f64, f64); 4] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3), (0.0, 0.12)];
+/// Common factors of the grid (ln): one standard deviation to either side. Places between them are nearer than what
+/// the candidates allow for.
+const FACTORS: [f64; 3] = [-0.12, 0.0, 0.12];
 /// Decades of the grid, Kx and Ky, and its step. A frequency rises at most with the root of both stiffnesses
 /// together. The nearest place of the grid is half a step off in both at most, and misses it by up to 10^(0.3/4) - 1
 /// = 19 %, where all stiffness is in soft springs. The candidates allow for that, and the search for the joint goes
@@ -44,8 +52,7 @@ pub(super) struct JointSearch<'a> {
 
 /// A joint and how well it suits.
 pub(super) struct JointFit {
-    /// ln Kx, ln Ky, atanh of the coupling.
-    pub place: [f64; 3],
+    pub place: Place,
     /// Negative logarithm of the frequencies' probability density, over all joints.
     pub cost: f64,
 }
@@ -77,21 +84,24 @@ impl<'a> JointSearch<'a> {
     }
 
     fn is_free(&self, index: usize) -> bool {
-        self.settings.fit.contains(&Parameter::JOINT[index])
+        match Parameter::JOINT.get(index) {
+            Some(parameter) => self.settings.fit.contains(parameter),
+            None => self.settings.common_factor,
+        }
     }
 
     /// Returns the place with the coupling that a held Ktr has there: sqrt(Kx Ky)/Kz, and no joint's is 1.
-    fn coupled(&self, place: [f64; 3]) -> [f64; 3] {
+    fn coupled(&self, place: Place) -> Place {
         if self.cross == 0.0 {
             return place;
         }
-        let [kx, ky, _] = place;
+        let [kx, ky, _, factor] = place;
         let held = self.cross * (0.5 * (kx + ky)).exp();
-        [kx, ky, held.clamp(-STRONGEST, STRONGEST).atanh()]
+        [kx, ky, held.clamp(-STRONGEST, STRONGEST).atanh(), factor]
     }
 
-    /// Returns places (ln Kx, ln Ky, atanh of the coupling) over all joints; a held stiffness has one.
-    pub fn grid(&self) -> Vec<[f64; 3]> {
+    /// Returns places over all joints; a held stiffness has one.
+    pub fn grid(&self) -> Vec<Place> {
         let units = [self.units.kt, self.units.kr];
         let [translation, rotation] = [0, 1].map(|index| {
             let mut values = Vec::new();
@@ -105,15 +115,22 @@ impl<'a> JointSearch<'a> {
             }
             values
         });
-        let mut places = Vec::with_capacity(translation.len() * rotation.len());
+        let factors = match self.settings.common_factor {
+            true => &FACTORS[..],
+            false => &[0.0],
+        };
+        let mut places = Vec::with_capacity(translation.len() * rotation.len() * factors.len());
         for &kx in &translation {
-            places.extend(rotation.iter().map(|&ky| self.coupled([kx, ky, 0.0])));
+            for &ky in &rotation {
+                let factors = factors.iter();
+                places.extend(factors.map(|&factor| self.coupled([kx, ky, 0.0, factor])));
+            }
         }
         places
     }
 
     /// Returns the coordinates of the model at a place.
-    fn point(&self, place: [f64; 3]) -> Point {
+    fn point(&self, place: Place) -> Point {
         let mut point = self.model.nominal();
         point[Parameter::Kt as usize] = place[0] + self.units.kt.ln();
         point[Parameter::Kr as usize] = place[1] + self.units.kr.ln();
@@ -122,18 +139,19 @@ impl<'a> JointSearch<'a> {
     }
 
     /// Returns the logarithms of the natural frequencies (Hz) of all modes looked at.
-    pub fn predict(&self, place: [f64; 3]) -> Vec<f64> {
+    pub fn predict(&self, place: Place) -> Vec<f64> {
         (1..=self.highest)
             .map(|mode| self.response(place, mode).0)
             .collect()
     }
 
-    /// Returns the logarithm of a natural frequency (Hz), and its slopes along the place.
-    fn response(&self, place: [f64; 3], mode: usize) -> (f64, [f64; 3]) {
+    /// Returns the logarithm of a natural frequency (Hz), the common factor in it, and its slopes along the place.
+    fn response(&self, place: Place, mode: usize) -> (f64, Place) {
         let guess = PI * (mode as f64 - 0.5);
         let response = self.model.response(&self.point(place), mode, guess);
-        let mut slopes = Parameter::JOINT.map(|parameter| response.sensitivity[parameter as usize]);
-        let by_coupling = slopes[2];
+        let [by_kt, by_kr, by_coupling] =
+            Parameter::JOINT.map(|parameter| response.sensitivity[parameter as usize]);
+        let mut slopes = [by_kt, by_kr, by_coupling, 1.0];
         let coupling = place[2].tanh();
         for (index, slope) in slopes.iter_mut().enumerate() {
             if !(self.is_free(index) && slope.is_finite()) {
@@ -144,18 +162,18 @@ impl<'a> JointSearch<'a> {
                 *slope += 0.5 * coupling / (1.0 - coupling * coupling) * by_coupling;
             }
         }
-        (response.frequency.ln(), slopes)
+        (response.frequency.ln() + place[FACTOR], slopes)
     }
 
     /// Returns the joint that suits these pairs of peak and mode best, looked for downhill of `start`.
     ///
     /// Laplace: the probability over all joints is the one at the best times the square root of the inverse
     /// curvature's determinant. The factors 2 pi of prior and curvature cancel.
-    pub fn refine(&self, pairs: &[(usize, usize)], start: [f64; 3]) -> JointFit {
+    pub fn refine(&self, pairs: &[(usize, usize)], start: Place) -> JointFit {
         let assigned = Assigned {
             search: self,
             pairs,
-            bounds: [0, 1, 2].map(|index| {
+            bounds: [0, 1, 2, FACTOR].map(|index| {
                 if self.is_free(index) {
                     [f64::NEG_INFINITY, f64::INFINITY]
                 } else {
@@ -183,12 +201,12 @@ struct Assigned<'a> {
     /// Peaks (from 0) with their modes (from 1).
     pairs: &'a [(usize, usize)],
     /// Limits of the place: a held coordinate has no room.
-    bounds: [[f64; 2]; 3],
+    bounds: [[f64; 2]; 4],
 }
 
 /// The assignment's cost at a place, with gradient and Gauss-Newton curvature.
 struct AssignedAt {
-    place: [f64; 3],
+    place: Place,
     /// Negative logarithm of the probability density.
     cost: f64,
     gradient: DVector<f64>,
@@ -203,8 +221,8 @@ impl Problem for Assigned<'_> {
         let mut at = AssignedAt {
             place,
             cost: 0.0,
-            gradient: DVector::zeros(3),
-            curvature: DMatrix::zeros(3, 3),
+            gradient: DVector::zeros(place.len()),
+            curvature: DMatrix::zeros(place.len(), place.len()),
         };
         for &(peak, mode) in self.pairs {
             let peak = &self.search.peaks[peak];
@@ -251,7 +269,7 @@ impl Problem for Assigned<'_> {
     }
 
     fn moved(&self, place: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
-        let moved = [0, 1, 2].map(|i| place[i] + step[i].clamp(-LARGEST, LARGEST));
+        let moved = [0, 1, 2, FACTOR].map(|i| place[i] + step[i].clamp(-LARGEST, LARGEST));
         Some(self.search.coupled(moved).to_vec())
     }
 }

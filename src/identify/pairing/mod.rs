@@ -18,7 +18,7 @@
 mod joint;
 
 use super::frequency_fit::{FrequencyModel, JointedStructure, Parameter};
-use joint::{JointSearch, View, is_clear};
+use joint::{JointSearch, Place, View, is_clear};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use tapjoint_beam::StructureError;
@@ -61,6 +61,8 @@ pub struct PairingSettings {
     /// Held stiffnesses Kt (N/m), Kr (N m/rad) and Ktr (N/rad). A stiffness that is neither estimated nor held is
     /// infinite: rigid, or without coupling. None.
     pub held: [Option<f64>; 3],
+    /// All frequencies may differ from the model's by a factor in common, as beside an unknown modulus: not by default.
+    pub common_factor: bool,
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
     pub bands: Vec<(f64, f64)>,
     /// Error of the model in a frequency, relative: 1.5 %, what a beam's stated dimensions, its
@@ -76,6 +78,7 @@ impl Default for PairingSettings {
         PairingSettings {
             fit: vec![Parameter::Kt, Parameter::Kr],
             held: [None; 3],
+            common_factor: false,
             bands: Vec::new(),
             discrepancy: 0.015,
             odds: 20.0,
@@ -194,7 +197,7 @@ fn score(
     search: &JointSearch<'_>,
     assignment: &Assignment,
     neighbours: &Neighbours,
-    start: [f64; 3],
+    start: Place,
 ) -> Scored {
     let pairs = pairs(assignment);
     let fit = search.refine(&pairs, start);
@@ -267,7 +270,7 @@ fn pairs(assignment: &Assignment) -> Vec<(usize, usize)> {
 
 /// The most likely assignments, each with the joint of the grid that suits it best; the plain one is
 /// always there.
-fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignment, [f64; 3])> {
+fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignment, Place)> {
     let peaks: Vec<f64> = search
         .peaks
         .iter()
@@ -281,12 +284,12 @@ fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignm
     let mut prices = vec![vec![0.0; peaks.len()]];
     prices.extend(weak.iter().any(|price| *price > 0.0).then_some(weak));
     let plain: Assignment = (1..=peaks.len()).map(Some).collect();
-    let grid: Vec<([f64; 3], Vec<f64>)> = search
+    let grid: Vec<(Place, Vec<f64>)> = search
         .grid()
         .into_par_iter()
         .map(|place| (place, search.predict(place)))
         .collect();
-    let mut best: BTreeMap<Assignment, (f64, [f64; 3])> = BTreeMap::new();
+    let mut best: BTreeMap<Assignment, (f64, Place)> = BTreeMap::new();
     for (place, modes) in &grid {
         let mut offers = Vec::with_capacity(2 * WIDTHS.len() + 1);
         for width in WIDTHS {
@@ -306,7 +309,7 @@ fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignm
             }
         }
     }
-    let mut found: Vec<(Assignment, (f64, [f64; 3]))> = best.into_iter().collect();
+    let mut found: Vec<(Assignment, (f64, Place))> = best.into_iter().collect();
     found.sort_by(|a, b| {
         let by_cost = a.1.0.total_cmp(&b.1.0);
         (a.0 != plain).cmp(&(b.0 != plain)).then(by_cost)

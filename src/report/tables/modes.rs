@@ -145,7 +145,9 @@ fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
 }
 
 const INTERVAL_NOTE: &str = "Interval from: the noise that the fit leaves (residual), or the scatter of the taps \
-                             where that is more than the noise explains (taps).";
+                             where that is more than the noise explains (taps); two poles: the \
+                             data ask for two of one shape, two modes or one that changes its \
+                             frequency, and the interval holds both.";
 const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
                          and 1/T, as an analyser shows it; none where that line is of another peak.";
 const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \

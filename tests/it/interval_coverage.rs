@@ -25,6 +25,7 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
         Cell::HeavyDamping,
         Cell::SixteenBit,
         Cell::ExponentialWindow,
+        Cell::Functions,
     ];
     for cell in cells {
         let answers = answers(cell, 100);

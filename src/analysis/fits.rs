@@ -29,7 +29,7 @@ const UNLIKE: f64 = 0.9;
 /// whichever is more.
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
-const CLEAR_AMPLITUDE: f64 = 5.0;
+pub(super) const CLEAR_AMPLITUDE: f64 = 5.0;
 
 /// Result of the polyreference fit over the band.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -4,7 +4,7 @@
 //! fit over many lines tells close modes apart. So all poles that the polyreference fit finds stable are fitted
 //! together, and those leave that the functions can do without.
 
-use super::fits::{Candidates, is_clear, start_of};
+use super::fits::{CLEAR_AMPLITUDE, Candidates, is_clear, start_of};
 use num_complex::Complex64;
 use tapjoint_signal::modal::fit::{Accepted, ExtraMode, FitSettings, ModeFit, PoleStart, Unfit};
 use tapjoint_signal::modal::polyreference::{PolyreferenceMode, all_modes};
@@ -62,12 +62,11 @@ impl FunctionModes<'_> {
     /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
     pub fn fit(&self, readings: &mut Vec<ModeReading>) {
         let proposals = self.starts(readings);
-        let (mut starts, others): (Vec<Proposal>, _) =
+        let (mut starts, others): (Vec<Proposal>, Vec<Proposal>) =
             proposals.iter().cloned().partition(|one| one.sure);
         // Proposals that lie apart from all others are fitted at once: without them the lines of the others are not
         // true. The rest is tested one by one beside them.
         let mut later: Vec<Proposal> = Vec::new();
-        let others: Vec<Proposal> = others;
         for proposal in others {
             if proposal.peak.is_some()
                 || self.is_crowded(&proposal.start, starts.iter().map(|one| one.start))
@@ -304,7 +303,11 @@ impl FunctionModes<'_> {
         // A peak of noise is as narrow as the record allows.
         let decay = -fit.pole.re * self.0.lines.duration;
         let rings_down = proposal.peak.is_none() || decay >= LEAST_DECAY;
-        self.is_near(fit, proposal) && rings_down && self.0.may_be_added(fit) && is_clear(fit)
+        self.is_near(fit, proposal)
+            && rings_down
+            && self.0.may_be_added(fit)
+            && is_clear(fit)
+            && stands_out(fit)
     }
 
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
@@ -336,4 +339,11 @@ impl FunctionModes<'_> {
             (mode.frequency - other.frequency).abs() < least * (widths[0] + widths[1])
         })
     }
+}
+
+/// Returns true if the strongest amplitude stands out of what the fit leaves, which is more than white noise where
+/// neighbouring lines agree: a misfit of a strong mode invents weak ones beside it.
+fn stands_out(fit: &ModeFit) -> bool {
+    let ratios = fit.amplitudes.iter().map(|one| one.value.norm() / one.std);
+    ratios.fold(0.0, f64::max) > CLEAR_AMPLITUDE * fit.inflation
 }

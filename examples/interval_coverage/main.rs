@@ -170,6 +170,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     report(&format!("   {noise:?}"), &own);
                 }
             }
+            if cell == Cell::Functions {
+                let invented = cells::functions::run(arguments.modes, arguments.seed).invented;
+                println!("   {invented} modes listed that were not drawn");
+            }
             show_worst(&answers, arguments.misses);
         }
     }

@@ -11,8 +11,8 @@ use tapjoint_signal::modal::fit::{
     PoleStart, TapForce, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
-    BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,
-    find_modes,
+    BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
+    all_modes, find_modes,
 };
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::recording::ResponseForm;
@@ -29,7 +29,7 @@ const UNLIKE: f64 = 0.9;
 /// whichever is more.
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
-const CLEAR_AMPLITUDE: f64 = 5.0;
+pub(super) const CLEAR_AMPLITUDE: f64 = 5.0;
 
 /// Result of the polyreference fit over the band.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,14 +38,21 @@ pub struct Stabilisation {
     pub searches: Vec<BandSearch>,
 }
 
-/// The polyreference fit of `columns` on equally spaced lines; nothing where they are too few.
-pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) -> Stabilisation {
+/// The polyreference fit of `columns` on equally spaced lines, in narrow bands about `peaks` as well; nothing where the
+/// lines are too few.
+pub(super) fn stabilisation(
+    first: f64,
+    spacing: f64,
+    columns: &[&[Complex64]],
+    peaks: BandPeaks,
+) -> Stabilisation {
     let rows: Vec<Vec<&[Complex64]>> = columns.iter().map(|&column| vec![column]).collect();
     let found = ResponseMatrix::new(first, spacing, &rows).and_then(|matrix| {
         let default = PolyreferenceSettings::default();
         let settings = PolyreferenceSettings {
             // The order that so many lines bear: a fifth of them, as in a band of its own.
             order: (matrix.points() / 5).clamp(2, default.order),
+            peaks,
             ..default
         };
         find_modes(&matrix, &settings)
@@ -207,7 +214,7 @@ impl Candidates<'_> {
 
     /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
     /// search for modes lets pass. At the ends of a band poles stand for what lies beyond it.
-    fn may_be_added(&self, fit: &ModeFit) -> bool {
+    pub fn may_be_added(&self, fit: &ModeFit) -> bool {
         let lines = self.data.frequencies();
         let Some((first, last)) = lines.first().zip(lines.last()) else {
             return false;
@@ -234,7 +241,7 @@ impl Candidates<'_> {
 
     /// Takes the fit of a peak, if it belongs to it; a peak that was no clear resonance becomes one where its fit is
     /// clear.
-    fn adopt(&self, reading: &mut ModeReading, fit: &ModeFit) {
+    pub fn adopt(&self, reading: &mut ModeReading, fit: &ModeFit) {
         // The natural frequency of a pole with high damping may lie outside of the lines that were fitted:
         // f = |lambda|/2 pi, while the lines hold Im(lambda)/2 pi alone to the band.
         let lines = self.data.frequencies();
@@ -260,7 +267,7 @@ impl Candidates<'_> {
     }
 }
 
-fn start_of(mode: &PolyreferenceMode) -> PoleStart {
+pub(super) fn start_of(mode: &PolyreferenceMode) -> PoleStart {
     PoleStart {
         frequency: mode.frequency,
         damping_ratio: Some(mode.damping_ratio),
@@ -268,7 +275,7 @@ fn start_of(mode: &PolyreferenceMode) -> PoleStart {
 }
 
 /// Returns true if the amplitudes stand out of their standard deviations, and the decay too.
-fn is_clear(fit: &ModeFit) -> bool {
+pub(super) fn is_clear(fit: &ModeFit) -> bool {
     let strongest = fit
         .amplitudes
         .iter()
@@ -339,7 +346,8 @@ impl FreeDecays {
         let functions = self.functions();
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
         let first = self.data.frequencies().first().copied().unwrap_or(0.0);
-        let stabilisation = stabilisation(first, self.data.spacing(), &columns);
+        let spacing = self.data.spacing();
+        let stabilisation = stabilisation(first, spacing, &columns, BandPeaks::Together);
         let candidates = Candidates {
             lines,
             data: &self.data,

@@ -1,12 +1,14 @@
 //! Files of frequency response functions: their resonances, as a recording's.
 
-use super::fits::{Candidates, stabilisation};
+use super::fits::{Candidates, Stabilisation, stabilisation};
+use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
 use super::recording_result::{Conditions, RecordingResult, Response};
 use super::warnings::Warning;
 use num_complex::Complex64;
 use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
+use tapjoint_signal::modal::polyreference::BandPeaks;
 use tapjoint_signal::modal::{
     CompositeLevel, PeakSettings, find_peaks, read_magnitude_peaks, read_peaks,
 };
@@ -153,7 +155,7 @@ fn spectra_of_magnitudes(
         decay: None,
         readings,
         force_noise: None,
-        stabilisation: stabilisation(lines.low, lines.spacing, &[]),
+        stabilisation: Stabilisation::default(),
     }
 }
 
@@ -164,15 +166,12 @@ fn spectra_of_functions(
     forms: &[Option<ResponseForm>],
     wanted: ReadBy,
 ) -> MeasuredSpectra {
-    let powers: Vec<Vec<f64>> = values
-        .iter()
-        .map(|h| h.iter().map(Complex64::norm_sqr).collect())
-        .collect();
     let columns: Vec<&[Complex64]> = values.iter().map(Vec::as_slice).collect();
-    let level = CompositeLevel::new(lines, &powers, None);
+    let level = level_of_functions(lines, &columns);
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
-    let stabilisation = stabilisation(lines.low, lines.spacing, &columns);
+    let peaks = BandPeaks::EveryFunction;
+    let stabilisation = stabilisation(lines.low, lines.spacing, &columns, peaks);
     // The fit takes the functions without the line at 0 Hz.
     let first_fitted = usize::from(lines.low <= 0.0);
     let basis = Basis::FrequencyResponse {
@@ -185,13 +184,13 @@ fn spectra_of_functions(
     });
     let frequencies = lines.frequencies().split_off(first_fitted);
     if let Ok(data) = ModalData::new(basis, frequencies, fitted.collect()) {
-        let candidates = Candidates {
+        let modes = FunctionModes(Candidates {
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
             hum: Vec::new(),
-        };
-        candidates.fit(&mut readings);
+        });
+        modes.fit(&mut readings);
         // There are modal constants where the form of every function is known.
         if let Some(forms) = forms.iter().copied().collect::<Option<Vec<ResponseForm>>>() {
             for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {

@@ -15,6 +15,7 @@ mod fits;
 mod found;
 mod frf;
 mod function_file;
+mod function_fits;
 mod identification;
 mod measurement;
 mod modes;

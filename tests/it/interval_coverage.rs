@@ -28,6 +28,7 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
         Cell::CloseModes,
         Cell::Hum,
         Cell::TwoTaps,
+        Cell::Functions,
     ];
     for cell in cells {
         let answers = answers(cell, 100);

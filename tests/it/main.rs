@@ -14,6 +14,7 @@ mod description;
 mod effects;
 mod errors;
 mod fastened;
+mod function_modes;
 mod gap;
 mod gap_advice;
 mod gap_decay;

@@ -19,7 +19,7 @@ mod reading;
 pub use magnitude::{interpolate_magnitude, read_magnitude_peaks};
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
-    near_mains,
+    near_mains, noise_of_function,
 };
 pub use reading::{
     BandReadings, FittedReading, Interpolation, MergedMode, ModeReading, NoInterpolation,

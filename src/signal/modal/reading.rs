@@ -31,8 +31,10 @@ pub struct ModeReading {
     pub interval: (f64, f64),
     /// Frequency of the peak's line, without a peak of the nearest one (Hz).
     pub line_frequency: f64,
-    /// Bound of the line reading (Hz).
+    /// Half of the line spacing or resolution, whichever is wider (Hz).
     pub half_line: f64,
+    /// Bound of the line reading (Hz): half a line, or more over a resonance that is wider.
+    pub line_bound: f64,
     /// The reading between the lines, where there is one.
     pub between: Option<Interpolation>,
     /// Standard deviation of the best frequency (Hz).
@@ -88,6 +90,7 @@ impl ModeReading {
             interval: (frequency, frequency),
             line_frequency: frequency,
             half_line,
+            line_bound: half_line,
             between: None,
             std: None,
             damping_ratio: None,
@@ -124,11 +127,11 @@ impl ModeReading {
                 self.source = ReadBy::Interpolated;
                 (between.frequency, between.bound, between.std)
             }
-            // On a line the truth lies anywhere within the half line.
+            // On a line the truth lies anywhere within the bound.
             None => {
                 self.source = ReadBy::Line;
-                let std = self.half_line / 3f64.sqrt();
-                (self.line_frequency, self.half_line, std)
+                let std = self.line_bound / 3f64.sqrt();
+                (self.line_frequency, self.line_bound, std)
             }
         };
         (self.frequency, self.std) = (frequency, Some(std));

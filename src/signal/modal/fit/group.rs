@@ -237,10 +237,21 @@ impl<'a> BandData<'a> {
     /// Fits from `start` with `terms` terms of background and given noise of the columns (any scale).
     pub fn fit(&self, start: &[Complex64], terms: usize, noise: &[f64]) -> Result<GroupFit, Unfit> {
         const MOST_STEPS: usize = 30;
+        self.search(start, terms, noise, MOST_STEPS)
+    }
+
+    /// Fits with at most so many steps of the poles; without any, only the amplitudes.
+    pub fn search(
+        &self,
+        start: &[Complex64],
+        terms: usize,
+        noise: &[f64],
+        steps: usize,
+    ) -> Result<GroupFit, Unfit> {
         let problem = self.problem(terms, noise);
         let freedom = self.freedom(&problem.fixed, start.len())?;
         let best = problem
-            .search(start, freedom, MOST_STEPS)
+            .search(start, freedom, steps)
             .ok_or(Unfit::NotIndependent)?;
         Ok(GroupFit {
             variance: best.at.square_sum / freedom,
@@ -473,6 +484,9 @@ pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) ->
 const MOST_SWEEPS: usize = 8;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;
+/// First sweeps over functions in which poles of known damping stay and only amplitudes are fitted. 2: the second has
+/// the amplitudes of all neighbours. Poles that move while a neighbour is missing run to it.
+const HELD_SWEEPS: usize = 2;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;
 
@@ -577,7 +591,7 @@ impl Accepted<'_> {
             own.retain(|&index| {
                 index == place || stride <= 1.0 || half_width(self.modes[index].pole) >= stride
             });
-            let moved = self.sweep(vec![own], &mut fitted);
+            let moved = self.sweep(vec![own], &mut fitted, false);
             if sweep > 0 && moved < STILL {
                 break;
             }
@@ -596,6 +610,10 @@ impl Accepted<'_> {
     /// Sweeps until the poles stay; returns the groups of the last sweep.
     pub(super) fn run(&mut self) -> Vec<Group> {
         let mut fitted = Vec::new();
+        let is_function = matches!(self.data.basis(), Basis::FrequencyResponse { .. });
+        // Poles that were fitted before know their neighbours.
+        let known =
+            (self.modes.iter()).all(|mode| mode.failed.is_some() || mode.amplitudes.is_some());
         let mut sweeps = 0;
         // A sweep in which a start fails adds one: modes that were fitted together with it begin again.
         let mut most = MOST_SWEEPS;
@@ -606,7 +624,8 @@ impl Accepted<'_> {
                 groups.sort_by(|a, b| self.power(b[0]).total_cmp(&self.power(a[0])));
             }
             let before = self.alive().len();
-            let moved = self.sweep(groups, &mut fitted);
+            let held = is_function && !known && sweeps < HELD_SWEEPS && groups.len() > 1;
+            let moved = self.sweep(groups, &mut fitted, held);
             most += usize::from(self.alive().len() < before);
             sweeps += 1;
             if sweeps > 1 && moved < STILL {
@@ -631,12 +650,22 @@ impl Accepted<'_> {
             .sum()
     }
 
-    /// Fits each group once. Returns how far the poles moved, in their standard deviations.
-    fn sweep(&mut self, groups: Vec<Vec<usize>>, fitted: &mut Vec<Group>) -> f64 {
+    /// Fits each group once. Returns how far the poles moved, in their standard deviations. Poles of known damping
+    /// stay where they are `held`.
+    fn sweep(&mut self, groups: Vec<Vec<usize>>, fitted: &mut Vec<Group>, held: bool) -> f64 {
         fitted.clear();
         let mut moved: f64 = 0.0;
         for members in groups {
-            match self.fit_group(&members) {
+            let held = held && members.iter().all(|&index| self.modes[index].damping_known);
+            let fit = match held {
+                true => self.fit_amplitudes(&members),
+                false => self.fit_group(&members),
+            };
+            match fit {
+                Ok(fit) if held => {
+                    moved = f64::INFINITY;
+                    self.take_over(&members, &fit);
+                }
                 Ok(fit) => {
                     moved = moved.max(self.accept(&members, &fit));
                     fitted.push(Group { members, fit });
@@ -662,22 +691,32 @@ impl Accepted<'_> {
         self.modes[failed].failed = Some(reason);
     }
 
-    /// Takes over the poles of a fit. Returns how far they moved in standard deviations.
+    /// Takes over poles, amplitudes and noise of a fit.
+    fn take_over(&mut self, members: &[usize], fit: &GroupFit) {
+        let columns = self.data.columns().len();
+        for (place, &index) in members.iter().enumerate() {
+            let mode = &mut self.modes[index];
+            mode.pole = fit.at.poles[place];
+            mode.amplitudes = Some(fit.amplitudes(place, columns));
+            mode.noise = fit.noise_by_column(columns);
+        }
+    }
+
+    /// Takes over the poles of a fit, and drops a start whose pole is no mode near it. Returns how far they moved in
+    /// standard deviations.
     fn accept(&mut self, members: &[usize], fit: &GroupFit) -> f64 {
         let deviations = fit.deviations();
-        let columns = self.data.columns().len();
         let mut most: f64 = 0.0;
         let mut refused: Option<(usize, Unfit)> = None;
         for (place, &index) in members.iter().enumerate() {
-            let mode = &mut self.modes[index];
-            let pole = fit.at.poles[place];
-            let change = pole - mode.pole;
+            let change = fit.at.poles[place] - self.modes[index].pole;
             most = most
                 .max(change.im.abs() / deviations[place][0])
                 .max(change.re.abs() / deviations[place][1]);
-            mode.pole = pole;
-            mode.amplitudes = Some(fit.amplitudes(place, columns));
-            mode.noise = fit.noise_by_column(columns);
+        }
+        self.take_over(members, fit);
+        for (place, &index) in members.iter().enumerate() {
+            let mode = &self.modes[index];
             // The latest start of several doubtful poles goes: two poles for one resonance make each
             // other doubtful.
             if let Some(reason) = mode.refusal(self.data, deviations[place])
@@ -707,19 +746,22 @@ impl Accepted<'_> {
         if most.is_nan() { f64::INFINITY } else { most }
     }
 
+    /// Fits the amplitudes of a group at its present poles.
+    fn fit_amplitudes(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
+        let band = BandData::new(self, members)?;
+        let poles = self.poles(members);
+        let mut numbers = (0..=FIRST_TERMS).rev();
+        let terms = numbers.find(|&terms| band.has_room(&poles, terms));
+        band.search(&poles, terms.unwrap_or(0), &band.scale(), 0)
+    }
+
     /// Fits a group from its present poles.
     fn fit_group(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
         let band = BandData::new(self, members)?;
         let mut poles = self.poles(members);
         let mut modes = members.iter().map(|&index| &self.modes[index]);
         if modes.all(|mode| mode.amplitudes.is_some()) {
-            // The noise of the sweep before, where all columns had one.
-            let first = members.first();
-            let known = first.map_or(&[][..], |&index| &self.modes[index].noise);
-            let noise: Option<Vec<f64>> = (band.used.iter())
-                .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
-                .collect();
-            let noise = match noise {
+            let noise = match self.noise(members, &band.used) {
                 Some(noise) => noise,
                 None => band.noise_of(&band.fit(&poles, 0, &band.scale())?),
             };
@@ -738,8 +780,17 @@ impl Accepted<'_> {
         band.fit(&fit.at.poles, terms, &noise)
     }
 
+    /// Noise of these columns in the sweep before; `None` where a column had none.
+    pub(super) fn noise(&self, members: &[usize], columns: &[usize]) -> Option<Vec<f64>> {
+        let known = &self.modes[*members.first()?].noise;
+        let columns = columns.iter();
+        columns
+            .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
+            .collect()
+    }
+
     /// Present poles of these modes (lines).
-    fn poles(&self, members: &[usize]) -> Vec<Complex64> {
+    pub(super) fn poles(&self, members: &[usize]) -> Vec<Complex64> {
         let members = members.iter();
         members.map(|&index| self.modes[index].pole).collect()
     }

@@ -624,6 +624,17 @@ impl<'a> Accepted<'a> {
         (accepted, fits)
     }
 
+    /// Drops a mode; [`refit`](Self::refit) then fits the others again.
+    pub fn remove(&mut self, index: usize) {
+        self.modes[index].failed = Some(Unfit::Unneeded);
+    }
+
+    /// Fits all modes again from where they are. Returns for each start its mode or the reason why there is none.
+    pub fn refit(&mut self) -> Vec<Result<ModeFit, Unfit>> {
+        let groups = self.run();
+        self.read(&groups)
+    }
+
     /// Reads the modes from the fits of their groups. Returns for each start its mode, or why there is none.
     fn read(&mut self, groups: &[Group]) -> Vec<Result<ModeFit, Unfit>> {
         let mut fits: Vec<Option<ModeFit>> = vec![None; self.modes.len()];
@@ -682,7 +693,7 @@ impl<'a> Accepted<'a> {
             .map_or(1, |group| group.fit.problem.lines.stride);
         if let (Some(group), Ok(mode)) = (&group, &test.fit)
             && let Some(place) = group.members.iter().position(|&index| index == last)
-            && let Some((probability, information_gain)) = beside.gain(group, place)
+            && let Some((probability, information_gain)) = beside.gain_of(group, place)
         {
             test.probability = probability;
             if let Some(nearest) = group.fit.nearest(place) {
@@ -690,41 +701,75 @@ impl<'a> Accepted<'a> {
                 let index = group.members[nearest];
                 test.neighbour = fits.and_then(|mut fits| fits.swap_remove(index).ok());
             }
-            let amplitudes = mode.amplitudes.iter();
-            let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
-            test.needed = probability < LEVEL
-                && information_gain > 0.0
-                && root_mean_square(&ratios) > LEAST_AMPLITUDE
-                && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
+            test.needed = is_needed(mode, probability, information_gain);
         }
         (test, beside, stride)
     }
 
-    /// Compares the fits with and without the pole at `place`; `None` where one of them fails. Returns the
-    /// probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
-    /// criterion.
-    ///
-    /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
-    /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
-    /// n ln S + k ln n.
-    fn gain(&self, group: &Group, place: usize) -> Option<(f64, f64)> {
+    /// Compares the fits with and without the pole at `place`, as [`gain`]; `None` where one of them fails.
+    fn gain_of(&self, group: &Group, place: usize) -> Option<(f64, f64)> {
         let fit = &group.fit;
         let band = BandData::new(self, &group.members).ok()?;
         let mut fewer: Vec<Complex64> = fit.at.poles.clone();
         fewer.remove(place);
-        let columns = fit.used.len() as f64;
-        let unknowns = 2.0 + 2.0 * columns;
-        let values = 2.0 * band.lines.count() as f64 * columns;
         // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
         let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
         let without = match fewer.is_empty() {
             true => band.square_sum_without(fit.terms, &fit.noise),
             false => band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum,
         };
-        let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
-        let fall = (without - with.at.square_sum) / unknowns / with.variance;
-        let probability = if fall > 0.0 { chance.sf(fall) } else { 1.0 };
-        let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
-        Some((probability, criterion))
+        gain(&band, &with, without)
     }
+
+    /// Returns true where the data ask for the fitted mode of start `index`, all other poles being as they are.
+    ///
+    /// [`test`](Self::test) lets the others move, and takes much longer.
+    pub fn needs(&self, index: usize, mode: &ModeFit) -> bool {
+        let members = &mode.joint_with;
+        let Some(place) = members.iter().position(|&member| member == index) else {
+            return false;
+        };
+        let gain = BandData::new(self, members).ok().and_then(|band| {
+            let noise = self.noise(members, &band.used)?;
+            let terms = mode.background_terms;
+            let poles = self.poles(members);
+            let mut fewer = poles.clone();
+            fewer.remove(place);
+            let with = band.search(&poles, terms, &noise, 0).ok()?;
+            let without = match fewer.is_empty() {
+                true => band.square_sum_without(terms, &noise),
+                false => band.search(&fewer, terms, &noise, 0).ok()?.at.square_sum,
+            };
+            gain(&band, &with, without)
+        });
+        gain.is_some_and(|(probability, gain)| is_needed(mode, probability, gain))
+    }
+}
+
+/// Compares two fits of a group's band, one `with` a pole and one without it, which leaves the sum of squares `without`.
+/// Returns the probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
+/// criterion.
+///
+/// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
+/// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
+/// n ln S + k ln n.
+fn gain(band: &BandData, with: &GroupFit, without: f64) -> Option<(f64, f64)> {
+    let columns = band.used.len() as f64;
+    let unknowns = 2.0 + 2.0 * columns;
+    let values = 2.0 * band.lines.count() as f64 * columns;
+    let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
+    let fall = (without - with.at.square_sum) / unknowns / with.variance;
+    let probability = if fall > 0.0 { chance.sf(fall) } else { 1.0 };
+    let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
+    Some((probability, criterion))
+}
+
+/// Returns true where noise alone does not explain the fall of the residual, and the mode is certain to decay.
+fn is_needed(mode: &ModeFit, probability: f64, information_gain: f64) -> bool {
+    let amplitudes = mode.amplitudes.iter();
+    let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
+    probability < LEVEL
+        && information_gain > 0.0
+        && root_mean_square(&ratios) > LEAST_AMPLITUDE
+        && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std
 }

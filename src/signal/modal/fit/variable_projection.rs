@@ -325,12 +325,18 @@ impl Problem for PoleProblem {
         })
     }
 
-    /// Poles stay in the upper half plane.
+    /// Poles stay in the upper half plane. Those of functions move by no more than their half width in a step: beyond
+    /// it the slopes say nothing, and among many modes a pole is thrown out of its resonance.
     fn moved(&self, parameters: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
         let moved: Vec<f64> = parameters.iter().zip(step).map(|(x, by)| x + by).collect();
         let allowed = moved.iter().all(|x| x.is_finite())
             && moved.iter().step_by(2).all(|position| *position > 0.0);
-        allowed.then_some(moved)
+        let bounded = self.lines.kappa.is_some()
+            || parameters.chunks_exact(2).enumerate().all(|(place, pole)| {
+                let step = step[2 * place].hypot(step[2 * place + 1]);
+                step <= pole[1].hypot(0.5)
+            });
+        (allowed && bounded).then_some(moved)
     }
 }
 

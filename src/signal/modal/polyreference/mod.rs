@@ -32,10 +32,11 @@ mod selection;
 mod stabilisation;
 
 use std::f64::consts::TAU;
+use std::slice::from_ref;
 
 use num_complex::Complex64;
 
-use super::{CompositeLevel, PeakSettings, find_peaks};
+use super::{CompositeLevel, PeakSettings, find_peaks, noise_of_function};
 use crate::spectral::{DISPLAY_RATIO, Lines};
 
 pub use selection::{PolyreferenceMode, select_modes};
@@ -109,6 +110,18 @@ pub struct PolyreferenceSettings {
     pub order: usize,
     /// Decay (1/s) that an exponential window has added to every pole; taken out of each. 0.
     pub added_decay: f64,
+    /// Peaks about which narrow bands are laid.
+    pub peaks: BandPeaks,
+}
+
+/// Peaks about which narrow bands are laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BandPeaks {
+    /// Those of all entries together: of free decays, whose lines share noise and ringing.
+    #[default]
+    Together,
+    /// Also those of single entries, over the noise of their own lines: of response functions.
+    EveryFunction,
 }
 
 impl Default for PolyreferenceSettings {
@@ -116,6 +129,7 @@ impl Default for PolyreferenceSettings {
         PolyreferenceSettings {
             order: 40,
             added_decay: 0.0,
+            peaks: BandPeaks::Together,
         }
     }
 }
@@ -238,6 +252,12 @@ const LEAST_BAND_LINES: f64 = 120.0;
 /// background.
 const HALF_POWER_WIDTHS: f64 = 16.0;
 
+/// Largest ratio of the reaches of two peaks of functions that share a band. 4: over a band wider than that the lags
+/// of an order no longer reach the decay of the lighter mode.
+const MOST_UNEQUAL: f64 = 4.0;
+/// Most functions whose peaks are looked for one by one. 12: more taps and sensors repeat each other.
+const MOST_ALONE: usize = 12;
+
 /// A band of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SubBand {
@@ -277,9 +297,9 @@ struct PeakGroup {
 
 /// Returns the bands around the groups of peaks of `matrix`, ascending; their cores do not overlap, and do
 /// not cover what lies far from every peak.
-pub fn sub_bands(matrix: &ResponseMatrix) -> Vec<SubBand> {
+pub fn sub_bands(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<SubBand> {
     let (low_end, high_end) = matrix.ends();
-    let groups = peak_groups(matrix);
+    let groups = peak_groups(matrix, peaks);
     let mut bands = Vec::with_capacity(groups.len());
     for (index, group) in groups.iter().enumerate() {
         let low = (group.first - group.reach).max(low_end);
@@ -301,7 +321,7 @@ pub fn sub_bands(matrix: &ResponseMatrix) -> Vec<SubBand> {
     bands
 }
 
-fn peak_groups(matrix: &ResponseMatrix) -> Vec<PeakGroup> {
+fn peak_groups(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<PeakGroup> {
     if matrix.points() < 3 {
         return Vec::new();
     }
@@ -318,26 +338,55 @@ fn peak_groups(matrix: &ResponseMatrix) -> Vec<PeakGroup> {
     let powers: Vec<Vec<f64>> = entries
         .map(|entry| entry.iter().map(Complex64::norm_sqr).collect())
         .collect();
-    let level = CompositeLevel::new(lines, &powers, None);
-    // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a mode costs time only.
-    let settings = PeakSettings {
-        blind_prominence_db: 6.0,
+    let mut levels = Vec::new();
+    // Less than the 15 dB that count as a resonance unseen: a band without a mode costs time only.
+    let mut settings = PeakSettings {
         above_noise_db: 10.0,
         ..PeakSettings::default()
     };
+    // Peaks of very different width share a band only where nothing is known of their noise.
+    let mut most_unequal = f64::INFINITY;
+    match peaks {
+        BandPeaks::Together => {
+            settings.blind_prominence_db = 6.0;
+            levels.push(CompositeLevel::new(lines, &powers, None));
+        }
+        BandPeaks::EveryFunction => {
+            most_unequal = MOST_UNEQUAL;
+            let noise = matrix.entries.iter().map(|entry| noise_of_function(entry));
+            let noise: Vec<Vec<f64>> = noise.collect();
+            levels.push(CompositeLevel::new(lines, &powers, Some(&noise)));
+            // A mode that moves one sensor alone may make no peak over all of them.
+            let alone = powers.iter().zip(&noise).take(MOST_ALONE);
+            levels.extend(alone.map(|(power, noise)| {
+                CompositeLevel::new(lines, from_ref(power), Some(from_ref(noise)))
+            }));
+        }
+    }
+    let mut peaks: Vec<(usize, f64)> = Vec::new();
+    for level in &levels {
+        for peak in find_peaks(level, &settings) {
+            // Lines over which the level stays within 3 dB of the peak.
+            let (before, after) = level.level_db.split_at(peak.index);
+            let least = after[0] - 3.0;
+            let below = before.iter().rev().take_while(|level| **level >= least);
+            let above = after.iter().take_while(|level| **level >= least);
+            peaks.push((peak.index, (below.count() + above.count()) as f64));
+        }
+    }
+    peaks.sort_by_key(|peak| peak.0);
+    peaks.dedup_by_key(|peak| peak.0);
     let mut groups: Vec<PeakGroup> = Vec::new();
-    for peak in find_peaks(&level, &settings) {
-        let frequency = matrix.frequency(peak.index);
-        // Lines over which the level stays within 3 dB of the peak.
-        let (before, after) = level.level_db.split_at(peak.index);
-        let least = after[0] - 3.0;
-        let below = before.iter().rev().take_while(|level| **level >= least);
-        let above = after.iter().take_while(|level| **level >= least);
-        let width = (below.count() + above.count()) as f64;
+    for (index, width) in peaks {
+        let frequency = matrix.frequency(index);
         let reach = 0.5 * (HALF_POWER_WIDTHS * width).max(LEAST_BAND_LINES) * matrix.spacing;
         match groups.last_mut() {
-            // A group is not longer than half a reach, so that its band stays narrow.
-            Some(group) if frequency - group.first < 0.5 * group.reach.min(reach) => {
+            // A group is not longer than half a reach, so that its band stays narrow. A light mode beside a plateau
+            // has a band of its own.
+            Some(group)
+                if frequency - group.first < 0.5 * group.reach.min(reach)
+                    && group.reach.max(reach) <= most_unequal * group.reach.min(reach) =>
+            {
                 group.last = frequency;
                 group.reach = group.reach.max(reach);
             }
@@ -369,7 +418,7 @@ pub fn find_modes(
         core: ends,
     };
     let mut searches = vec![search(matrix, whole_band, settings)?];
-    for band in sub_bands(matrix) {
+    for band in sub_bands(matrix, settings.peaks) {
         let mut part = search(matrix, band, settings)?;
         // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
         // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds

@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use tapjoint_signal::modal::polyreference::{
-    PoleStability, PolyreferenceError, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
-    all_modes, find_modes, select_modes, stabilise_poles, sub_bands,
+    BandPeaks, PoleStability, PolyreferenceError, PolyreferenceMode, PolyreferenceSettings,
+    ResponseMatrix, all_modes, find_modes, select_modes, stabilise_poles, sub_bands,
 };
 
 /// Frequency (Hz), damping ratio, factors of the outputs, factors of the inputs.
@@ -367,7 +367,7 @@ fn prop_sub_bands_ascend_and_their_cores_do_not_overlap() {
             })
             .collect();
         let responses = decay_transforms(&modes, 2.0, 50.0, seed);
-        let bands = sub_bands(&responses.matrix());
+        let bands = sub_bands(&responses.matrix(), BandPeaks::Together);
         assert!(!bands.is_empty());
         for band in &bands {
             assert!(

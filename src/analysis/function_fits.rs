@@ -206,10 +206,9 @@ impl FunctionModes<'_> {
                 let damping_ratio = reading.damping_ratio.unwrap_or(unread);
                 let width = damping_ratio * reading.frequency;
                 let near = |other: f64| (other - reading.frequency).abs() <= width + spacing;
-                let mut known = starts
-                    .iter()
-                    .chain(&found)
-                    .filter(|start| start.sure || start.peak.is_none());
+                // What finer lines show without a decay of its own may be noise over a wider resonance.
+                let decided = starts.iter().filter(|one| one.sure || one.peak.is_none());
+                let mut known = decided.chain(found.iter().filter(|one| one.bound.is_some()));
                 if known.any(|known| near(known.start.frequency)) {
                     continue;
                 }

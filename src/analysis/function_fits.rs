@@ -149,7 +149,8 @@ impl FunctionModes<'_> {
             for (index, proposal) in starts.iter().enumerate().rev() {
                 let Ok(fit) = &fits[index] else { continue };
                 let is_known = proposal.sure || groups.contains(&fit.joint_with.as_slice());
-                if !is_known && !(self.is_own(fit, proposal) && accepted.needs(index, fit)) {
+                let stays = is_known || self.is_own(fit, proposal) && accepted.needs(index, fit);
+                if !stays {
                     groups.push(&fit.joint_with);
                     strays.push(index);
                 }

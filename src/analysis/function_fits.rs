@@ -149,7 +149,8 @@ impl FunctionModes<'_> {
             for (index, proposal) in starts.iter().enumerate().rev() {
                 let Ok(fit) = &fits[index] else { continue };
                 let is_known = proposal.sure || groups.contains(&fit.joint_with.as_slice());
-                if !is_known && !(self.is_own(fit, proposal) && accepted.needs(index, fit)) {
+                let stays = is_known || self.is_own(fit, proposal) && accepted.needs(index, fit);
+                if !stays {
                     groups.push(&fit.joint_with);
                     strays.push(index);
                 }
@@ -206,10 +207,9 @@ impl FunctionModes<'_> {
                 let damping_ratio = reading.damping_ratio.unwrap_or(unread);
                 let width = damping_ratio * reading.frequency;
                 let near = |other: f64| (other - reading.frequency).abs() <= width + spacing;
-                let mut known = starts
-                    .iter()
-                    .chain(&found)
-                    .filter(|start| start.sure || start.peak.is_none());
+                // What finer lines show without a decay of its own may be noise over a wider resonance.
+                let decided = starts.iter().filter(|one| one.sure || one.peak.is_none());
+                let mut known = decided.chain(found.iter().filter(|one| one.bound.is_some()));
                 if known.any(|known| near(known.start.frequency)) {
                     continue;
                 }

@@ -359,7 +359,7 @@ impl<'a> Stage<'a> {
                 remove_offset(force, rate);
                 let mut copy = force.clone();
                 window.apply(&mut copy, rate);
-                ungated = Some(transformer.transform(&mut copy));
+                ungated = Some(transformer.transform(&copy));
                 gate.apply(force);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples

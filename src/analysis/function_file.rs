@@ -155,6 +155,7 @@ fn spectra_of_magnitudes(
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation: Stabilisation::default(),
     }
 }
@@ -211,6 +212,7 @@ fn spectra_of_functions(
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation,
     }
 }

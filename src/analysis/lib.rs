@@ -34,7 +34,9 @@ pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
-pub use measurement::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+pub use measurement::{
+    ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
+};
 use modes::{modes_of_bare, modes_of_test, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};

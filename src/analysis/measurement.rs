@@ -87,8 +87,20 @@ pub struct MeasuredSpectra {
     /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
     /// without a hammer or a quiet stretch before the first tap.
     pub force_noise: Option<Vec<f64>>,
+    /// The window about the force pulses; `None` without a hammer.
+    pub force_window: Option<ForceWindow>,
     /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
+}
+
+/// The window that keeps noise and offset of the hammer before and after a pulse out of the functions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceWindow {
+    /// Its length, half of the taper included, in the mean of the taps (s).
+    pub length: f64,
+    /// Largest change of H1 by the window over the resonances (1): |H1 with it - H1 without it| over |H1 without it|, each
+    /// the root of the sum of squares over the responses; `None` without a resonance.
+    pub h1_change: Option<f64>,
 }
 
 /// Reasons for which a measurement stops.
@@ -200,6 +212,16 @@ const AFTER_TRIGGER: f64 = 5e-3;
 /// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
 const LEAST_SAMPLES: u64 = 64;
 
+/// Averages over the accepted taps, and what is read from the transforms besides.
+struct Averages {
+    averages: AveragedSpectra,
+    /// Every tap's own transforms without a hammer, up to a bound on memory: their phases differ, so that they cannot be
+    /// averaged.
+    transforms: Vec<Vec<Complex64>>,
+    /// H1 of every response by the force without its window; `None` without a hammer.
+    ungated: Option<Vec<Vec<Complex64>>>,
+}
+
 /// Data that every step of one recording's measurement needs.
 struct Stage<'a> {
     recording: &'a Recording,
@@ -299,7 +321,11 @@ impl<'a> Stage<'a> {
             Some(WindowKind::Hann) => Window::Hann,
             Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
         };
-        let (averages, transforms) = self.averages(window)?;
+        let Averages {
+            averages,
+            transforms,
+            ungated,
+        } = self.averages(window)?;
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = match self.free_decays()? {
             Some(decays) => {
@@ -313,6 +339,7 @@ impl<'a> Stage<'a> {
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
+            force_window: self.force_window(&readings, &averages, ungated.as_deref()),
             averages,
             window,
             decay: Some(decay),
@@ -322,21 +349,21 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Returns the averages. Without a hammer it also returns every tap's own transforms, up to a bound on memory:
-    /// their phases differ, so that they cannot be averaged.
-    fn averages(
-        &self,
-        window: Window,
-    ) -> Result<(AveragedSpectra, Vec<Vec<Complex64>>), RecordingError> {
+    fn averages(&self, window: Window) -> Result<Averages, RecordingError> {
         let rate = self.recording.sample_rate();
         let mut averager = SpectralAverager::new(self.lines, self.responses());
+        let mut whole = SpectralAverager::new(self.lines, self.responses());
         let transformer = Transformer::new(rate, self.lines, self.gate as usize);
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
-            if let (Some(window), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
+            let mut ungated = None;
+            if let (Some(gate), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
                 remove_offset(force, rate);
-                window.apply(force);
+                let mut copy = force.clone();
+                window.apply(&mut copy, rate);
+                ungated = Some(transformer.transform(&copy));
+                gate.apply(force);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples
                 .iter_mut()
@@ -347,6 +374,9 @@ impl<'a> Stage<'a> {
                 .collect();
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
+            if let Some(force) = ungated {
+                whole.add(Some(&force), &responses);
+            }
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
                 // Time zero is moved to the trigger. The quiet stretch before it tilts the phase, and a fit of few
                 // lines could not follow that tilt as a background.
@@ -364,7 +394,43 @@ impl<'a> Stage<'a> {
         let averages = averager
             .finish()
             .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
-        Ok((averages, kept))
+        Ok(Averages {
+            averages,
+            transforms: kept,
+            ungated: whole.finish().and_then(|whole| whole.h1),
+        })
+    }
+
+    /// Length of the force window, and the change that it makes to H1 at the resonances.
+    fn force_window(
+        &self,
+        readings: &[ModeReading],
+        averages: &AveragedSpectra,
+        ungated: Option<&[Vec<Complex64>]>,
+    ) -> Option<ForceWindow> {
+        let (gated, ungated) = (averages.h1.as_deref()?, ungated?);
+        let mut largest: Option<f64> = None;
+        for reading in readings.iter().filter(|reading| reading.label.is_none()) {
+            let line = averages.lines.nearest(reading.frequency);
+            let (mut change, mut all) = (0.0, 0.0);
+            for (with, without) in gated.iter().zip(ungated) {
+                change += (with[line] - without[line]).norm_sqr();
+                all += without[line].norm_sqr();
+            }
+            if all > 0.0 {
+                largest = Some(f64::max(largest.unwrap_or(0.0), (change / all).sqrt()));
+            }
+        }
+        let rate = self.recording.sample_rate();
+        let windows = self
+            .taps
+            .accepted()
+            .filter_map(|tap| pulse_window(tap, rate));
+        let lengths: Vec<f64> = windows.map(PulseWindow::length).collect();
+        Some(ForceWindow {
+            length: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64 / rate,
+            h1_change: largest,
+        })
     }
 
     /// Peaks of the composite level over all sensors, read and labelled.
@@ -661,6 +727,11 @@ impl PulseWindow {
         let start = self.start.min(force.len());
         force[..start].fill(0.0);
         apply_force_window(&mut force[start..], self.length, self.taper);
+    }
+
+    /// Length of the window (samples), half of its taper included.
+    fn length(self) -> f64 {
+        self.length as f64 + 0.5 * self.taper as f64
     }
 
     /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.

@@ -228,6 +228,7 @@ mod tests {
             time,
             peak: 1.0,
             pulse_end: None,
+            pulse: None,
             record: 0..100,
             second_hit,
             rejection: None,

@@ -16,6 +16,8 @@ const PARAMETERS: &str =
 /// Heads of `modes.csv`.
 const MODES: &str = "mode,label,recording,method,frequency_Hz,std_Hz,line_frequency_Hz,half_line_Hz,\
      interpolated_frequency_Hz,interpolated_bound_Hz,damping,damping_std,lambda,coherence,random_error";
+/// Heads of `taps.csv`.
+const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fall_10_dB_Hz,fall_20_dB_Hz,usable_to_Hz";
 /// Heads of `perturbation.csv`. `kind` names the change of the frequencies. `percent` is its size where all
 /// were changed alike, and `mode` the mode that was changed alone. `statistic` says how `kx`, `ky` and `kz`
 /// (values without unit, or percent) follow from the estimates.
@@ -114,6 +116,32 @@ pub fn render_modes_csv(document: &Document) -> Result<String, ReportError> {
         ]);
     }
     write(MODES, rows)
+}
+
+/// Returns `taps.csv`: one row for each tap, used or not, with its force pulse in numbers where there is a hammer.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
+    let mut rows = Vec::new();
+    for recording in document.recordings.iter().flatten() {
+        for (index, tap) in recording.taps.iter().enumerate() {
+            rows.push(vec![
+                recording.file.clone(),
+                (index + 1).to_string(),
+                number(Some(tap.time)),
+                number(tap.peak_force.or(tap.peak_response)),
+                recording.tap_unit.clone().unwrap_or_default(),
+                tap.accepted.to_string(),
+                tap.reason.clone().unwrap_or_default(),
+                number(tap.pulse.map(|pulse| pulse.width)),
+                number(tap.pulse.and_then(|pulse| pulse.fall_10_db)),
+                number(tap.pulse.and_then(|pulse| pulse.fall_20_db)),
+                number(tap.pulse.map(|pulse| pulse.usable_to)),
+            ]);
+        }
+    }
+    write(TAPS, rows)
 }
 
 /// Returns `perturbation.csv`; only its header where nothing was perturbed.

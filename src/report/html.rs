@@ -252,6 +252,7 @@ fn measurement_sections<'a>(document: &Document) -> Vec<Section<'a>> {
                 tables::conditions(document),
                 tables::channels(document),
                 tables::taps(document),
+                tables::hammer(document),
             ]),
             ..Section::default()
         });

@@ -31,7 +31,7 @@ pub mod words {
 
 pub use data_files::{
     render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
-    render_perturbation_csv,
+    render_perturbation_csv, render_taps_csv,
 };
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,

@@ -17,10 +17,11 @@ use crate::picture::{Chart, Drawing, PictureFormat, packed, render_picture, rend
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
     ReportError, ReportFile, render_modes_csv, render_parameters_csv, render_perturbation_csv,
+    render_taps_csv,
 };
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
-/// `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
+/// `taps.csv` where there are taps, `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
 /// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `cloud`,
 /// `gap`, `gap-place`.
 ///
@@ -54,6 +55,10 @@ pub fn render_run(
         ReportFile::of("parameters.csv", render_parameters_csv(document)?),
         ReportFile::of("modes.csv", render_modes_csv(document)?),
     ]);
+    let mut recordings = document.recordings.iter().flatten();
+    if recordings.any(|recording| !recording.taps.is_empty()) {
+        files.push(ReportFile::of("taps.csv", render_taps_csv(document)?));
+    }
     if document.perturbation.is_some() {
         let text = render_perturbation_csv(document)?;
         files.push(ReportFile::of("perturbation.csv", text));
@@ -196,11 +201,12 @@ pub fn render_schema() -> String {
 /// The model that a diagnosis leads to, beside the report.
 pub const MODEL_FILE: &str = "updated-model.toml";
 /// Files of words, the model apart.
-const WORDS: [&str; 5] = [
+const WORDS: [&str; 6] = [
     "report.html",
     "report.json",
     "parameters.csv",
     "modes.csv",
+    "taps.csv",
     "perturbation.csv",
 ];
 /// Pictures of the whole test.

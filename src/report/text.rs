@@ -29,6 +29,7 @@ pub fn render_text(document: &Document) -> String {
         plain(tables::datasets(document)),
         joined([plain(tables::recordings(document)), plain(channels)]),
         joined(taps.map(plain)),
+        noted(tables::hammer(document)),
         modes(document),
         noted(tables::frfs(document)),
         estimate(document),

@@ -4,7 +4,7 @@ use crate::shared::steel_strip;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tapjoint::description::{ChannelRef, FitParameter, TestDescription};
+use tapjoint::description::{ChannelRef, FitParameter, TestDescription, WindowKind};
 use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout, Quantity};
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
@@ -318,6 +318,44 @@ fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
         "{}",
         lines.block
     );
+}
+
+#[test]
+fn recover_the_change_of_h1_by_the_force_window() {
+    let clean = one_tap(5.0);
+    let channels = |share: f64| {
+        let [mut force, response] =
+            [0, 1].map(|channel| clean.read(channel, 0..clean.frames()).unwrap());
+        let first = (0..force.len()).find(|&n| force[n] > 0.2).unwrap() - 4;
+        // A weaker copy of the pulse after half a second: far outside the window, and too weak for a second hit.
+        for n in 0..20 {
+            force[first + 1000 + n] += share * force[first + n];
+        }
+        [force, response].map(|samples| Channel {
+            samples,
+            ..Default::default()
+        })
+    };
+    // H1 with the window is (1 + share e^(-i w t)) times that without it.
+    for share in [0.0, 0.01, 0.03] {
+        let recording = Recording::from_samples("copy", 2000.0, channels(share).into()).unwrap();
+        let hammer = ChannelRef::Number(1);
+        let found = measure_bare(recording, Some(&hammer), |settings| {
+            settings.window = Some(WindowKind::Rectangular);
+        });
+        let window = found.unwrap().measurement.spectra.unwrap().force_window;
+        let window = window.expect("there is a hammer");
+        let change = window.h1_change.expect("there is a mode");
+        assert!((change - share).abs() < 5e-3, "{share}: {window:?}");
+        assert!((4e-3..20e-3).contains(&window.length), "{window:?}");
+    }
+}
+
+#[test]
+fn limit_there_is_no_force_window_without_a_hammer() {
+    let found = measure_bare(one_tap(5.0), None, |_| {}).unwrap();
+    assert_eq!(found.measurement.taps.mean_pulse(), None);
+    assert_eq!(found.measurement.spectra.unwrap().force_window, None);
 }
 
 /// Frequencies (Hz) of the first modes of a structure with this joint, Kt (N/m) and Kr (N m/rad).

@@ -15,6 +15,7 @@ use tapjoint_signal::recording::{
     Abscissa, ChannelInfo, Ordinate, Precision, UffCoding, UniversalFile,
 };
 use tapjoint_signal::spectral::Window;
+use tapjoint_signal::taps::Pulse;
 
 /// One recording.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -63,6 +64,8 @@ pub struct RecordingSection {
     pub window: Option<String>,
     /// Decay the window adds (1/s).
     pub window_decay: Option<f64>,
+    /// The force pulses in the mean of the accepted taps, and the window about them; null without a hammer.
+    pub hammer: Option<HammerSection>,
     /// Level at the record's end relative to its start, the largest of the responses.
     pub remaining_at_end: Option<f64>,
     /// This recording's own readings.
@@ -82,6 +85,20 @@ pub struct TapSection {
     pub accepted: bool,
     /// Why not.
     pub reason: Option<String>,
+    /// Its force pulse; null without a hammer.
+    pub pulse: Option<Pulse>,
+}
+
+/// The force pulses of a recording.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct HammerSection {
+    /// Mean of the accepted taps. A fall that one of them lacks is null.
+    pub pulse: Pulse,
+    /// Length of the window about each pulse, outside of which the force counts as zero (s), half of its taper included;
+    /// null without spectra.
+    pub force_window: Option<f64>,
+    /// Largest change of H1 at a resonance by that window (%); null without a resonance.
+    pub h1_change_percent: Option<f64>,
 }
 
 /// One channel of a recording, in the unit that its values have.
@@ -151,6 +168,14 @@ impl RecordingSection {
             peak_response: (!recording.has_hammer).then_some(tap.peak),
             accepted: tap.accepted(),
             reason: tap.rejection.as_ref().map(ToString::to_string),
+            pulse: tap.pulse,
+        });
+        let gate = spectra.and_then(|spectra| spectra.force_window);
+        let mean_pulse = recording.measurement.taps.mean_pulse();
+        let hammer = mean_pulse.map(|pulse| HammerSection {
+            pulse,
+            force_window: gate.map(|gate| gate.length),
+            h1_change_percent: gate.and_then(|gate| Some(100.0 * gate.h1_change?)),
         });
         let readings = recording.readings().iter().zip(&recording.mode_numbers);
         let modes = readings.map(|(reading, &mode)| ModeSection {
@@ -182,6 +207,7 @@ impl RecordingSection {
             band: lines.map(|lines| [lines.low, lines.high]),
             window: spectra.map(|spectra| spectra.window.name().to_string()),
             window_decay: spectra.and_then(|spectra| added_decay(spectra.window)),
+            hammer,
             remaining_at_end: spectra.and_then(|spectra| Some(spectra.decay?.remaining)),
             modes: modes.collect(),
         }

@@ -7,8 +7,8 @@ mod measured;
 mod model;
 
 pub use measured::{
-    AmplitudeSection, ChannelSection, DatasetSection, FitSection, FrfSection, ModeSection,
-    RecordingSection, TapSection, datasets_of, frf_document, method_name,
+    AmplitudeSection, ChannelSection, DatasetSection, FitSection, FrfSection, HammerSection,
+    ModeSection, RecordingSection, TapSection, datasets_of, frf_document, method_name,
 };
 pub use model::{
     Baseline, BaselineSection, EstimateSection, FreeBeamSection, GapPlaceSection, GapSection,

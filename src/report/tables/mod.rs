@@ -15,7 +15,7 @@ pub use modes::{
     fitted_to, frfs, mode_details, modes, modes_from, prediction, reading_details, readings,
 };
 pub use recordings::{
-    channels, conditions, datasets, quality, quality_all, quality_count, quality_doubts,
+    channels, conditions, datasets, hammer, quality, quality_all, quality_count, quality_doubts,
     recordings, rejected_taps, taps, taps_used,
 };
 

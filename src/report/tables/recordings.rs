@@ -8,6 +8,7 @@ use crate::format::{
     MISSING, optional, or_missing, significant, trimmed, unit_words, with_minus_signs,
 };
 use tapjoint_signal::quality::{Check, Outcome, QualityVerdict};
+use tapjoint_signal::taps::Pulse;
 
 /// One row for each recording, with its spectra; `None` without recordings.
 pub fn recordings(document: &Document) -> Option<Table> {
@@ -164,12 +165,27 @@ fn taps_of(
                 number("Time (s)", format!("{:.3}", tap.time)),
                 number("Peak", optional(peak(tap), 3)),
                 words("Unit", peak_unit(recording)),
+                page_number(
+                    "Pulse (ms)",
+                    optional(tap.pulse.map(|pulse| 1e3 * pulse.width), 3),
+                ),
+                page_number("−10 dB (Hz)", fall(tap.pulse, |pulse| pulse.fall_10_db)),
+                page_number("−20 dB (Hz)", fall(tap.pulse, |pulse| pulse.fall_20_db)),
+                page_number(
+                    "Usable to (Hz)",
+                    optional(tap.pulse.map(|pulse| pulse.usable_to), 3),
+                ),
                 words("Used", if tap.accepted { "yes" } else { "no" }),
                 words("Reason", tap.reason.clone().unwrap_or_default()),
             ]);
         }
     }
     some(Table::of(caption, rows, peaks_note(recordings)))
+}
+
+/// Frequency at which the spectrum of a pulse has fallen; a dash where it has not within the recording's band.
+fn fall(pulse: Option<Pulse>, read: fn(&Pulse) -> Option<f64>) -> String {
+    optional(pulse.as_ref().and_then(read), 3)
 }
 
 fn peak(tap: &TapSection) -> Option<f64> {
@@ -214,6 +230,32 @@ pub fn taps_used(document: &Document) -> Option<Table> {
         ]
     });
     some(Table::of("Taps used", rows, peaks_note(recordings)))
+}
+
+/// One row for each recording with a hammer: its force pulses in the mean; `None` without any.
+pub fn hammer(document: &Document) -> Option<Table> {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let rows = recordings.iter().filter_map(|one| {
+        let hammer = one.hammer.as_ref()?;
+        let pulse = hammer.pulse;
+        Some([
+            of_several(one, recordings),
+            number("Pulse (ms)", significant(1e3 * pulse.width, 3)),
+            number("−10 dB (Hz)", fall(Some(pulse), |pulse| pulse.fall_10_db)),
+            number("−20 dB (Hz)", fall(Some(pulse), |pulse| pulse.fall_20_db)),
+            number("Usable to (Hz)", significant(pulse.usable_to, 3)),
+            number(
+                "Force window (ms)",
+                optional(hammer.force_window.map(|length| 1e3 * length), 3),
+            ),
+            number("H1 changes by (%)", optional(hammer.h1_change_percent, 2)),
+        ])
+    });
+    let note = "Mean of the taps used. Pulse: width at half height. −10 and −20 dB: where the force spectrum has \
+                fallen so far. Usable to: the latter, where the spectrum comes within 10 dB of its noise, or sample \
+                rate/2.56, whichever is lowest. The force counts as zero outside the force window; H1 changes by: what \
+                that does at the resonances, at most.";
+    some(Table::of("Hammer", rows, note))
 }
 
 /// One row for each dataset; `None` without any.

@@ -205,9 +205,7 @@ pub mod limits {
     /// Fall of the force spectrum over the band (dB). 20: 10 to 20 dB are common, beyond that the far end
     /// is hardly excited (ISO 7626-5).
     pub const FORCE_FALL: f64 = 20.0;
-    /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
-    /// small by the share of its power, here a tenth.
-    pub const FORCE_OVER_NOISE: f64 = 10.0;
+    pub use crate::taps::FORCE_OVER_NOISE;
     /// Largest over smallest accepted tap. 3: 10 dB, one range of an amplifier; wider, a joint that is not
     /// linear shows in the averages.
     pub const TAP_LEVELS: f64 = 3.0;

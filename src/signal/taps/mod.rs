@@ -6,9 +6,11 @@
 //! next tap comes.
 
 mod double_hit;
+mod pulse;
 mod search;
 
 pub use double_hit::SecondHit;
+pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
 use std::fmt;
 use std::ops::Range;
@@ -98,6 +100,8 @@ pub struct Tap {
     pub peak: f64,
     /// Frame in which the force pulse, its ringing included, has died away; `None` without a hammer.
     pub pulse_end: Option<u64>,
+    /// Its force pulse in numbers; `None` without a hammer.
+    pub pulse: Option<Pulse>,
     /// Frames of its record: a little before the trigger to where the next tap comes.
     pub record: Range<u64>,
     /// A second hit within the record, from [`TapSettings::double_hit_warning`] of the peak up; `None`
@@ -264,6 +268,12 @@ impl Taps {
         self.accepted().map(Tap::frames).min()
     }
 
+    /// The force pulse in the mean of the accepted taps; `None` without a hammer or an accepted tap.
+    pub fn mean_pulse(&self) -> Option<Pulse> {
+        let pulses: Vec<Pulse> = self.accepted().filter_map(|tap| tap.pulse).collect();
+        Pulse::mean(&pulses)
+    }
+
     /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up.
     pub fn quiet(&self) -> Range<u64> {
         0..self.taps.first().map_or(0, |tap| tap.record.start)
@@ -356,10 +366,14 @@ fn tap(
     let record = start..end.max(start);
     // Least distance of two taps (frames).
     let least = (settings.least_distance * rate) as u64;
-    let (mut pulse_end, mut second) = (None, None);
+    let (mut pulse_end, mut pulse, mut second) = (None, None, None);
     if let Some(force) = force_of(recording, source, found, index, &record, least)? {
         let own = force.index(record.end.min(event.trigger + least));
-        pulse_end = Some(force.pulse_end(event, own));
+        let end = force.pulse_end(event, own);
+        let start = force.index(record.start);
+        let about = start..force.index(end).max(start);
+        pulse = Pulse::of(&force.samples[about], force.noise, rate);
+        pulse_end = Some(end);
         second = second_hit(&force, event, own, settings);
     }
     let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
@@ -379,6 +393,7 @@ fn tap(
         time: event.trigger as f64 / rate,
         peak: event.peak,
         pulse_end,
+        pulse,
         record,
         second_hit: second,
         rejection,

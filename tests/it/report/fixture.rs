@@ -112,6 +112,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        hammer: None,
         aside: None,
         conditions: Conditions {
             tap: Some(0.04),
@@ -156,6 +157,7 @@ fn taps() -> Vec<TapSection> {
         .iter()
         .enumerate()
         .map(|(index, reason)| TapSection {
+            pulse: None,
             time: 0.31 + 3.4 * index as f64,
             peak_force: Some(41.2 - 2.9 * index as f64),
             peak_response: None,
@@ -325,6 +327,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
         decay: None,
         readings,
         force_noise: None,
+        force_window: None,
         stabilisation: Default::default(),
     };
     spectra.stabilisation.searches = vec![band_search(band)];
@@ -446,6 +449,7 @@ fn measured_taps() -> Vec<Tap> {
             time: tap.time,
             peak: tap.peak_force.unwrap_or(1.0),
             pulse_end: None,
+            pulse: None,
             record: 0..0,
             second_hit: None,
             rejection: None,

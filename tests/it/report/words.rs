@@ -8,8 +8,11 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::tables::parameters;
 use tapjoint::report::words::findings as summary;
-use tapjoint::report::{render_json, render_modes_csv, render_parameters_csv, render_text};
+use tapjoint::report::{
+    render_json, render_modes_csv, render_parameters_csv, render_taps_csv, render_text,
+};
 use tapjoint::structure::Assembly;
+use tapjoint::taps::Pulse;
 
 use super::{broken, fixture, incomplete, rendered, text_of};
 use crate::golden::assert_snapshot;
@@ -260,6 +263,27 @@ fn val_modes_csv() {
         "{}",
         lines[6]
     );
+}
+
+#[test]
+fn val_taps_csv() {
+    let mut document = fixture::document();
+    let recordings = document.recordings.as_mut().expect("recordings");
+    recordings[0].taps[0].pulse = Some(Pulse {
+        width: 6e-4,
+        fall_10_db: Some(1140.0),
+        fall_20_db: None,
+        usable_to: 1000.0,
+    });
+    let csv = render_taps_csv(&document).expect("the table is written");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(
+        lines[1], "low.wav,1,0.31,41.2,N,true,,0.0006,1140,,1000",
+        "every column has its head: {}",
+        lines[0]
+    );
+    assert_eq!(lines[0].split(',').count(), 11);
+    assert!(lines[2].ends_with(",,,"), "{}", lines[2]);
 }
 
 #[test]

@@ -26,6 +26,9 @@ const LEAST_DECAY: f64 = 2.0;
 /// A fit may lie off its start by the half-power width of the start times this. 2: the linear estimator and readings
 /// between the lines are wrong by a half-power width only where another mode is as near.
 const WIDER: f64 = 2.0;
+/// Most proposals that are tested one by one, the clearest first: each is a fit of all modes near it, and noise over
+/// thousands of lines proposes hundreds.
+const MOST_TESTED: usize = 40;
 /// Numbers of lines whose means are searched as well. Each leaves to the next what is wider than two of its own lines.
 const COARSER: [usize; 3] = [4, 16, 64];
 /// Least number of coarser lines. 32: fewer hold no peak and its surroundings.
@@ -85,7 +88,7 @@ impl FunctionModes<'_> {
             0..0,
             failed.map(|(start, _)| start.clone()).collect::<Vec<_>>(),
         );
-        for proposal in later {
+        for proposal in later.into_iter().take(MOST_TESTED) {
             let (test, beside) = accepted.test(&proposal.start);
             let fitted = starts.iter().zip(&fits).filter(|(_, fit)| fit.is_ok());
             let fitted = fitted.map(|(start, _)| start.start);

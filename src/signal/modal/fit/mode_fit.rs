@@ -27,6 +27,8 @@ const SCATTERS: f64 = 0.2;
 const SCATTERS_CLEARLY: f64 = 0.01;
 /// Factor on two intervals of 95 % that shall both hold their values in 95 %: each must in 97.5 %, 2.241/1.960.
 const BOTH: f64 = 1.143;
+/// Share of energy from which a second pole counts. 2 %: an amplitude of a seventh.
+const LEAST_ENERGY: f64 = 0.02;
 /// A residual correlation beyond so many standard deviations is a misfit. 3: by chance one fit in 700.
 const CORRELATED: f64 = 3.0;
 /// Steps of the fit of one tap; it starts from the joint poles, or within a half width of its own.
@@ -189,15 +191,16 @@ impl ModeFit {
     /// Widens the intervals so that they hold two poles that explain the data better than this one alone.
     ///
     /// Two modes of one shape so near each other, and one mode whose frequency changes while it rings, look alike.
-    /// Either is inside. A pole of less than a tenth of the other's amplitude bends the line of the other, and is not
-    /// what was read.
+    /// Either is inside. A pole of far less energy only bends the other's line, and is not what
+    /// was read: the beginning of a decay that is not straight is fitted by a pole that has soon died away.
     pub fn widen_to(&mut self, poles: [&ModeFit; 2]) {
         let sizes = poles.map(|pole| {
-            let values = pole.amplitudes.iter();
-            root_mean_square(&values.map(|a| a.value.norm()).collect::<Vec<_>>())
+            // The energy of a decay is a^2/(4 sigma).
+            let squares = pole.amplitudes.iter().map(|a| a.value.norm_sqr());
+            squares.sum::<f64>() / pole.pole.re.abs()
         });
         for (pole, size) in poles.into_iter().zip(sizes) {
-            if size > 0.1 * sizes[0].max(sizes[1]) {
+            if size > LEAST_ENERGY * sizes[0].max(sizes[1]) {
                 self.frequency.widen_to(&pole.frequency);
                 self.damping_ratio.widen_to(&pole.damping_ratio);
             }

@@ -74,7 +74,10 @@ fn modes(document: &Document) -> String {
         );
         text.push_str(&wrapped(&note, 0));
     }
-    text.extend(tables::modes_from(document).map(|from| wrapped(&from, 0)));
+    let more = [tables::left_out(document), tables::modes_from(document)];
+    for sentence in more.into_iter().flatten() {
+        text.push_str(&wrapped(&sentence, 0));
+    }
     text
 }
 

@@ -10,6 +10,7 @@ use crate::format::{
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
     with_decimals_of,
 };
+use tapjoint_signal::modal::PeakLabel;
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
@@ -17,9 +18,39 @@ const LAMBDA_DIGITS: i32 = 6;
 /// Most significant digits of a damping ratio.
 const DAMPING_DIGITS: i32 = 4;
 
-/// One row for each resonance of the merged list; `None` without any.
+/// Height over the noise (dB) from which a peak that could not be read as a resonance is shown all the same. Noise alone
+/// does not reach it in a million lines: its power is exponentially distributed, and e^-100 is the probability of 20 dB.
+const STRONG: f64 = 20.0;
+
+/// Returns true for a peak that no resonance explains.
+fn is_unclear(mode: &ModeSection) -> bool {
+    mode.label.as_deref() == Some(PeakLabel::NoResonance.to_string().as_str())
+}
+
+/// Returns true for what tables show: resonances, and strong peaks that are none.
+fn is_shown(mode: &&ModeSection) -> bool {
+    let height = mode.above_noise_db.or(mode.prominence_db);
+    !is_unclear(mode) || height.is_some_and(|height| height >= STRONG)
+}
+
+/// "2 peaks of noise are left out; the JSON has them."; `None` where all are shown.
+pub fn left_out(document: &Document) -> Option<String> {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    match modes.iter().filter(|mode| !is_shown(mode)).count() {
+        0 => None,
+        1 => Some("1 peak of noise is left out; the JSON has it.".to_owned()),
+        count => Some(format!(
+            "{count} peaks of noise are left out; the JSON has them."
+        )),
+    }
+}
+
+/// One row for each resonance of the merged list, and for each strong peak that is none; `None` without any.
 pub fn modes(document: &Document) -> Option<Table> {
-    let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
+    let modes: Vec<&ModeSection> = document.modes.as_deref()?.iter().filter(is_shown).collect();
+    if modes.is_empty() {
+        return None;
+    }
     let given = modes.iter().all(|mode| mode.method.is_none());
     let described = document.test.iter().any(|test| test.kind.is_some());
     let caption = match (given, described) {
@@ -29,12 +60,15 @@ pub fn modes(document: &Document) -> Option<Table> {
     };
     let mut note = match given {
         true => "Frequency: as it was given, with its bound.".to_owned(),
-        false => note(document, modes, described),
+        false => note(document, &modes, described),
     };
+    if let Some(others) = left_out(document) {
+        note = format!("{note} {others}");
+    }
     if let Some(from) = modes_from(document) {
         note = format!("{from} {note}");
     }
-    Some(table(caption, modes.iter(), &note).without_columns(&DETAILS))
+    Some(table(caption, modes.into_iter(), &note).without_columns(&DETAILS))
 }
 
 /// "From soft.wav; hard.wav (8.8 times its tap level) enters the diagnosis alone."; `None` where every recording
@@ -63,7 +97,10 @@ pub fn modes_from(document: &Document) -> Option<String> {
 /// Details of the reading of each resonance of the merged list; `None` where nothing is known but the reading
 /// itself.
 pub fn mode_details(document: &Document) -> Option<Table> {
-    let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
+    let modes: Vec<&ModeSection> = document.modes.as_deref()?.iter().filter(is_shown).collect();
+    if modes.is_empty() {
+        return None;
+    }
     let mut notes = Vec::new();
     if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
         notes.push(INTERVAL_NOTE);
@@ -76,7 +113,11 @@ pub fn mode_details(document: &Document) -> Option<Table> {
             "Coherence and random error: of the sensor that knows the mode best, on its line.",
         );
     }
-    details(table("How each was read", modes.iter(), &notes.join(" ")))
+    details(table(
+        "How each was read",
+        modes.into_iter(),
+        &notes.join(" "),
+    ))
 }
 
 /// Details of the reading of each resonance in each recording; `None` where there is at most one recording.
@@ -117,7 +158,7 @@ pub fn fitted_to(document: &Document) -> &'static str {
 }
 
 /// Explains the columns and the methods that occur.
-fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
+fn note(document: &Document, modes: &[&ModeSection], described: bool) -> String {
     let (mut fitted, mut interpolated) = (false, false);
     for mode in modes {
         fitted |= mode.method == Some(ReadBy::Fit);
@@ -166,6 +207,7 @@ fn own_readings(document: &Document) -> Option<impl Iterator<Item = &ModeSection
     let mut modes = recordings
         .iter()
         .flat_map(|recording| &recording.modes)
+        .filter(is_shown)
         .peekable();
     modes.peek().is_some().then_some(modes)
 }
@@ -219,9 +261,14 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
     lambda.column.place = Place::Spacious;
     let scatter = fit.and_then(|fit| fit.scatter_probability);
     let random_error = mode.random_error.map(|error| 100.0 * error);
+    // A peak that is no resonance has a line, and no natural frequency.
+    let frequency = match is_unclear(mode) {
+        true => MISSING.to_owned(),
+        false => reading(mode).joined(),
+    };
     [
         words("Mode", mode_name(mode.mode, mode.label.as_deref())),
-        number("Frequency (Hz)", reading(mode).joined()),
+        number("Frequency (Hz)", frequency),
         page_words("Method", method_name(mode.method)),
         page_words("Interval from", interval),
         number("Line (Hz)", or_missing(line)),

@@ -20,6 +20,8 @@ use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
 const MOST_EXTRA: usize = 12;
+/// Most fits beside which a second pole is looked for, those that leave most first.
+const MOST_MISFITS: usize = 4;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
@@ -104,7 +106,10 @@ impl Candidates<'_> {
         if !added.is_empty() {
             fits = self.settled(&mut starts, &mut added, &settings);
         }
-        for fit in fits.iter().flatten().filter(|fit| fit.inflation > 1.0) {
+        let mut misfits: Vec<&ModeFit> = fits.iter().flatten().collect();
+        misfits.retain(|fit| fit.inflation > 1.0);
+        misfits.sort_by(|a, b| b.inflation.total_cmp(&a.inflation));
+        for fit in misfits.into_iter().take(MOST_MISFITS) {
             // One pole leaves more than noise, and no search proposed a second: it is looked for half a width away.
             let (frequency, ratio) = (fit.frequency.value, fit.damping_ratio.value);
             let near = |pole: &ModeFit| {

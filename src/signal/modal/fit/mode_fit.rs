@@ -132,13 +132,10 @@ impl FittedValue {
 }
 
 /// Frequencies and damping ratios of single taps, with their standard deviations.
-fn values_of(taps: &[TapFit]) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
-    let taps = taps.iter();
-    taps.map(|tap| {
-        let damping = (tap.damping_ratio, tap.damping_std);
-        ((tap.frequency, tap.frequency_std), damping)
-    })
-    .unzip()
+fn values_of(taps: &[TapFit]) -> [Vec<(f64, f64)>; 2] {
+    let frequencies = taps.iter().map(|tap| (tap.frequency, tap.frequency_std));
+    let dampings = taps.iter().map(|tap| (tap.damping_ratio, tap.damping_std));
+    [frequencies.collect(), dampings.collect()]
 }
 
 /// Takes the intervals of all modes of a recording from the scatter of their taps, where the taps scatter.
@@ -148,8 +145,7 @@ fn values_of(taps: &[TapFit]) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
 fn take_scatter(fits: &mut [Option<ModeFit>]) {
     let (mut squares, mut freedom) = ([0.0; 2], 0.0);
     for mode in fits.iter().flatten().filter(|mode| mode.taps.len() > 1) {
-        let (frequencies, dampings) = values_of(&mode.taps);
-        let scatters = [frequencies, dampings].map(|taps| scatter_about_mean(&taps));
+        let scatters = values_of(&mode.taps).map(|taps| scatter_about_mean(&taps));
         if scatters.iter().all(|scatter| scatter.is_finite()) {
             squares = [squares[0] + scatters[0], squares[1] + scatters[1]];
             freedom += mode.taps.len() as f64 - 1.0;
@@ -160,7 +156,7 @@ fn take_scatter(fits: &mut [Option<ModeFit>]) {
     }
     let [frequencies_do, dampings_do] = squares.map(|sum| chi_square_tail(sum, freedom) < SCATTERS);
     for mode in fits.iter_mut().flatten() {
-        let (frequencies, dampings) = values_of(&mode.taps);
+        let [frequencies, dampings] = values_of(&mode.taps);
         let [frequency, damping] = [&mut mode.frequency, &mut mode.damping_ratio];
         let is_clear =
             |value: &FittedValue| (value.scatter_probability).is_some_and(|p| p < SCATTERS_CLEARLY);
@@ -414,7 +410,7 @@ impl<'a> GroupReader<'a> {
         let stds = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
         let freedom = (fit.freedom / self.repetition).max(1.0);
         let taps = self.taps_of(place);
-        let (frequencies, dampings) = values_of(&taps);
+        let [frequencies, dampings] = values_of(&taps);
         let damping_ratio = FittedValue::new(joint.damping_ratio, stds[1], freedom, &dampings);
         // Less than two standard deviations beside the window's decay are no damping.
         let hidden = damping_ratio.value <= 0.0 || damping_ratio.value < 2.0 * damping_ratio.std;

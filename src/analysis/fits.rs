@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, TapForce, Unfit, fit_modes, modal_constants,
+    PoleStart, TapForce, Unfit, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
@@ -96,15 +96,13 @@ impl Candidates<'_> {
                 starts.push(start);
                 added.push(extra);
                 accepted = together;
-            } else if let (true, Ok(fit), Some(neighbour)) = (test.needed, test.fit, test.neighbour)
-                && self.may_be_added(&fit)
-            {
-                pairs.push([fit, neighbour]);
+            } else {
+                pairs.extend(self.pair(test));
             }
         }
         let peaks_alone = starts.len() - added.len();
         if !added.is_empty() {
-            fits = self.settled(&mut starts, &mut added, &settings);
+            (accepted, fits) = self.settled(&mut starts, &mut added, &settings);
         }
         let mut misfits: Vec<&ModeFit> = fits.iter().flatten().collect();
         misfits.retain(|fit| fit.inflation > 1.0);
@@ -121,9 +119,9 @@ impl Candidates<'_> {
                     frequency: frequency * (1.0 + side * ratio),
                     damping_ratio: Some(ratio),
                 });
-                if let (true, Ok(extra), Some(neighbour)) = (test.needed, test.fit, test.neighbour)
-                {
-                    pairs.push([extra, neighbour]);
+                let pair = self.pair(test);
+                if pair.is_some() {
+                    pairs.extend(pair);
                     break;
                 }
             }
@@ -168,15 +166,15 @@ impl Candidates<'_> {
         starts: &mut Vec<PoleStart>,
         added: &mut Vec<&PolyreferenceMode>,
         settings: &FitSettings,
-    ) -> Vec<Result<ModeFit, Unfit>> {
+    ) -> (Accepted<'_>, Vec<Result<ModeFit, Unfit>>) {
         let peaks = starts.len() - added.len();
         loop {
-            let fits = fit_modes(self.data, starts, settings);
+            let (accepted, fits) = Accepted::new(self.data, starts, settings);
             let mut of_added = fits.iter().skip(peaks);
             let stray =
                 of_added.position(|fit| fit.as_ref().is_ok_and(|fit| !self.may_be_added(fit)));
             let Some(stray) = stray else {
-                return fits;
+                return (accepted, fits);
             };
             starts.remove(peaks + stray);
             added.remove(stray);
@@ -228,6 +226,19 @@ impl Candidates<'_> {
         let low = first + margin.max(NEAR_ENDS.1 * first);
         let high = last - margin.max(NEAR_ENDS.1 * last);
         (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < MOST_DAMPING
+    }
+
+    /// Returns a tested pole with its neighbour, where the data ask for both, of one shape and near each other.
+    fn pair(&self, test: ExtraMode) -> Option<[ModeFit; 2]> {
+        let alike = test.likeness.is_none_or(|likeness| likeness >= UNLIKE);
+        let (true, Ok(extra), Some(neighbour)) = (test.needed && alike, test.fit, test.neighbour)
+        else {
+            return None;
+        };
+        let widths = [&extra, &neighbour].map(|fit| fit.frequency.value * fit.damping_ratio.value);
+        let distance = (extra.frequency.value - neighbour.frequency.value).abs();
+        let near = distance < APART * (widths[0] + widths[1]);
+        (near && self.may_be_added(&extra)).then_some([extra, neighbour])
     }
 
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.

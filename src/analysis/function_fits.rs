@@ -29,7 +29,7 @@ const WIDER: f64 = 2.0;
 /// Most proposals that are tested one by one, the clearest first: each is a fit of all modes near it, and noise over
 /// thousands of lines proposes hundreds.
 const MOST_TESTED: usize = 40;
-/// Numbers of lines whose means are searched as well. Each leaves to the next what is wider than two of its own lines.
+/// Numbers of lines whose means are searched as well, the finest first.
 const COARSER: [usize; 3] = [4, 16, 64];
 /// Least number of coarser lines. 32: fewer hold no peak and its surroundings.
 const LEAST_COARSE: usize = 32;
@@ -54,7 +54,7 @@ struct Proposal {
     peak: Option<usize>,
     /// Bound (Hz) of a resonance that coarser lines show.
     bound: Option<f64>,
-    /// True for a peak that was read as a resonance: it stays, whatever the fit says.
+    /// True for a peak that was read as a resonance, or that has a stable pole beside it: its fit is kept.
     sure: bool,
 }
 
@@ -102,7 +102,7 @@ impl FunctionModes<'_> {
         self.settle(&starts, &mut accepted, &mut fits);
         for (start, fit) in starts.iter().zip(&fits) {
             let Ok(fit) = fit else { continue };
-            if let Some(peak) = start.peak {
+            if let Some(peak) = start.peak.filter(|&peak| readings[peak].fit.is_none()) {
                 if self.is_near(fit, start) {
                     self.0.adopt(&mut readings[peak], fit);
                 }
@@ -121,8 +121,8 @@ impl FunctionModes<'_> {
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
 
-    /// Takes peaks for resonances that are none on their own lines and could not be fitted, where coarser lines show a
-    /// decaying oscillation: its noise is no white one. It lies within the bound of that reading.
+    /// Turns a peak that was no clear resonance into one where its fit failed but coarser lines show a decaying
+    /// oscillation. The bound of that reading becomes the bound of its line.
     fn read_coarse(&self, readings: &mut [ModeReading], coarse: &[Proposal]) {
         for one in coarse {
             let (Some(bound), Some(peak)) = (one.bound, one.peak) else {

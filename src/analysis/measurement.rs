@@ -565,8 +565,9 @@ impl<'a> Stage<'a> {
 
 /// Hum is looked for within so many half widths of a resonance and so many lines: the band of its fit.
 const HUM_REACH: (f64, f64) = (10.0, 12.0);
-/// Most multiples of the mains frequency that are looked for near one resonance. A damped one at 5 kHz has more.
-const MOST_HARMONICS: usize = 40;
+/// Most multiples of one mains frequency that are looked for near a resonance, the nearest ones. A damped one at 5 kHz has
+/// more.
+const MOST_HARMONICS: f64 = 40.0;
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
 struct PreTriggerNoise {
@@ -660,23 +661,21 @@ impl PreTriggerNoise {
         lines: &Lines,
         settings: &MainsSettings,
     ) -> Vec<f64> {
-        let mut found = Vec::new();
+        let (mut labelled, mut found) = (Vec::new(), Vec::new());
         for reading in readings {
             if let Some(PeakLabel::Mains(harmonic)) = reading.label {
-                found.push(harmonic);
+                labelled.push(harmonic);
                 continue;
             }
             let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
             let reach = HUM_REACH.0 * width + HUM_REACH.1 * 2.0 * lines.half_line();
             for mains in [50.0, 60.0] {
+                let reach = reach.min(0.5 * MOST_HARMONICS * mains);
                 let first = ((reading.frequency - reach) / mains).ceil().max(1.0) as usize;
                 let last = ((reading.frequency + reach) / mains).floor().max(0.0) as usize;
-                let harmonics = (first..=last).take(MOST_HARMONICS);
-                found.extend(harmonics.map(|number| mains * number as f64));
+                found.extend((first..=last).map(|number| mains * number as f64));
             }
         }
-        found.sort_by(f64::total_cmp);
-        found.dedup();
         found.retain(|&harmonic| {
             self.responses.iter().any(|samples| {
                 let before = line_amplitude(samples, self.sample_rate, harmonic);
@@ -684,6 +683,9 @@ impl PreTriggerNoise {
                 (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)
             })
         });
+        found.extend(labelled);
+        found.sort_by(f64::total_cmp);
+        found.dedup();
         found
     }
 

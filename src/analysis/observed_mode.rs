@@ -353,6 +353,9 @@ impl Repeats {
                 std: joint.std,
                 freedom: Some(joint.freedom).filter(|freedom| *freedom < KNOWN),
             },
+            Some(joint) if joint.source == UncertaintySource::TwoPoles => {
+                normal(joint.value, joint.std)
+            }
             // Weighted mean with the weights 1/std^2.
             _ => {
                 let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();

@@ -340,10 +340,10 @@ pub struct FitSection {
     pub damping_low: f64,
     /// Upper end of the damping ratio's 95 % interval.
     pub damping_high: f64,
-    /// Source of the frequency's standard deviation: "residual" (the noise that the fit leaves) or
-    /// "taps" (their scatter, where it is more than that noise explains).
+    /// Source of the frequency's interval: "residual" (the noise that the fit leaves), "taps" (their scatter, where it is
+    /// more than that noise explains) or "two-poles" (it holds two poles that explain the data better than one).
     pub uncertainty_from: UncertaintySource,
-    /// Degrees of freedom of the frequency's standard deviation.
+    /// Degrees of freedom behind the interval. The standard deviation already contains them where the source is "taps".
     pub freedom: f64,
     /// Probability that noise alone makes the taps scatter so; null with a single tap.
     pub scatter_probability: Option<f64>,

@@ -200,13 +200,13 @@ fn mode_of(document: &Document, mode: usize) -> Option<&ModeSection> {
 
 /// Bound of a resonance's best frequency (Hz).
 pub fn bound_of(mode: &ModeSection) -> Option<f64> {
+    let half = mode.low.zip(mode.high);
+    let half = half.map(|(low, high)| 0.5 * (high - low));
     let own = match mode.method {
         Some(ReadBy::Interpolated) => mode.interpolated_bound,
-        Some(ReadBy::Fit) => mode
-            .low
-            .zip(mode.high)
-            .map(|(low, high)| 0.5 * (high - low)),
-        Some(ReadBy::Line) | None => None,
+        // A line that coarser lines show as a resonance has a wider bound than half a line.
+        Some(ReadBy::Fit | ReadBy::Line) => half,
+        None => None,
     };
     own.or(mode.half_line)
         .or(mode.std.map(|std| 2.0 * std))

@@ -29,7 +29,7 @@ fn is_unclear(mode: &ModeSection) -> bool {
 
 /// Returns true for what tables show: resonances, and strong peaks that are none.
 fn is_shown(mode: &&ModeSection) -> bool {
-    let height = mode.above_noise_db.or(mode.prominence_db);
+    let height = mode.above_noise_db;
     !is_unclear(mode) || height.is_some_and(|height| height >= STRONG)
 }
 
@@ -298,7 +298,10 @@ fn tap_deviation(mode: &ModeSection) -> Option<f64> {
 /// The best frequency with its bound.
 pub fn reading(mode: &ModeSection) -> Rounded {
     match (mode.method, mode.half_line, bound_of(mode)) {
-        (Some(ReadBy::Line) | None, Some(half_line), _) => line_reading(mode.frequency, half_line),
+        (Some(ReadBy::Line) | None, Some(half_line), bound) => line_reading(
+            mode.frequency,
+            bound.map_or(half_line, |bound| bound.max(half_line)),
+        ),
         (_, half_line, Some(bound)) => frequency_reading(mode.frequency, bound, half_line),
         (_, _, None) => Rounded {
             value: significant(mode.frequency, 6),

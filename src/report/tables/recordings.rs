@@ -183,7 +183,7 @@ fn taps_of(
     some(Table::of(caption, rows, peaks_note(recordings)))
 }
 
-/// Frequency at which the spectrum of a pulse has fallen; a dash where it has not within the recording's band.
+/// Frequency at which the spectrum of a pulse has fallen; a dash where it has not fallen so far at half the sample rate.
 fn fall(pulse: Option<Pulse>, read: fn(&Pulse) -> Option<f64>) -> String {
     optional(pulse.as_ref().and_then(read), 3)
 }
@@ -252,9 +252,9 @@ pub fn hammer(document: &Document) -> Option<Table> {
         ])
     });
     let note = "Mean of the taps used. Pulse: width at half height. −10 and −20 dB: where the force spectrum has \
-                fallen so far. Usable to: the latter, where the spectrum comes within 10 dB of its noise, or sample \
-                rate/2.56, whichever is lowest. The force counts as zero outside the force window; H1 changes by: what \
-                that does at the resonances, at most.";
+                fallen so far. Usable to: the lowest of three frequencies: the fall by 20 dB, the spectrum within \
+                10 dB of the channel's noise, sample rate/2.56. The force counts as zero outside the force window. H1 \
+                changes by: the largest change at a resonance by that window.";
     some(Table::of("Hammer", rows, note))
 }
 

@@ -432,8 +432,8 @@ impl GroupFit {
         let shares = powers
             .iter()
             .map(|power| (power[0] / whole[0]).min(power[1] / whole[1]));
-        let alike = self.likeness(data, one, other);
-        shares.sum::<f64>() < SAME_TAPS && alike.is_none_or(|alike| alike > SAME_SHAPE)
+        let alike = || self.likeness(data, one, other);
+        shares.sum::<f64>() < SAME_TAPS && alike().is_none_or(|alike| alike > SAME_SHAPE)
     }
 
     /// Standard deviations of position and decay of each pole (lines), from the residual.
@@ -726,10 +726,9 @@ impl Accepted<'_> {
             }
         }
         for (place, &index) in members.iter().enumerate() {
-            let mut before = 0..place;
-            if refused.is_none() && before.any(|other| fit.is_one_mode(self.data, other, place)) {
-                let later = members[..place].iter().fold(index, |a, &b| a.max(b));
-                refused = Some((later, Unfit::NotIndependent));
+            let same = (0..place).find(|&other| fit.is_one_mode(self.data, other, place));
+            if let (None, Some(other)) = (&refused, same) {
+                refused = Some((index.max(members[other]), Unfit::NotIndependent));
             }
         }
         if let Some((index, reason)) = refused {

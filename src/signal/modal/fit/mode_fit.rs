@@ -35,8 +35,8 @@ const CORRELATED: f64 = 3.0;
 const TAP_STEPS: usize = 6;
 /// Half widths by which a tap's frequencies may be away from the joint ones. The band of the fit reaches to 10.
 const MOST_MOVED: u8 = 8;
-/// Fall of a tap's residual that a start elsewhere must bring, in variances of the residual there. 25: noise alone brings
-/// it at one of the 16 places in ten thousand taps.
+/// A fall of a tap's residual that a start elsewhere must bring, in variances of that residual. 25: by noise alone, one tap
+/// in ten thousand has such a fall at any of the 16 places.
 const CLEARLY_LESS: f64 = 25.0;
 
 /// Origin of a standard deviation.
@@ -365,16 +365,28 @@ impl<'a> GroupReader<'a> {
             let tap = data.columns()[column].tap;
             places.entry(tap).or_default().push(place);
         }
+        let is_decay = matches!(data.basis(), Basis::FreeDecay { .. });
+        let several = places.len() > 1;
         let mut problem = fit.problem.clone();
         let mut taps = Vec::new();
         for (tap, places) in places {
             problem.columns = fit.problem.columns.select_columns(&places);
-            let (start, moved) = moved_start(&problem, &fit.at.poles);
+            // A single tap has the joint fit; the places of functions are no repeats.
+            let (start, moved) = match (is_decay && several, &fit.at.poles) {
+                (true, joint) => moved_start(&problem, joint),
+                (false, joint) => (joint.clone(), 0.0),
+            };
             if let Some(best) = problem.search(&start, fit.freedom, TAP_STEPS)
                 && let Some(covariance) = best.slopes.covariance(match moved {
                     0.0 => fit.variance,
                     // The joint fit does not describe this tap, and its residual is no noise.
-                    _ => best.at.square_sum / problem.columns.len() as f64,
+                    _ => {
+                        let columns = problem.columns.ncols();
+                        let linear = fit.problem.fixed.rank() + 2 * fit.at.poles.len();
+                        let values = problem.columns.len() as f64;
+                        let unknowns = (linear * columns + 2 * fit.at.poles.len()) as f64;
+                        best.at.square_sum / (values - unknowns).max(1.0)
+                    }
                 })
             {
                 taps.push(TapPoles {

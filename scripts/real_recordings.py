@@ -10,8 +10,8 @@ neither as missing nor as further.
 
 For each file and band that is not as expected it prints what was expected, found, missing and further (`--modes`:
 for all). Then it prints the recall over all files, and the precision where the README calls its list complete.
-A further mode that at least half of the files of one structure show in the same band, within 0.5 %, is counted apart
-(column `again`) and not as wrong: a list of bending modes does not name torsion or bending to the side.
+The column `again` says how many of the further modes at least half of three or more files of one structure show in the
+same band, within 0.5 %. They count as wrong all the same, though a list of bending modes does not name torsion.
 Elsewhere each further mode must stand 10 dB over the floor, and have a stable column of pyEMA where pyEMA is
 installed (`pip install pyema`). Without it columns are not judged. A file that cannot be read counts as failed, and
 all its modes as missing.
@@ -39,8 +39,7 @@ from pathlib import Path
 
 # A mode nearer than this share to a band's end is not counted.
 NEAR_END = 0.02
-# Further modes of several files of one structure are one where they lie within this share of each other, and belong to
-# the structure where at least half of the files show them: chance does not repeat a frequency.
+# Further modes of several files of one structure are the same where they lie within this share of each other.
 SAME = 0.005
 # A further mode stands this far (dB) over the floor: the median of the level about it.
 OVER_FLOOR = 10.0
@@ -291,7 +290,7 @@ class Outcome:
     # Within the range in which the list is complete.
     right: int = 0
     wrong: int = 0
-    # Further modes that at least half of the files show.
+    # Those of the wrong ones that at least half of the files show.
     again: int = 0
     further: int = 0
     doubtful: int = 0
@@ -404,7 +403,6 @@ def try_set(program, data, one, show):
         for zoom in [None, *one.bands]:
             total.add(try_band(program, one, file, path, zoom, columns, show, seen))
     total.again = sum(repeated(files) for files in seen.values())
-    total.wrong -= total.again
     if one.name == "independent":
         total.add(run_independent(program, data, one))
     return total

@@ -16,8 +16,8 @@ use super::{Answer, Noise, found, log_uniform};
 #[derive(Debug, Default)]
 pub struct FunctionAnswers {
     pub answers: Vec<Answer>,
-    /// Number of modes that the program lists and that are farther from every true one than a line and its half-power
-    /// width, or a second one at the same.
+    /// Number of listed modes without a drawn mode within a line and half of its half-power width. A second mode listed
+    /// for one drawn mode counts too.
     pub invented: usize,
 }
 

@@ -23,10 +23,10 @@ const MOST_EXTRA: usize = 12;
 /// Most fits beside which a second pole is looked for, those that leave most first.
 const MOST_MISFITS: usize = 4;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
-const APART: f64 = 3.0;
+pub(super) const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
 /// whose frequency changes while it rings is fitted by two poles of one shape.
-const UNLIKE: f64 = 0.9;
+pub(super) const UNLIKE: f64 = 0.9;
 /// Distance from the ends of the band within which a mode without a peak is none: lines, and a share of the frequency,
 /// whichever is more.
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
@@ -126,17 +126,14 @@ impl Candidates<'_> {
                 }
             }
         }
-        for [one, other] in &pairs {
-            let distance = |fit: &ModeFit| {
-                let frequency = fit.frequency.value;
-                (frequency - one.frequency.value)
-                    .abs()
-                    .min((frequency - other.frequency.value).abs())
-            };
+        for [extra, neighbour] in &pairs {
+            // The listed mode is the pole beside which the other was tested, or has taken a place between the two.
+            let distance = |fit: &ModeFit| (fit.frequency.value - neighbour.frequency.value).abs();
+            let reach = APART * half_widths([extra, neighbour]);
             let nearest = fits.iter_mut().flatten();
             let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            if let Some(fit) = nearest {
-                fit.widen_to([one, other]);
+            if let Some(fit) = nearest.filter(|fit| distance(fit) < reach) {
+                fit.widen_to([extra, neighbour]);
             }
         }
         let (of_peaks, of_added) = fits.split_at(peaks_alone);
@@ -148,13 +145,7 @@ impl Candidates<'_> {
         // Modes that make no peak.
         for (proposal, fit) in added.into_iter().zip(of_added) {
             let Ok(fit) = fit else { continue };
-            let line = self.lines.nearest(fit.frequency.value);
-            let mut reading =
-                ModeReading::on_line(self.lines.frequency(line), self.lines.half_line());
-            reading.above_noise_db = Some(proposal.above_noise_db);
-            reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
-            reading.select_estimate(ReadBy::Fit);
-            readings.push(reading);
+            readings.push(self.without_peak(fit, proposal.above_noise_db));
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
@@ -191,15 +182,7 @@ impl Candidates<'_> {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
         let (mut starts, mut peaks) = (Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
-            // The mode that belongs to a peak: the nearest within a line and its half-power width.
-            let near = free.iter().enumerate().filter_map(|(place, mode)| {
-                let mode = (*mode)?;
-                let distance = (mode.frequency - reading.frequency).abs();
-                let width = mode.damping_ratio * mode.frequency;
-                (distance <= 2.0 * self.lines.half_line() + width).then_some((place, distance))
-            });
-            let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
-            let own = nearest.and_then(|(place, _)| free[place].take());
+            let own = self.take_nearest(&mut free, reading);
             match (reading.label, own) {
                 (None, None) => starts.push(PoleStart {
                     frequency: reading.frequency,
@@ -213,6 +196,33 @@ impl Candidates<'_> {
         let mut extras: Vec<&PolyreferenceMode> = free.into_iter().flatten().collect();
         extras.sort_by(|a, b| b.above_noise_db.total_cmp(&a.above_noise_db));
         (starts, peaks, extras)
+    }
+
+    /// Takes the mode of the polyreference fit that belongs to a peak out of those that are `free`: the nearest within a
+    /// line and half of its half-power width.
+    pub fn take_nearest<'m>(
+        &self,
+        free: &mut [Option<&'m PolyreferenceMode>],
+        reading: &ModeReading,
+    ) -> Option<&'m PolyreferenceMode> {
+        let near = free.iter().enumerate().filter_map(|(place, mode)| {
+            let mode = (*mode)?;
+            let distance = (mode.frequency - reading.frequency).abs();
+            let width = mode.damping_ratio * mode.frequency;
+            (distance <= 2.0 * self.lines.half_line() + width).then_some((place, distance))
+        });
+        let (place, _) = near.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        free[place].take()
+    }
+
+    /// Returns the reading of a fitted mode that makes no peak.
+    pub fn without_peak(&self, fit: &ModeFit, above_noise_db: f64) -> ModeReading {
+        let line = self.lines.nearest(fit.frequency.value);
+        let mut reading = ModeReading::on_line(self.lines.frequency(line), self.lines.half_line());
+        reading.above_noise_db = Some(above_noise_db);
+        reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
+        reading.select_estimate(ReadBy::Fit);
+        reading
     }
 
     /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
@@ -235,9 +245,8 @@ impl Candidates<'_> {
         else {
             return None;
         };
-        let widths = [&extra, &neighbour].map(|fit| fit.frequency.value * fit.damping_ratio.value);
         let distance = (extra.frequency.value - neighbour.frequency.value).abs();
-        let near = distance < APART * (widths[0] + widths[1]);
+        let near = distance < APART * half_widths([&extra, &neighbour]);
         (near && self.may_be_added(&extra)).then_some([extra, neighbour])
     }
 
@@ -281,6 +290,12 @@ impl Candidates<'_> {
         }
         reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
     }
+}
+
+/// Half the half-power widths of two modes together (Hz).
+fn half_widths(fits: [&ModeFit; 2]) -> f64 {
+    let widths = fits.map(|fit| fit.frequency.value * fit.damping_ratio.value);
+    widths.iter().sum()
 }
 
 pub(super) fn start_of(mode: &PolyreferenceMode) -> PoleStart {

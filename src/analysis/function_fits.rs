@@ -1,29 +1,24 @@
-//! Modes fitted to frequency response functions: every stable column that the functions call for.
+//! Modes fitted to frequency response functions.
 //!
-//! A function has no ringing before its first line, no force and no taps: its noise can be read from its lines, and a
-//! fit over many lines tells close modes apart. So all poles that the polyreference fit finds stable are fitted
-//! together, and those leave that the functions can do without.
+//! The noise of a function is estimated from its lines. All poles that the polyreference fit finds stable are fitted
+//! together. Poles that do not lower the residual beyond chance are then dropped.
 
-use super::fits::{CLEAR_AMPLITUDE, Candidates, is_clear, start_of};
+use super::fits::{APART, CLEAR_AMPLITUDE, Candidates, UNLIKE, is_clear, start_of};
 use num_complex::Complex64;
 use tapjoint_signal::modal::fit::{Accepted, ExtraMode, FitSettings, ModeFit, PoleStart, Unfit};
 use tapjoint_signal::modal::polyreference::{PolyreferenceMode, all_modes};
 use tapjoint_signal::modal::{
-    CompositeLevel, FittedReading, ModeReading, PeakLabel, PeakSettings, ReadBy, find_peaks,
-    noise_of_function, read_peaks,
+    CompositeLevel, ModeReading, PeakLabel, PeakSettings, ReadBy, find_peaks, noise_of_function,
+    read_peaks,
 };
 use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Window};
 
-/// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
-const APART: f64 = 3.0;
-/// A single response shows no shapes. There two modes are distinct beyond this multiple: each then has a maximum of
-/// its own, or a shoulder. The poles that mend the line of one mode lie within its half-power width.
+/// A single response shows no shapes. There two modes are distinct beyond this multiple of their half-power widths, not
+/// beyond [`APART`]: each then has a maximum of its own, or a shoulder. The poles that mend the line of one mode lie within its half-power width.
 const APART_ALONE: f64 = 1.0;
-/// Nearer than that, their shapes must differ: a modal assurance criterion below this.
-const UNLIKE: f64 = 0.9;
 /// Least decay over the record (sigma T) of a peak that may be noise.
 const LEAST_DECAY: f64 = 2.0;
-/// A fit may lie off its start by the half-power width of the start times this. 2: the linear estimator and readings
+/// A fit may lie off its start by half of the start's half-power width times this. 2: the linear estimator and readings
 /// between the lines are wrong by a half-power width only where another mode is as near.
 const WIDER: f64 = 2.0;
 /// Most proposals that are tested one by one, the clearest first: each is a fit of all modes near it, and noise over
@@ -31,7 +26,7 @@ const WIDER: f64 = 2.0;
 const MOST_TESTED: usize = 40;
 /// Numbers of lines whose means are searched as well, the finest first.
 const COARSER: [usize; 3] = [4, 16, 64];
-/// Least number of coarser lines. 32: fewer hold no peak and its surroundings.
+/// Least number of coarser lines. 32: fewer are too short for a peak and its surroundings.
 const LEAST_COARSE: usize = 32;
 
 /// Level of response functions over the noise of their own lines.
@@ -109,13 +104,7 @@ impl FunctionModes<'_> {
                 continue;
             }
             // A mode that makes no peak.
-            let line = self.0.lines.nearest(fit.frequency.value);
-            let line = self.0.lines.frequency(line);
-            let mut reading = ModeReading::on_line(line, self.0.lines.half_line());
-            reading.above_noise_db = Some(start.above_noise_db);
-            reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
-            reading.select_estimate(ReadBy::Fit);
-            readings.push(reading);
+            readings.push(self.0.without_peak(fit, start.above_noise_db));
         }
         self.read_coarse(readings, &proposals);
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
@@ -138,8 +127,8 @@ impl FunctionModes<'_> {
         }
     }
 
-    /// Drops the modes that leave their place beside the others or that the data do not ask for: of each group of
-    /// close modes the least clear one, until all stay.
+    /// Drops modes that moved away from their start, and modes that the data do not need. From each group of close
+    /// modes it drops the least clear one, fits again, and repeats this until all modes stay.
     fn settle(
         &self,
         starts: &[Proposal],
@@ -250,15 +239,7 @@ impl FunctionModes<'_> {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
         let mut starts: Vec<Proposal> = Vec::new();
         for (index, reading) in readings.iter().enumerate() {
-            // The mode that belongs to a peak: the nearest within a line and its half-power width.
-            let near = free.iter().enumerate().filter_map(|(place, mode)| {
-                let mode = (*mode)?;
-                let distance = (mode.frequency - reading.frequency).abs();
-                let width = mode.damping_ratio * mode.frequency;
-                (distance <= 2.0 * self.0.lines.half_line() + width).then_some((place, distance))
-            });
-            let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
-            let own = nearest.and_then(|(place, _)| free[place].take());
+            let own = self.0.take_nearest(&mut free, reading);
             let resonance = reading.label != Some(PeakLabel::NoResonance);
             starts.push(Proposal {
                 start: own.map_or(
@@ -286,8 +267,8 @@ impl FunctionModes<'_> {
         starts
     }
 
-    /// Returns true if a fit lies where it was proposed, within two half lines and its half-power width. A fit that left
-    /// it for another mode, or that became wide to mend what the others miss, is no reading of this one.
+    /// Returns true if a fit lies where it was proposed: within a line and half of its half-power width. This rejects a
+    /// fit that moved to another mode, and one that became wide to explain what the other modes do not.
     fn is_near(&self, fit: &ModeFit, proposal: &Proposal) -> bool {
         let found = fit.frequency.value;
         let start = proposal.start.damping_ratio.unwrap_or(0.0);
@@ -301,7 +282,7 @@ impl FunctionModes<'_> {
         (found - proposal.start.frequency).abs() <= 2.0 * self.0.lines.half_line() + width
     }
 
-    /// Returns true if a fit is a clear mode where it was proposed: within its half-power width.
+    /// Returns true if a fit is a clear mode, lies where it was proposed, and decays within the record.
     fn is_own(&self, fit: &ModeFit, proposal: &Proposal) -> bool {
         // A peak of noise is as narrow as the record allows.
         let decay = -fit.pole.re * self.0.lines.duration;

@@ -96,10 +96,10 @@ pub struct MeasuredSpectra {
 /// The window that keeps noise and offset of the hammer before and after a pulse out of the functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceWindow {
-    /// Its length, half of the taper included, in the mean of the taps (s).
+    /// Length (s), half of the taper included: mean of the accepted taps.
     pub length: f64,
-    /// Largest change of H1 by the window over the resonances (1): |H1 with it - H1 without it| over |H1 without it|, each
-    /// the root of the sum of squares over the responses; `None` without a resonance.
+    /// Largest relative change of H1 that the window causes at a resonance (1): sqrt(sum |H1w - H1|^2 / sum |H1|^2) over
+    /// the responses, H1w with the window, H1 without it. `None` without a resonance.
     pub h1_change: Option<f64>,
 }
 
@@ -563,11 +563,13 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Hum is looked for within so many half widths of a resonance and so many lines: the band of its fit.
+/// Hum is looked for within this many half widths (zeta f) of a resonance plus this many lines: the band of its fit.
 const HUM_REACH: (f64, f64) = (10.0, 12.0);
 /// Most multiples of one mains frequency that are looked for near a resonance, the nearest ones. A damped one at 5 kHz has
 /// more.
 const MOST_HARMONICS: f64 = 40.0;
+/// Most samples before the taps in which hum is looked for: some seconds. Each harmonic passes over all of them.
+const MOST_QUIET: usize = 1 << 17;
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
 struct PreTriggerNoise {
@@ -652,7 +654,8 @@ impl PreTriggerNoise {
         mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
     }
 
-    /// Returns the multiples of 50 and 60 Hz (Hz) near the readings that were there before the taps, in any response.
+    /// Returns the frequencies of mains hum near the readings (Hz): multiples of 50 and 60 Hz that any response shows
+    /// before the first tap.
     ///
     /// Under the peak of a resonance hum makes no peak of its own, and has no label. A fit without it would be wrong.
     fn hum_beside(
@@ -676,8 +679,11 @@ impl PreTriggerNoise {
                 found.extend((first..=last).map(|number| mains * number as f64));
             }
         }
+        found.sort_by(f64::total_cmp);
+        found.dedup();
         found.retain(|&harmonic| {
             self.responses.iter().any(|samples| {
+                let samples = &samples[samples.len().saturating_sub(MOST_QUIET)..];
                 let before = line_amplitude(samples, self.sample_rate, harmonic);
                 let noise = noise_beside(samples, self.sample_rate, harmonic);
                 (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)

@@ -121,7 +121,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let given = described.iter().chain(&own_options);
         if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
             bail!(
-                "{name} is for bare recordings; a test description says it itself: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `band`, `block`, `window`"
+                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `band`, `block`, `window`"
             );
         }
         let file = read_test(file, terminal)?;

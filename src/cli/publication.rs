@@ -137,7 +137,7 @@ pub(super) fn end_begun(path: &Path, files: &Files) -> anyhow::Result<()> {
         match Staging::take(&own) {
             Ok(Some(dead)) => drop(recovered(dead, files)?),
             Ok(None) => return Err(busy(path)),
-            // Of somebody else.
+            // It belongs to another user.
             Err(_) => {}
         }
     }

@@ -31,16 +31,19 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
         Cell::Functions,
     ];
     for cell in cells {
-        let answers = answers(cell, 100);
+        // A coverage of 86 % among 300 modes is seen: it has the probability 10^-5.
+        let count = if cell == Cell::TwoTaps { 300 } else { 100 };
+        let answers = answers(cell, count);
         let found = answers.iter().filter(|answer| answer.found.is_some());
         let found = found.count() as u64;
         // A mode may drown in noise; the full study misses 0.4 to 5 % of them.
-        assert!(found >= 85, "{}: {found} of 100 modes", cell.name());
+        let least = 85 * count as u64 / 100;
+        assert!(found >= least, "{}: {found} of {count} modes", cell.name());
         let inside = answers
             .iter()
             .filter(|answer| answer.is_inside() == Some(true));
         let inside = inside.count() as u64;
-        // So few inside by chance where 93 % hold the truth. A hundred modes show gross errors alone: a coverage of
+        // Probability of so few inside if 93 % hold the truth. A hundred modes show only gross errors: a coverage of
         // 85 % is seen in one draw of three. The long run is the example's.
         let few = Binomial::new(0.93, found).unwrap().cdf(inside);
         assert!(
@@ -67,6 +70,21 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
             cell.name()
         );
     }
+}
+
+#[test]
+fn regress_hum_under_a_resonance_does_not_widen_its_interval() {
+    let answers = answers(Cell::Hum, 100);
+    // Half lengths in standard deviations of the Cramer-Rao bound in white noise.
+    let lengths = answers.iter().filter_map(|answer| {
+        let found = answer.found?;
+        Some((found.high - found.low) / (2.0 * 1.96 * answer.bound?))
+    });
+    let mut lengths: Vec<f64> = lengths.collect();
+    lengths.sort_by(f64::total_cmp);
+    let median = lengths[lengths.len() / 2];
+    // 1.1 in the full study, 2.9 where the hum stays in the residual.
+    assert!(median < 1.5, "{median} of {}", lengths.len());
 }
 
 #[test]

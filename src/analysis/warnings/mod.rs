@@ -54,7 +54,7 @@ pub const WARNING_CODES: [(&str, &str); 65] = [
     ),
     (
         "values-assumed",
-        "a column of a function is taken as linear magnitudes",
+        "a column of a function is taken as linear magnitudes, or as a phase in degrees",
     ),
     (
         "lines-assumed",

@@ -67,7 +67,7 @@ impl Neighbourhood {
     /// deviations).
     ///
     /// The norm of the residuals changes nowhere by more than the data move. Where the norms of two minima differ by
-    /// more than twice that, the deeper one stays the deeper. A valley without a floor has minima without number.
+    /// more than twice that, the deeper one stays the deeper. A flat valley has any number of minima.
     /// The deepest [`FOLLOWED`] stand for them.
     fn starts_after(&self, moved: f64) -> Vec<Point> {
         let least = self.norms.first().copied().unwrap_or(0.0);

@@ -23,8 +23,8 @@ const FACTOR: usize = 3;
 /// Prior means of a place, and their standard deviations: joints of built structures lie within some decades of the
 /// beam's own stiffness, couplings within 0.3. A modulus wrong by a quarter moves all frequencies by 12 %.
 const PRIOR: [(f64, f64); 4] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3), (0.0, 0.12)];
-/// Common factors of the grid (ln): one standard deviation to either side. Places between them are nearer than what
-/// the candidates allow for.
+/// Common factors of the grid (ln): zero, and one standard deviation to either side. The candidates allow for the
+/// distance to factors between these.
 const FACTORS: [f64; 3] = [-0.12, 0.0, 0.12];
 /// Decades of the grid, Kx and Ky, and its step. A frequency rises at most with the root of both stiffnesses
 /// together. The nearest place of the grid is half a step off in both at most, and misses it by up to 10^(0.3/4) - 1
@@ -145,7 +145,7 @@ impl<'a> JointSearch<'a> {
             .collect()
     }
 
-    /// Returns the logarithm of a natural frequency (Hz), the common factor in it, and its slopes along the place.
+    /// Returns the logarithm of a natural frequency (Hz), with the common factor applied, and its derivatives by the place.
     fn response(&self, place: Place, mode: usize) -> (f64, Place) {
         let guess = PI * (mode as f64 - 0.5);
         let response = self.model.response(&self.point(place), mode, guess);

@@ -61,7 +61,8 @@ pub struct PairingSettings {
     /// Held stiffnesses Kt (N/m), Kr (N m/rad) and Ktr (N/rad). A stiffness that is neither estimated nor held is
     /// infinite: rigid, or without coupling. None.
     pub held: [Option<f64>; 3],
-    /// All frequencies may differ from the model's by a factor in common, as beside an unknown modulus: not by default.
+    /// True: all frequencies may differ from the model by one common factor, as where the modulus is estimated. Default:
+    /// false.
     pub common_factor: bool,
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
     pub bands: Vec<(f64, f64)>,

@@ -4,6 +4,7 @@
 
 use num_complex::Complex64;
 
+use crate::document::is_strong;
 use crate::format::{significant, trimmed, unit_words};
 use crate::picture::{
     Axis, Block, Chart, Color, Event, InPage, Mark, Panel, Places, Rule, Series, extent, nice_step,
@@ -11,6 +12,7 @@ use crate::picture::{
 };
 use tapjoint_analysis::{CloseUp, Frf, MeasuredSpectra, RecordingResult};
 use tapjoint_description::SensorKind;
+use tapjoint_signal::modal::PeakLabel;
 use tapjoint_signal::spectral::{FrfEstimator, Lines};
 use tapjoint_signal::taps::Tap;
 
@@ -325,7 +327,12 @@ fn decibels(ratio: f64) -> f64 {
 /// Returns the resonances as marks on the frequency axis.
 pub(super) fn rules(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<Rule> {
     let read = spectra.readings.iter().zip(&recording.mode_numbers);
-    let known = read.filter(|(reading, _)| reading.frequency.is_finite());
+    // The tables leave out the same peaks.
+    let known = read.filter(|(reading, _)| {
+        let is_noise =
+            reading.label == Some(PeakLabel::NoResonance) && !is_strong(reading.above_noise_db);
+        reading.frequency.is_finite() && !is_noise
+    });
     let rules = known.map(|(reading, mode)| {
         // One digit more than the half-line bound.
         let bound = reading.half_line / 5.0;

@@ -9,7 +9,7 @@ use tapjoint_analysis::{
 };
 use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
-use tapjoint_signal::modal::{FittedReading, ModeReading, ReadBy};
+use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::quality::Check;
 use tapjoint_signal::recording::{
     Abscissa, ChannelInfo, Ordinate, Precision, UffCoding, UniversalFile,
@@ -273,6 +273,15 @@ pub fn datasets_of(name: &str, file: &UniversalFile) -> Vec<DatasetSection> {
     sections
 }
 
+/// Height over the noise (dB) from which a peak that could not be read as a resonance is shown all the same. Noise does
+/// not reach it: its power is exponentially distributed, and exceeds its mean by 20 dB with the probability e^-100.
+const STRONG: f64 = 20.0;
+
+/// Returns true for a peak that is too high for noise, whatever it is. `above_noise_db`: its height (dB), where known.
+pub(crate) fn is_strong(above_noise_db: Option<f64>) -> bool {
+    above_noise_db.is_some_and(|height| height >= STRONG)
+}
+
 /// One resonance.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ModeSection {
@@ -318,6 +327,9 @@ pub struct ModeSection {
     pub recording: Option<String>,
     /// Name of a peak that is no mode: "mains 50 Hz".
     pub label: Option<String>,
+    /// True for a peak that no resonance explains.
+    #[serde(skip)]
+    pub is_unclear: bool,
 }
 
 /// Name of the way in which a frequency was read; "given" for one that was read elsewhere.
@@ -343,7 +355,8 @@ pub struct FitSection {
     /// Source of the frequency's interval: "residual" (the noise that the fit leaves), "taps" (their scatter, where it is
     /// more than that noise explains) or "two-poles" (it holds two poles that explain the data better than one).
     pub uncertainty_from: UncertaintySource,
-    /// Degrees of freedom behind the interval. The standard deviation already contains them where the source is "taps".
+    /// Degrees of freedom behind the interval (1). Where the source is "taps" or "two-poles", take the standard deviation as
+    /// that of a normal distribution.
     pub freedom: f64,
     /// Probability that noise alone makes the taps scatter so; null with a single tap.
     pub scatter_probability: Option<f64>,
@@ -396,7 +409,7 @@ impl ModeSection {
             mode: mode.mode,
             frequency: mode.frequency,
             half_line: mode.half_line,
-            std: mode.std,
+            std: mode.std.filter(|_| !reading.is_unclear),
             lambda: mode.lambda,
             recording: mode.recording.clone(),
             label: mode.label(),
@@ -410,6 +423,7 @@ impl ModeSection {
         let quality = spectra.map(|spectra| spectra.averages.best_quality(reading.frequency));
         let change = recording.and_then(|recording| recording.amplitude_change(reading));
         let fit = reading.fit.as_deref();
+        let is_unclear = reading.label == Some(PeakLabel::NoResonance);
         ModeSection {
             mode: None,
             frequency: reading.frequency,
@@ -418,9 +432,10 @@ impl ModeSection {
             half_line: Some(reading.half_line),
             interpolated_frequency: reading.between.map(|between| between.frequency),
             interpolated_bound: reading.between.map(|between| between.bound),
-            std: reading.std,
-            low: Some(reading.interval.0),
-            high: Some(reading.interval.1),
+            // Noise has no frequency of its own.
+            std: reading.std.filter(|_| !is_unclear),
+            low: (!is_unclear).then_some(reading.interval.0),
+            high: (!is_unclear).then_some(reading.interval.1),
             damping: reading.damping_ratio,
             damping_std: reading.damping_std,
             fit: fit.map(|fit| FitSection::of(fit, change)),
@@ -431,6 +446,7 @@ impl ModeSection {
             above_noise_db: reading.above_noise_db,
             recording: None,
             label: reading.label.map(|label| label.to_string()),
+            is_unclear,
         }
     }
 }

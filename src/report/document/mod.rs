@@ -6,6 +6,7 @@
 mod measured;
 mod model;
 
+pub(crate) use measured::is_strong;
 pub use measured::{
     AmplitudeSection, ChannelSection, DatasetSection, FitSection, FrfSection, HammerSection,
     ModeSection, RecordingSection, TapSection, datasets_of, frf_document, method_name,

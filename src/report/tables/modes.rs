@@ -4,13 +4,12 @@ use super::{
     Cell, Place, Table, bound_of, coherence, mode_name, mode_of, number, page_number, page_words,
     words,
 };
-use crate::document::{Document, ModeSection, ReadBy, method_name};
+use crate::document::{Document, ModeSection, ReadBy, is_strong, method_name};
 use crate::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
     with_decimals_of,
 };
-use tapjoint_signal::modal::PeakLabel;
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
@@ -18,29 +17,19 @@ const LAMBDA_DIGITS: i32 = 6;
 /// Most significant digits of a damping ratio.
 const DAMPING_DIGITS: i32 = 4;
 
-/// Height over the noise (dB) from which a peak that could not be read as a resonance is shown all the same. Noise alone
-/// does not reach it in a million lines: its power is exponentially distributed, and e^-100 is the probability of 20 dB.
-const STRONG: f64 = 20.0;
-
-/// Returns true for a peak that no resonance explains.
-fn is_unclear(mode: &ModeSection) -> bool {
-    mode.label.as_deref() == Some(PeakLabel::NoResonance.to_string().as_str())
-}
-
 /// Returns true for what tables show: resonances, and strong peaks that are none.
 fn is_shown(mode: &&ModeSection) -> bool {
-    let height = mode.above_noise_db;
-    !is_unclear(mode) || height.is_some_and(|height| height >= STRONG)
+    !mode.is_unclear || is_strong(mode.above_noise_db)
 }
 
-/// "2 peaks of noise are left out; the JSON has them."; `None` where all are shown.
+/// "2 peaks without a clear resonance are left out; the JSON has them."; `None` where all are shown.
 pub fn left_out(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref().unwrap_or_default();
     match modes.iter().filter(|mode| !is_shown(mode)).count() {
         0 => None,
-        1 => Some("1 peak of noise is left out; the JSON has it.".to_owned()),
+        1 => Some("1 peak without a clear resonance is left out; the JSON has it.".to_owned()),
         count => Some(format!(
-            "{count} peaks of noise are left out; the JSON has them."
+            "{count} peaks without a clear resonance are left out; the JSON has them."
         )),
     }
 }
@@ -186,9 +175,9 @@ fn note(document: &Document, modes: &[&ModeSection], described: bool) -> String 
 }
 
 const INTERVAL_NOTE: &str = "Interval from: the noise that the fit leaves (residual), or the scatter of the taps \
-                             where that is more than the noise explains (taps); two poles: the \
-                             data ask for two of one shape, two modes or one that changes its \
-                             frequency, and the interval holds both.";
+                             where that is more than the noise explains (taps). Two poles: two poles \
+                             of one shape explain the data better than one, and the interval holds \
+                             both. They are two modes, or one mode whose frequency changes.";
 const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
                          and 1/T, as an analyser shows it; none where that line is of another peak.";
 const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \
@@ -262,7 +251,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
     let scatter = fit.and_then(|fit| fit.scatter_probability);
     let random_error = mode.random_error.map(|error| 100.0 * error);
     // A peak that is no resonance has a line, and no natural frequency.
-    let frequency = match is_unclear(mode) {
+    let frequency = match mode.is_unclear {
         true => MISSING.to_owned(),
         false => reading(mode).joined(),
     };

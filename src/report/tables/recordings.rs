@@ -252,9 +252,9 @@ pub fn hammer(document: &Document) -> Option<Table> {
         ])
     });
     let note = "Mean of the taps used. Pulse: width at half height. −10 and −20 dB: where the force spectrum has \
-                fallen so far. Usable to: the lowest of three frequencies: the fall by 20 dB, the spectrum within \
-                10 dB of the channel's noise, sample rate/2.56. The force counts as zero outside the force window. H1 \
-                changes by: the largest change at a resonance by that window.";
+                fallen so far. Usable to: the lowest of the fall by 20 dB, the frequency where the spectrum comes \
+                within 10 dB of the channel's noise, and sample rate/2.56. Outside the force window the force is set to \
+                zero. H1 changes by: the largest relative change of H1 at a resonance that this causes.";
     some(Table::of("Hammer", rows, note))
 }
 

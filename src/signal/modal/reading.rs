@@ -33,7 +33,7 @@ pub struct ModeReading {
     pub line_frequency: f64,
     /// Half of the line spacing or resolution, whichever is wider (Hz).
     pub half_line: f64,
-    /// Bound of the line reading (Hz): half a line, or more over a resonance that is wider.
+    /// Bound of the line reading (Hz): half a line, or more where only coarser lines show the resonance.
     pub line_bound: f64,
     /// The reading between the lines, where there is one.
     pub between: Option<Interpolation>,

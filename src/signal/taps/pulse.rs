@@ -9,8 +9,9 @@ use crate::spectral::DISPLAY_RATIO;
 
 /// Width of a force pulse and the band that it excites.
 ///
-/// Levels are those of the Fourier transform of the pulse over its largest value at a lower frequency. A half sine of
-/// width w at half height (length 1.5 w) has fallen by 10 dB at 0.68/w and by 20 dB at 0.87/w.
+/// A fall (dB) is that of the magnitude of the Fourier transform, relative to its largest value at lower frequencies. A
+/// half sine of length L has the transform cos(pi f L)/(1 - (2 f L)^2) over its value at 0 Hz. Its width at half
+/// height is w = L/1.5, and it falls by 10 dB at 0.68/w and by 20 dB at 0.87/w.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Pulse {
     /// Width at half of its height (s). The curve between the samples is the band-limited one: a pulse of two samples has
@@ -36,7 +37,7 @@ const LEAST_LINES: usize = 4096;
 const HALVINGS: usize = 30;
 
 impl Pulse {
-    /// Reads a pulse, upwards on a baseline of zero, that has died away at the end of the samples. `noise` is the channel's
+    /// Reads a positive pulse on a baseline of zero. At the end of the samples it has died away. `noise` is the channel's
     /// standard deviation (its unit), `rate` the sample rate (Hz). `None` of samples without a positive one.
     pub(super) fn of(samples: &[f64], noise: f64, rate: f64) -> Option<Pulse> {
         let numbered = samples.iter().enumerate();

@@ -190,6 +190,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         above_noise_db: Some(52.0),
         recording: Some(file.into()),
         label: None,
+        is_unclear: false,
     }
 }
 

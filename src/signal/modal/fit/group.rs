@@ -13,7 +13,9 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use tapjoint_numerics::stats::chi_square_tail;
 
-use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes};
+use super::variable_projection::{
+    DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes, half_width,
+};
 use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 use crate::modal::Subspace;
 
@@ -35,15 +37,11 @@ const TERM_LEVEL: f64 = 0.05;
 /// percent of the precision, and a short band does not know its noise better.
 const NOISE_CHANGE: f64 = 0.2;
 
-/// Two modes share at least so much of their taps' powers: 1 where every tap excites them in the same proportion.
+/// Least common share of the powers of two modes over the taps. It is 1 where every tap excites them in the same
+/// proportion, and 0 where one mode rings at either frequency after a tap of its own: half way between.
 const SAME_TAPS: f64 = 0.5;
-/// Likeness from which two shapes count as one.
+/// Likeness from which two shapes count as one, the usual limit of the modal assurance criterion.
 const SAME_SHAPE: f64 = 0.9;
-
-/// Effective half width of a pole (lines): its decay, and half a line where that is less.
-pub(super) fn half_width(pole: Complex64) -> f64 {
-    pole.re.hypot(0.5)
-}
 
 /// Half of the band of a pole (lines).
 pub(super) fn half_band(pole: Complex64) -> f64 {
@@ -394,9 +392,18 @@ impl GroupFit {
         let columns: Vec<usize> = (0..taps.len()).collect();
         let shapes = columns.chunk_by(|&a, &b| as_one || taps[a] == taps[b]);
         let shapes: Vec<&[usize]> = shapes.filter(|shape| shape.len() > 1).collect();
+        let sensors = |shape: &[usize]| -> Vec<usize> {
+            let shape = shape.iter();
+            shape
+                .map(|&index| data.columns()[self.used[index]].sensor)
+                .collect()
+        };
         let (mut alike, mut whole) = (0.0, 0.0);
         for mine in &shapes {
-            for theirs in shapes.iter().filter(|theirs| theirs.len() == mine.len()) {
+            for theirs in shapes
+                .iter()
+                .filter(|theirs| sensors(theirs) == sensors(mine))
+            {
                 let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
                 for (&a, &b) in mine.iter().zip(*theirs) {
                     let (own, other) = (self.amplitude(one, a), self.amplitude(other, b));
@@ -411,9 +418,8 @@ impl GroupFit {
         (whole > 0.0).then(|| alike / whole)
     }
 
-    /// Returns true where two poles are one mode that rings at another frequency after some of the taps: they have one
-    /// shape, but not the same taps excite them. A tap excites two modes beside each other in the same proportion
-    /// always.
+    /// Returns true where two poles are one mode whose frequency changed between the taps. They have one shape, but
+    /// different taps excite them. Every tap excites two neighbouring modes in the same proportion.
     fn is_one_mode(&self, data: &ModalData, one: usize, other: usize) -> bool {
         let taps = data.columns().iter().map(|column| column.tap + 1).max();
         let taps = taps.unwrap_or(0);
@@ -484,8 +490,8 @@ pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) ->
 const MOST_SWEEPS: usize = 8;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;
-/// First sweeps over functions in which poles of known damping stay and only amplitudes are fitted. 2: the second has
-/// the amplitudes of all neighbours. Poles that move while a neighbour is missing run to it.
+/// Number of first sweeps over functions that fit amplitudes only and keep poles of known damping. 2: the second sweep
+/// knows the amplitudes of all neighbours. Without them a pole would move to its neighbour.
 const HELD_SWEEPS: usize = 2;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;

@@ -124,8 +124,8 @@ pub enum Unfit {
     /// Every column is zero in the band.
     #[error("no column holds anything in its band")]
     NoSignal,
-    /// The data can do without it.
-    #[error("the data do not ask for it")]
+    /// The data do not need it.
+    #[error("the data do not need it")]
     Unneeded,
     /// Poles or their neighbours cannot be separated.
     #[error("it cannot be told from another mode")]

@@ -30,6 +30,11 @@ use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, StopReason
 use super::{Basis, ModalData};
 use crate::modal::Subspace;
 
+/// Effective half width of a pole (lines): its decay, and half a line where that is less.
+pub(super) fn half_width(pole: Complex64) -> f64 {
+    pole.re.hypot(0.5)
+}
+
 /// Least decay (lines) of a steady line: on its own line it is a million times its neighbours.
 pub(super) const STEADY: f64 = 1e-6;
 
@@ -334,7 +339,7 @@ impl Problem for PoleProblem {
         let bounded = self.lines.kappa.is_some()
             || parameters.chunks_exact(2).enumerate().all(|(place, pole)| {
                 let step = step[2 * place].hypot(step[2 * place + 1]);
-                step <= pole[1].hypot(0.5)
+                step <= half_width(Complex64::new(-pole[1], pole[0]))
             });
         (allowed && bounded).then_some(moved)
     }

@@ -117,10 +117,10 @@ pub struct PolyreferenceSettings {
 /// Peaks about which narrow bands are laid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BandPeaks {
-    /// Those of all entries together: of free decays, whose lines share noise and ringing.
+    /// Peaks of all entries together. For free decays: their lines share noise and ringing.
     #[default]
     Together,
-    /// Also those of single entries, over the noise of their own lines: of response functions.
+    /// Also peaks of single entries over the noise of their own lines. For response functions.
     EveryFunction,
 }
 
@@ -252,8 +252,8 @@ const LEAST_BAND_LINES: f64 = 120.0;
 /// background.
 const HALF_POWER_WIDTHS: f64 = 16.0;
 
-/// Largest ratio of the reaches of two peaks of functions that share a band. 4: over a band wider than that the lags
-/// of an order no longer reach the decay of the lighter mode.
+/// Largest ratio of the reaches of two peaks of functions in one band. 4: over a wider band the lags of the model order
+/// are too short for the decay of the lighter mode.
 const MOST_UNEQUAL: f64 = 4.0;
 /// Most functions whose peaks are looked for one by one. 12: more taps and sensors repeat each other.
 const MOST_ALONE: usize = 12;
@@ -344,7 +344,7 @@ fn peak_groups(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<PeakGroup> {
         above_noise_db: 10.0,
         ..PeakSettings::default()
     };
-    // Peaks of very different width share a band only where nothing is known of their noise.
+    // Without known noise, peaks of very different width may share a band.
     let mut most_unequal = f64::INFINITY;
     match peaks {
         BandPeaks::Together => {

@@ -488,6 +488,9 @@ pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) ->
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
+/// Most sweeps that test one more start. 4: after it all modes are fitted again, and the test asks for a mode far clearer
+/// than what further sweeps move.
+const TEST_SWEEPS: usize = 4;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;
 /// Number of first sweeps over functions that fit amplitudes only and keep poles of known damping. 2: the second sweep
@@ -583,13 +586,13 @@ pub struct Accepted<'a> {
 impl Accepted<'_> {
     /// Fits one more start beside modes that were swept; `None` where it fails.
     ///
-    /// Returns its group once the poles stay. Modes of other groups do not change.
+    /// Returns its group after the last sweep. Modes of other groups do not change.
     pub(super) fn add(&mut self, start: &PoleStart) -> Option<Group> {
         let place = self.modes.len();
         let added = self.settings.added_decay;
         self.modes.push(ModeState::new(self.data, start, added));
         let mut fitted = Vec::new();
-        for sweep in 0..MOST_SWEEPS {
+        for sweep in 0..TEST_SWEEPS {
             let groups = groups(&self.alive());
             let mut own = groups.into_iter().find(|group| group.contains(&place))?;
             // Other modes of the group stay as they are where they are too narrow for thinned lines.
@@ -598,6 +601,11 @@ impl Accepted<'_> {
                 index == place || stride <= 1.0 || half_width(self.modes[index].pole) >= stride
             });
             let moved = self.sweep(vec![own], &mut fitted, false);
+            let may_be_needed = (fitted.last()).is_none_or(|group| self.may_be_needed(group, place));
+            if !may_be_needed {
+                self.modes[place].failed = Some(Unfit::Unneeded);
+                return None;
+            }
             if sweep > 0 && moved < STILL {
                 break;
             }

@@ -607,6 +607,9 @@ pub struct ExtraMode {
 /// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
 /// the data, out of some tens of lines.
 const LEVEL: f64 = 1e-4;
+/// The probability beyond which an added mode is given up after any sweep. 1 %: a hundred times the level, for the next
+/// sweeps lower the residual a little more.
+const HOPELESS: f64 = 0.01;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
 /// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
@@ -743,18 +746,42 @@ impl<'a> Accepted<'a> {
         };
         let gain = BandData::new(self, members).ok().and_then(|band| {
             let noise = self.noise(members, &band.used)?;
-            let terms = mode.background_terms;
-            let poles = self.poles(members);
-            let mut fewer = poles.clone();
-            fewer.remove(place);
-            let with = band.search(&poles, terms, &noise, 0).ok()?;
-            let without = match fewer.is_empty() {
-                true => band.square_sum_without(terms, &noise),
-                false => band.search(&fewer, terms, &noise, 0).ok()?.at.square_sum,
-            };
-            gain(&band, &with, without)
+            self.gain_at(&band, members, place, mode.background_terms, &noise)
         });
         gain.is_some_and(|(probability, gain)| is_needed(mode, probability, gain))
+    }
+
+    /// Compares the fits with and without the pole at `place` of a group, all poles being as they are, as [`gain`].
+    fn gain_at(
+        &self,
+        band: &BandData,
+        members: &[usize],
+        place: usize,
+        terms: usize,
+        noise: &[f64],
+    ) -> Option<(f64, f64)> {
+        let poles = self.poles(members);
+        let mut fewer = poles.clone();
+        fewer.remove(place);
+        let with = band.search(&poles, terms, noise, 0).ok()?;
+        let without = match fewer.is_empty() {
+            true => band.square_sum_without(terms, noise),
+            false => band.search(&fewer, terms, noise, 0).ok()?.at.square_sum,
+        };
+        gain(band, &with, without)
+    }
+
+    /// Returns false where a mode that has just been added will not be needed, so that more sweeps are vain.
+    ///
+    /// Without it the others have not moved: the residual falls by more than it will between two settled fits.
+    pub(super) fn may_be_needed(&self, group: &Group, start: usize) -> bool {
+        let (members, fit) = (&group.members, &group.fit);
+        let Some(place) = members.iter().position(|&index| index == start) else {
+            return true;
+        };
+        let gain = (BandData::new(self, members).ok())
+            .and_then(|band| self.gain_at(&band, members, place, fit.terms, &fit.noise));
+        gain.is_none_or(|(probability, _)| probability < HOPELESS)
     }
 }
 

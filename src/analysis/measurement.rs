@@ -10,7 +10,7 @@ use tapjoint_signal::modal::amplitude::Decay;
 use tapjoint_signal::modal::fit::TapForce;
 use tapjoint_signal::modal::{
     CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
-    find_peaks, mains_harmonic, near_mains, read_peaks,
+    find_peaks, label_combinations, mains_harmonic, near_mains, read_peaks,
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
@@ -167,6 +167,7 @@ pub fn measure(
                         warnings.push(Warning::mains(file, reading.line_frequency, label));
                     }
                 }
+                warnings.extend(Warning::combinations(file, &found.readings));
                 spectra = Some(found);
             }
             Err(problem @ SpectralError::Padded { .. }) => {
@@ -338,6 +339,7 @@ impl<'a> Stage<'a> {
             reading.select_estimate(self.settings.reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        label_combinations(&mut readings);
         Ok(MeasuredSpectra {
             force_window: self.force_window(&readings, &averages, ungated.as_deref()),
             averages,

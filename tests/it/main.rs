@@ -7,6 +7,7 @@ mod blind_check;
 mod blind_check_draw;
 mod cli;
 mod cli_frf;
+mod combinations;
 mod corpus;
 mod deck;
 mod deck_with_effects;

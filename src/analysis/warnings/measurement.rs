@@ -6,7 +6,7 @@ use crate::amplitude::{AmplitudeChanges, Way};
 use std::fmt;
 use tapjoint_description::DescriptionError;
 use tapjoint_identify::pairing::{MeasuredPeak, MissingCause, MissingMode, Pairing};
-use tapjoint_signal::modal::PeakLabel;
+use tapjoint_signal::modal::{ModeReading, PeakLabel};
 use tapjoint_signal::quality::{Check, Outcome, QualityVerdict, Subject, limits};
 use tapjoint_signal::recording::{Recording, RecordingWarning};
 use tapjoint_signal::spectral::Window;
@@ -98,6 +98,39 @@ impl Warning {
             about: format!("{file}: {frequency:.2} Hz"),
             ..Warning::about(file, "mains", text)
         }
+    }
+
+    /// Peaks that are sums and differences of others; `None` where there are none.
+    pub(crate) fn combinations(file: &str, readings: &[ModeReading]) -> Option<Self> {
+        const MOST_NAMED: usize = 3;
+        let mut named = Vec::new();
+        let (mut count, mut step) = (0, 0.0);
+        for reading in readings {
+            let Some(PeakLabel::Combination { line, step: by }) = reading.label else {
+                continue;
+            };
+            count += 1;
+            step = by.abs();
+            if count <= MOST_NAMED {
+                let sign = if by < 0.0 { '\u{2212}' } else { '+' };
+                let frequency = reading.frequency;
+                named.push(format!("{frequency:.1} = {line:.1} {sign} {step:.1} Hz"));
+            }
+        }
+        let more = count - named.len();
+        if more > 0 {
+            named.push(format!("and {more} more"));
+        }
+        let text = format!(
+            "{count} peaks lie beside stronger ones at the distance of {step:.1} Hz, the frequency of a mode ({}); a joint \
+             that slips or a contact that opens and closes makes such combinations while that mode rings; they are listed \
+             with this label and are not counted as modes; softer taps make them weaker",
+            named.join(", ")
+        );
+        (count > 0).then(|| Warning {
+            about: format!("{file}: {count} peaks"),
+            ..Warning::about(file, "combinations", text)
+        })
     }
 
     /// Peaks to which no mode of the jointed beam belongs; `None` where there are none.

@@ -330,6 +330,9 @@ pub struct ModeSection {
     /// True for a peak that no resonance explains.
     #[serde(skip)]
     pub is_unclear: bool,
+    /// True for a sum or difference of others.
+    #[serde(skip)]
+    pub is_combination: bool,
 }
 
 /// Name of the way in which a frequency was read; "given" for one that was read elsewhere.
@@ -447,6 +450,7 @@ impl ModeSection {
             recording: None,
             label: reading.label.map(|label| label.to_string()),
             is_unclear,
+            is_combination: matches!(reading.label, Some(PeakLabel::Combination { .. })),
         }
     }
 }

@@ -245,7 +245,10 @@ fn modes(document: &Document) -> Option<String> {
     // The peaks that are not counted, by kind: "; 3 more peaks are not counted (2 no clear resonance, 1 mains 50 Hz)".
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for mode in modes.iter().filter(|mode| mode.mode.is_none()) {
-        let name = mode.label.as_deref().unwrap_or(UNPAIRED);
+        let name = match mode.is_combination {
+            true => "combination",
+            false => mode.label.as_deref().unwrap_or(UNPAIRED),
+        };
         match kinds.iter_mut().find(|(known, _)| *known == name) {
             Some((_, count)) => *count += 1,
             None => kinds.push((name, 1)),

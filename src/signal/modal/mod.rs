@@ -3,19 +3,21 @@
 //! Peaks are found on a composite level over all sensors ([`find_peaks`]), read between the lines by
 //! a pole ([`interpolate_pole`]) and on the line nearest to that, with the half-line bound
 //! ([`read_peaks`]). Mains lines are recognised, and the readings of several recordings are merged
-//! ([`merge_modes`]).
+//! ([`merge_modes`]). Peaks that a nonlinear joint makes of others are labelled ([`label_combinations`]).
 //!
 //! [`polyreference`] finds the poles of a whole band from several responses at once, also where two
 //! modes show as one peak. [`fit`] refines poles to the greatest likelihood and says how well they are known.
 //! [`amplitude`] follows frequency and damping along a decay.
 
 pub mod amplitude;
+mod combinations;
 pub mod fit;
 mod magnitude;
 mod peaks;
 pub mod polyreference;
 mod reading;
 
+pub use combinations::label_combinations;
 pub use magnitude::{interpolate_magnitude, read_magnitude_peaks};
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,

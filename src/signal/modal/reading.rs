@@ -168,6 +168,13 @@ pub enum PeakLabel {
     Mains(f64),
     /// The force has a gap there, and the quotient a peak.
     ForceGap,
+    /// A nonlinear joint makes it at the sum of a stronger line (Hz) and a step (Hz, negative for a difference).
+    Combination {
+        /// The stronger line (Hz).
+        line: f64,
+        /// The frequency that is added to it (Hz).
+        step: f64,
+    },
     /// No decaying oscillation explains it: speckle of noise or reverberation.
     NoResonance,
 }
@@ -177,6 +184,10 @@ impl fmt::Display for PeakLabel {
         match self {
             PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
             PeakLabel::ForceGap => f.write_str("gap of the force"),
+            PeakLabel::Combination { line, step } => {
+                let sign = if *step < 0.0 { '\u{2212}' } else { '+' };
+                write!(f, "combination {line:.1} {sign} {:.1} Hz", step.abs())
+            }
             PeakLabel::NoResonance => f.write_str("no clear resonance"),
         }
     }

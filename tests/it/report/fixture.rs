@@ -191,6 +191,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         recording: Some(file.into()),
         label: None,
         is_unclear: false,
+        is_combination: false,
     }
 }
 

@@ -252,6 +252,10 @@ const LEAST_BAND_LINES: f64 = 120.0;
 /// background.
 const HALF_POWER_WIDTHS: f64 = 16.0;
 
+/// Most lines of a band between the peaks. 600: fifteen for each of the highest order, whose lags are then as long as a
+/// decay of a fifteenth of the block.
+const MOST_LINES_BETWEEN: f64 = 600.0;
+
 /// Largest ratio of the reaches of two peaks of functions in one band. 4: over a wider band the lags of the model order
 /// are too short for the decay of the lighter mode.
 const MOST_UNEQUAL: f64 = 4.0;
@@ -319,6 +323,32 @@ pub fn sub_bands(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<SubBand> {
         bands.push(SubBand { low, high, core });
     }
     bands
+}
+
+/// Returns bands that cover what lies between the cores of `bands`, ascending: a mode there makes no peak, and over the
+/// whole band the lags of the model order are too short for its decay.
+fn bands_between(matrix: &ResponseMatrix, bands: &[SubBand]) -> Vec<SubBand> {
+    let (low_end, high_end) = matrix.ends();
+    let mut found = Vec::new();
+    let mut from = low_end;
+    let cores = bands.iter().map(|band| band.core);
+    for (core_low, core_high) in cores.chain([(high_end, high_end)]) {
+        let lines = (core_low - from) / matrix.spacing;
+        if lines >= LEAST_BAND_LINES {
+            let parts = (lines / MOST_LINES_BETWEEN).ceil();
+            let width = (core_low - from) / parts;
+            for part in 0..parts as usize {
+                let core = (from + part as f64 * width, from + (part + 1) as f64 * width);
+                found.push(SubBand {
+                    low: (core.0 - 0.1 * width).max(low_end),
+                    high: (core.1 + 0.1 * width).min(high_end),
+                    core,
+                });
+            }
+        }
+        from = from.max(core_high);
+    }
+    found
 }
 
 fn peak_groups(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<PeakGroup> {
@@ -418,7 +448,9 @@ pub fn find_modes(
         core: ends,
     };
     let mut searches = vec![search(matrix, whole_band, settings)?];
-    for band in sub_bands(matrix, settings.peaks) {
+    let mut bands = sub_bands(matrix, settings.peaks);
+    bands.extend(bands_between(matrix, &bands));
+    for band in bands {
         let mut part = search(matrix, band, settings)?;
         // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
         // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds

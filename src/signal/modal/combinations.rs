@@ -1,0 +1,174 @@
+//! Combination tones: peaks at sums and differences of a mode's frequency and that of a stronger one.
+//!
+//! A joint that slips, or a contact that opens and closes, is not linear. While a mode of frequency f_b rings, it changes
+//! the joint in its own rhythm, and every other line f_a gets neighbours at f_a + f_b and f_a - f_b; they get neighbours
+//! in turn (Nayfeh & Mook 1979, chapter 4: combination resonances). Such a peak decays like a mode and is none. A mode may
+//! lie at such a place by chance. So peaks are only labelled where there are far more of them than chance explains.
+
+use num_complex::Complex64;
+use statrs::distribution::{DiscreteCDF, Poisson};
+
+use super::amplitude::AmplitudeVerdict;
+use super::{ModeReading, PeakLabel};
+
+/// Distance from the exact place, relative to the fundamental. 0.75 %: combinations arise while the amplitude is
+/// largest, where a bolted joint lowers the frequency by up to this share of what the whole decay has.
+const REACH: f64 = 0.0075;
+/// Least ratio of the powers of a line and its neighbour at the begin of the decay. 6 dB: a modulation that takes half
+/// of the amplitude would be a strong one.
+const WEAKER: f64 = 4.0;
+/// Least ratio of a combination's decay to that of its stronger line. It decays like the product of both, hence faster.
+/// 0.7: the amplitude changes the damping of the lines.
+const LEAST_DECAY: f64 = 0.7;
+/// Least number of combinations.
+const LEAST_NUMBER: u64 = 3;
+/// Largest probability of so many by chance, over all fundamentals that are tried, where the fundamental's frequency
+/// changes with its amplitude: that the structure is nonlinear is known then.
+const LEVEL: f64 = 0.01;
+/// The same where no change was seen.
+const LEVEL_UNSEEN: f64 = 1e-4;
+
+/// A fitted line.
+struct Tone {
+    /// Index of its reading.
+    index: usize,
+    /// Frequency (Hz).
+    frequency: f64,
+    /// Half the 95 % interval (Hz).
+    bound: f64,
+    /// Half-power half width (Hz).
+    half_width: f64,
+    /// Power over all taps and sensors when the decay begins.
+    power: f64,
+    /// True where frequency or damping change with the amplitude.
+    changes: bool,
+}
+
+/// A tone at the sum or the difference of a stronger line and the fundamental.
+struct Combination {
+    /// Index of its reading.
+    index: usize,
+    label: PeakLabel,
+    /// True for a multiple of the fundamental. Modes of a string or a rod lie there as well.
+    is_multiple: bool,
+}
+
+/// Labels fitted peaks as combinations, where more lie at such places than chance explains.
+pub fn label_combinations(readings: &mut [ModeReading]) {
+    let tones = tones_of(readings);
+    let (Some(low), Some(high)) = (
+        tones.iter().map(|tone| tone.frequency).reduce(f64::min),
+        tones.iter().map(|tone| tone.frequency).reduce(f64::max),
+    ) else {
+        return;
+    };
+    let mut best: Option<(f64, Vec<Combination>)> = None;
+    for fundamental in &tones {
+        let found = combinations(&tones, fundamental);
+        let expected = expected_by_chance(&tones, fundamental, high - low);
+        // Multiples count where the structure is known to be nonlinear.
+        let counted = found
+            .iter()
+            .filter(|one| fundamental.changes || !one.is_multiple);
+        let number = counted.count() as u64;
+        let Ok(chance) = Poisson::new(expected.max(f64::MIN_POSITIVE)) else {
+            continue;
+        };
+        if number < LEAST_NUMBER {
+            continue;
+        }
+        let probability = chance.sf(number - 1) * tones.len() as f64;
+        let level = match fundamental.changes {
+            true => LEVEL,
+            false => LEVEL_UNSEEN,
+        };
+        if probability < level && best.as_ref().is_none_or(|(least, _)| probability < *least) {
+            best = Some((probability, found));
+        }
+    }
+    for one in best.into_iter().flat_map(|(_, found)| found) {
+        readings[one.index].label = Some(one.label);
+    }
+}
+
+/// Peaks with a fit and without a label.
+fn tones_of(readings: &[ModeReading]) -> Vec<Tone> {
+    let mut tones = Vec::new();
+    for (index, reading) in readings.iter().enumerate() {
+        let (Some(fit), None) = (&reading.fit, reading.label) else {
+            continue;
+        };
+        let mode = &fit.mode;
+        let values = mode.amplitudes.iter().map(|one| one.value);
+        tones.push(Tone {
+            index,
+            frequency: mode.frequency.value,
+            bound: 0.5 * (mode.frequency.high - mode.frequency.low),
+            half_width: mode.frequency.value * mode.damping_ratio.value,
+            power: values.map(|value: Complex64| value.norm_sqr()).sum(),
+            changes: (fit.amplitude.as_ref())
+                .is_some_and(|curve| curve.verdict == AmplitudeVerdict::Changes),
+        });
+    }
+    tones
+}
+
+/// Distance within which a tone lies at an exact place (Hz).
+fn reach(tone: &Tone, fundamental: &Tone) -> f64 {
+    // A tone that is known less well than this is no evidence.
+    REACH * fundamental.frequency + tone.bound.min(REACH * fundamental.frequency)
+}
+
+/// Lines beside which a tone may be a combination.
+fn stronger<'a>(
+    tones: &'a [Tone],
+    tone: &'a Tone,
+    fundamental: &'a Tone,
+) -> impl Iterator<Item = &'a Tone> {
+    tones.iter().filter(move |line| {
+        line.index != tone.index
+            && line.power >= WEAKER * tone.power
+            && fundamental.power >= WEAKER * tone.power
+            && tone.half_width >= LEAST_DECAY * line.half_width.max(fundamental.half_width)
+    })
+}
+
+/// The tones at sums and differences of stronger lines and the fundamental.
+fn combinations(tones: &[Tone], fundamental: &Tone) -> Vec<Combination> {
+    let mut found = Vec::new();
+    let step = fundamental.frequency;
+    for tone in tones.iter().filter(|tone| tone.index != fundamental.index) {
+        let mut nearest: Option<(f64, PeakLabel)> = None;
+        for line in stronger(tones, tone, fundamental) {
+            let distance = tone.frequency - line.frequency;
+            let off = (distance.abs() - step).abs();
+            if off <= reach(tone, fundamental)
+                && nearest.as_ref().is_none_or(|(least, _)| off < *least)
+            {
+                let step = step.copysign(distance);
+                let line = line.frequency;
+                nearest = Some((off, PeakLabel::Combination { line, step }));
+            }
+        }
+        if let Some((_, label)) = nearest {
+            let number = (tone.frequency / step).round();
+            found.push(Combination {
+                index: tone.index,
+                label,
+                is_multiple: (tone.frequency - number * step).abs() <= number * REACH * step,
+            });
+        }
+    }
+    found
+}
+
+/// Number of tones that lie at sums and differences by chance, each anywhere over a band of this width (Hz).
+fn expected_by_chance(tones: &[Tone], fundamental: &Tone, width: f64) -> f64 {
+    let mut expected = 0.0;
+    for tone in tones.iter().filter(|tone| tone.index != fundamental.index) {
+        let lines = stronger(tones, tone, fundamental).count() as f64;
+        // Two places beside each line, each with a reach to either side.
+        expected += (4.0 * lines * reach(tone, fundamental) / width).min(1.0);
+    }
+    expected
+}

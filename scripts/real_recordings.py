@@ -12,6 +12,7 @@ For each file and band that is not as expected it prints what was expected, foun
 for all). Then it prints the recall over all files, and the precision where the README calls its list complete.
 The column `again` says how many of the further modes at least half of three or more files of one structure show in the
 same band, within 0.5 %. They count as wrong all the same, though a list of bending modes does not name torsion.
+A listed peak that the program names a combination of others is found, and never a further mode.
 Elsewhere each further mode must stand 10 dB over the floor, and have a stable column of pyEMA where pyEMA is
 installed (`pip install pyema`). Without it columns are not judged. A file that cannot be read counts as failed, and
 all its modes as missing.
@@ -213,6 +214,11 @@ def modes_of(recording):
     return [mode for mode in recording["modes"] if mode["label"] is None]
 
 
+def combinations_of(recording):
+    """Peaks that the program lists as sums and differences of others."""
+    return [mode for mode in recording["modes"] if (mode["label"] or "").startswith("combination")]
+
+
 # ---------------------------------------------------------------- beside it
 
 
@@ -335,9 +341,9 @@ def try_band(program, one, file, path, zoom, columns, show, seen):
     read_band = tuple(recording["band"]) if recording and recording["band"] else band or (0.0, math.inf)
     expected = [pair for pair in one.of(file) if counted(pair[0], band or read_band)]
     modes = [mode for mode in modes_of(recording) if counted(mode["frequency"], band or read_band)] if recording else []
-    read = [mode["frequency"] for mode in modes]
+    listed = modes + (combinations_of(recording) if recording else [])
     # Everything named in the file may be matched: a neighbour of the band's end is no further mode.
-    matched = match(one.of(file), read)
+    matched = match(one.of(file), [mode["frequency"] for mode in listed])
     found = {f: value for f, value in matched.items() if (f in [pair[0] for pair in expected])}
     missing = [f for f, _ in expected if f not in found]
     further = [mode for mode in modes if mode["frequency"] not in matched.values()]

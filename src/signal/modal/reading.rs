@@ -33,7 +33,8 @@ pub struct ModeReading {
     pub line_frequency: f64,
     /// Half of the line spacing or resolution, whichever is wider (Hz).
     pub half_line: f64,
-    /// Bound of the line reading (Hz): half a line, or more where only coarser lines show the resonance.
+    /// Bound of the line reading (Hz) of a resonance no wider than a line: half a line, or more where only coarser lines
+    /// show the resonance.
     pub line_bound: f64,
     /// The reading between the lines, where there is one.
     pub between: Option<Interpolation>,
@@ -130,8 +131,14 @@ impl ModeReading {
             // On a line the truth lies anywhere within the bound.
             None => {
                 self.source = ReadBy::Line;
-                let std = self.line_bound / 3f64.sqrt();
-                (self.line_frequency, self.line_bound, std)
+                // Over the flat top of a resonance wider than a line, noise decides which line is the highest, and
+                // the peak of an accelerance lies zeta^2 f higher: both remain within half of the half-power width.
+                let half_width = self.damping_ratio.unwrap_or(0.0) * self.line_frequency;
+                let mut bound = self.line_bound;
+                if half_width > self.half_line {
+                    bound = bound.max(self.half_line + half_width);
+                }
+                (self.line_frequency, bound, bound / 3f64.sqrt())
             }
         };
         (self.frequency, self.std) = (frequency, Some(std));

@@ -513,6 +513,7 @@ impl Case {
         let window = self.cell == Cell::ExponentialWindow;
         let recording = recording.expect("finite samples");
         let analysis = run_recording(recording, hammer.as_ref(), |settings| {
+            settings.taps.keep_overload = matches!(self.cell, Cell::Rails80 | Cell::Rails50);
             if window {
                 settings.window = Some(WindowKind::Exponential);
             }

@@ -319,11 +319,12 @@ pub(super) fn is_clear(fit: &ModeFit) -> bool {
 pub(super) struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
     data: ModalData,
-    /// Force of each tap; empty without a hammer.
+    /// Force of each tap that was not overloaded; empty without a hammer.
     forces: Vec<TapForce>,
     /// Samples of each tap.
     decays: Vec<Decay>,
-    /// Transforms of the forces, time zero at the decays' first sample; empty without a hammer.
+    /// Transforms of the forces, one for each decay, time zero at its first sample; zero where the force is not known,
+    /// empty without a hammer.
     force_columns: Vec<Column>,
 }
 
@@ -345,12 +346,14 @@ impl FreeDecays {
             responses.add_tap(&decay.responses)?;
         }
         let mut pulses = FreeDecayCollector::new(rate, samples, &[band])?;
-        for force in &forces {
+        for tap in 0..decays.len() {
+            let force = forces.iter().find(|force| force.tap == tap);
+            let force = force.map_or(&[][..], |force| &force.samples);
             // The force before time zero stands at the end of the block: on multiples of rate/block a transform
             // cannot tell a time from one a block later.
-            let kept = force.samples.len().min(samples);
+            let kept = force.len().min(samples);
             let mut block = vec![0.0; samples - kept];
-            block.extend_from_slice(&force.samples[force.samples.len() - kept..]);
+            block.extend_from_slice(&force[force.len() - kept..]);
             pulses.add_tap(&[block])?;
         }
         let force_columns = match forces[..] {

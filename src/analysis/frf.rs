@@ -127,7 +127,7 @@ pub(super) fn form_of_kind(kind: SensorKind) -> Option<ResponseForm> {
 }
 
 /// The frequency response functions of a recording, one for each response; none without an accepted
-/// tap.
+/// tap that was not overloaded.
 ///
 /// # Errors
 /// [`FrfError`]: no hammer, or a form that the sensors do not have.
@@ -140,6 +140,10 @@ pub fn frfs_of(recording: &RecordingResult, settings: &FrfSettings) -> Result<Ve
     let Some(spectra) = &recording.measurement.spectra else {
         return Ok(Vec::new());
     };
+    // Every tap that is used was overloaded.
+    if spectra.averages.h1.is_none() {
+        return Ok(Vec::new());
+    }
     let mut frfs = Vec::with_capacity(recording.responses.len());
     for (index, response) in recording.responses.iter().enumerate() {
         let mut frf = frf(recording, spectra, index, response, settings)?;

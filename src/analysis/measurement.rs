@@ -243,13 +243,22 @@ impl<'a> Stage<'a> {
         taps: &'a Taps,
         lines: Lines,
     ) -> Self {
+        let mut channels = settings.source.channels();
+        let mut has_force = false;
+        if let TapSource::Hammer { responses, .. } = &settings.source {
+            has_force = taps.accepted().any(Tap::is_whole);
+            // Where every pulse or response was cut off, only the decays are left, as without a hammer.
+            if !has_force {
+                channels.clone_from(responses);
+            }
+        }
         Stage {
             recording,
             settings,
             taps,
             lines,
-            channels: settings.source.channels(),
-            has_force: matches!(settings.source, TapSource::Hammer { .. }),
+            channels,
+            has_force,
             gate: (lines.duration * recording.sample_rate()).round() as u64,
         }
     }
@@ -264,8 +273,16 @@ impl<'a> Stage<'a> {
         Ok(channels)
     }
 
+    /// The taps whose records are averaged: with a force those that are whole.
+    fn averaged(&self) -> impl Iterator<Item = &'a Tap> {
+        let has_force = self.has_force;
+        self.taps
+            .accepted()
+            .filter(move |tap| !has_force || tap.is_whole())
+    }
+
     fn record(&self, tap: &Tap) -> Result<Vec<Vec<f64>>, RecordingError> {
-        self.read(tap.record.start..tap.record.start + self.gate)
+        self.read(tap.usable_from()..tap.usable_from() + self.gate)
     }
 
     /// The quiet stretch before the first tap, at most a block.
@@ -275,12 +292,9 @@ impl<'a> Stage<'a> {
         let mut force = self.read(start..quiet.end)?;
         let responses = force.split_off(usize::from(self.has_force));
         let rate = self.recording.sample_rate();
-        let windows = self
-            .taps
-            .accepted()
-            .filter_map(|tap| pulse_window(tap, rate));
+        let windows = self.averaged().filter_map(|tap| pulse_window(tap, rate));
         let energy: f64 = windows.map(PulseWindow::energy).sum();
-        let count = self.taps.accepted().count().max(1) as f64;
+        let count = self.averaged().count().max(1) as f64;
         Ok(PreTriggerNoise {
             force: force.pop(),
             responses,
@@ -357,10 +371,11 @@ impl<'a> Stage<'a> {
         let mut whole = SpectralAverager::new(self.lines, self.responses());
         let transformer = Transformer::new(rate, self.lines, self.gate as usize);
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
-        for tap in self.taps.accepted() {
+        for tap in self.averaged() {
             let mut samples = self.record(tap)?;
             let mut ungated = None;
-            if let (Some(gate), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
+            let gate = pulse_window(tap, rate).filter(|_| self.has_force);
+            if let (Some(gate), Some(force)) = (gate, samples.first_mut()) {
                 remove_offset(force, rate);
                 let mut copy = force.clone();
                 window.apply(&mut copy, rate);
@@ -382,7 +397,7 @@ impl<'a> Stage<'a> {
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
                 // Time zero is moved to the trigger. The quiet stretch before it tilts the phase, and a fit of few
                 // lines could not follow that tilt as a background.
-                let delay = tap.time - tap.record.start as f64 / rate;
+                let delay = tap.time - tap.usable_from() as f64 / rate;
                 for mut transform in responses {
                     for (line, value) in transform.iter_mut().enumerate() {
                         let turn = TAU * self.lines.frequency(line) * delay;
@@ -424,10 +439,7 @@ impl<'a> Stage<'a> {
             }
         }
         let rate = self.recording.sample_rate();
-        let windows = self
-            .taps
-            .accepted()
-            .filter_map(|tap| pulse_window(tap, rate));
+        let windows = self.averaged().filter_map(|tap| pulse_window(tap, rate));
         let lengths: Vec<f64> = windows.map(PulseWindow::length).collect();
         Some(ForceWindow {
             length: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64 / rate,
@@ -501,7 +513,9 @@ impl<'a> Stage<'a> {
     fn begin(&self, tap: &Tap) -> u64 {
         let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
         let trigger = (tap.time * self.recording.sample_rate()).round();
-        tap.pulse_end.unwrap_or((trigger + after) as u64)
+        let begin = tap.pulse_end.unwrap_or((trigger + after) as u64);
+        // Samples that were cut off are no decay.
+        begin.max(tap.usable_from())
     }
 
     /// Reads the decays; `None` where they are too short for a fit.
@@ -509,7 +523,7 @@ impl<'a> Stage<'a> {
         let taps: Vec<&Tap> = self.taps.accepted().collect();
         let lengths = taps
             .iter()
-            .map(|tap| (tap.record.start + self.gate).saturating_sub(self.begin(tap)));
+            .map(|tap| (tap.usable_from() + self.gate).saturating_sub(self.begin(tap)));
         let shortest = lengths.min().unwrap_or(0);
         let samples = match largest_smooth_block(shortest as usize) {
             Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
@@ -545,7 +559,8 @@ impl<'a> Stage<'a> {
         let mut channels = self.read(tap.record.start..begin + samples as u64)?;
         let before = (begin - tap.record.start) as usize;
         let responses = channels.split_off(usize::from(self.has_force));
-        let force = channels.pop().map(|mut force| {
+        let force = channels.pop().filter(|_| tap.is_whole());
+        let force = force.map(|mut force| {
             remove_offset(&mut force, rate);
             if let Some(window) = pulse_window(tap, rate) {
                 window.apply(&mut force);

@@ -231,6 +231,7 @@ mod tests {
             pulse: None,
             record: 0..100,
             second_hit,
+            overload: None,
             rejection: None,
         };
         let far = SecondHit {

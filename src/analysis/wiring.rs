@@ -98,6 +98,7 @@ fn measure_described(
     let mut settings = MeasureSettings::new(wiring.source());
     settings.band = description.band;
     settings.block = description.block;
+    settings.taps.keep_overload = description.keep_overload;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
     if wiring.hammer.is_some() {
@@ -233,10 +234,11 @@ fn bare_wiring(
 pub fn inspect_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,
+    taps: &TapSettings,
 ) -> Result<RecordingResult, PipelineError> {
     let wiring = bare_wiring(&recording, hammer)?;
     let source = wiring.source();
-    let taps = find_taps(&recording, &source, &TapSettings::default())?;
+    let taps = find_taps(&recording, &source, taps)?;
     let warnings = of_recording(&recording, &source, &taps);
     let measurement = Measurement {
         taps,

@@ -6,8 +6,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, T
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint::description::{
-    ASSEMBLIES, Assembly, ChannelRef, FORMS, READINGS, ReadBy, ResponseForm, SENSOR_KINDS,
-    SensorKind, WINDOWS, WindowKind,
+    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
+    SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
 };
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
 use tapjoint::quantity::{Dimension, parse_quantity};
@@ -16,6 +16,7 @@ use tapjoint::recording::{
 };
 use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
+use tapjoint::taps::TapSettings;
 
 /// Most threads: no machine has more processors, and each thread takes memory.
 const MOST_THREADS: u64 = 1024;
@@ -120,6 +121,10 @@ pub(super) struct RecordingArguments {
     /// frequency, samples, time, rate, points
     #[arg(long, value_name = "ROLE=NAME", value_parser = variable)]
     pub(super) variable: Vec<(VariableRole, String)>,
+    /// Taps that drove a channel to its limit: reject them, or keep their decays from where they are whole;
+    /// default: reject
+    #[arg(long, value_name = "WHAT", value_parser = overload())]
+    pub(super) overload: Option<bool>,
 }
 
 impl RecordingArguments {
@@ -134,6 +139,14 @@ impl RecordingArguments {
             time_unit: self.time_unit,
             values: self.values,
             variables,
+        }
+    }
+
+    /// Returns the limits for taps.
+    pub(super) fn taps(&self) -> TapSettings {
+        TapSettings {
+            keep_overload: self.overload.unwrap_or(false),
+            ..TapSettings::default()
         }
     }
 
@@ -465,6 +478,13 @@ pub(super) fn reading() -> impl TypedValueParser<Value = ReadBy> {
 fn time_unit() -> impl TypedValueParser<Value = f64> {
     let help = ["Seconds", "Milliseconds", "Microseconds", "Nanoseconds"];
     words(TIME_UNITS, help)
+}
+
+fn overload() -> impl TypedValueParser<Value = bool> {
+    words(
+        OVERLOADS,
+        ["Reject them", "Use their decays from where they are whole"],
+    )
 }
 
 fn value_columns() -> impl TypedValueParser<Value = ValueColumns> {

@@ -114,6 +114,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
             ("--time-unit", bare.time_unit.is_some()),
             ("--values", bare.values.is_some()),
             ("--variable", !bare.variable.is_empty()),
+            ("--overload", bare.overload.is_some()),
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),
@@ -121,7 +122,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let given = described.iter().chain(&own_options);
         if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
             bail!(
-                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `band`, `block`, `window`"
+                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `overload`, `band`, `block`, `window`"
             );
         }
         let file = read_test(file, terminal)?;
@@ -220,7 +221,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         match render_frf_picture(recording, frfs, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
-                "{}: no tap was accepted, so there is no function to draw",
+                "{}: no tap without an overload was accepted, so there is no function to draw",
                 recording.file
             )),
         }
@@ -229,7 +230,9 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
     for (file, format) in outputs {
         match format {
             _ if all.is_empty() => {
-                terminal.warn("no tap was accepted, so there is no function to write");
+                terminal.warn(
+                    "no tap without an overload was accepted, so there is no function to write",
+                );
             }
             None => file.write(render_frf_csv(&all)?.as_bytes())?,
             Some(format) => file.write(&render_frf_uff(&all, format)?)?,
@@ -291,6 +294,7 @@ fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::R
     };
     Ok(run_wired(recording, &wiring, |measure| {
         arguments.spectrum.apply(measure);
+        measure.taps = arguments.recording.taps();
     })?)
 }
 

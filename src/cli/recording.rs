@@ -34,6 +34,7 @@ pub(super) fn analyse(
         Ok(opened) => {
             let analysis = run_recording(opened, recording.hammer.as_ref(), |measure| {
                 spectrum.apply(measure);
+                measure.taps = recording.taps();
                 measure.reading = reading;
             });
             return Ok(analysis?);
@@ -57,6 +58,7 @@ pub(super) fn analyse(
         ("--hammer", recording.hammer.is_some()),
         ("--sample-rate", recording.sample_rate.is_some()),
         ("--time-unit", recording.time_unit.is_some()),
+        ("--overload", recording.overload.is_some()),
         ("--block", spectrum.block.is_some()),
         ("--window", spectrum.window.is_some()),
     ];
@@ -169,6 +171,7 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
         recordings.push(inspect_bare(
             recording,
             arguments.recording.hammer.as_ref(),
+            &arguments.recording.taps(),
         )?);
     }
     let warnings: Vec<_> = recordings

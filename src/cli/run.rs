@@ -87,9 +87,12 @@ const SAMPLES: usize = 1000;
 /// Reads the description, and checks that options and recordings go with it.
 fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let bare = &arguments.recording;
-    if bare.hammer.is_some() || bare.settings() != ReadSettings::default() {
+    if bare.hammer.is_some()
+        || bare.overload.is_some()
+        || bare.settings() != ReadSettings::default()
+    {
         bail!(
-            "--hammer, --sample-rate, --time-unit, --values and --variable are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
+            "--hammer, --sample-rate, --time-unit, --values, --variable and --overload are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
     let mut file = read_test(&arguments.file, terminal)?;

@@ -12,7 +12,7 @@ mod template;
 
 pub use parse::{ChannelRefError, READINGS, WINDOWS};
 pub use reader::DescriptionError;
-pub use recordings::{FORMS, SENSOR_KINDS};
+pub use recordings::{FORMS, OVERLOADS, SENSOR_KINDS};
 use schemars::JsonSchema;
 use serde::Serialize;
 pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, lap_layout};
@@ -258,6 +258,8 @@ pub struct RecordingDescription {
     pub variables: Variables,
     /// The sensor of such a file.
     pub sensor: Option<String>,
+    /// True if taps that drove a channel to its limit are used from where their decays are whole.
+    pub keep_overload: bool,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,
     /// Carried to the outputs: temperature (degrees Celsius).

@@ -243,6 +243,8 @@ pub const FORMS: [(&str, ResponseForm); 3] = [
     ("mobility", ResponseForm::Mobility),
     ("receptance", ResponseForm::Receptance),
 ];
+/// Words of `overload` in `[[recording]]`: true to use overloaded taps.
+pub const OVERLOADS: [(&str, bool); 2] = [("reject", false), ("keep", true)];
 /// Words of `form` in `[[recording]]`, those of spectra included.
 const FUNCTION_FORMS: [(&str, FunctionForm); 4] = [
     (
@@ -343,6 +345,11 @@ pub(super) fn read_recording(
              or remove `values`",
         ));
     }
+    if let (Some(entry), Some(_)) = (table.get("overload"), form) {
+        return Err(entry.error(
+            "`overload` is about taps, and `form` says that the file holds functions; remove one of them",
+        ));
+    }
     Ok(RecordingDescription {
         file: file.text("a file such as \"taps.wav\"")?.into(),
         line: file.line,
@@ -360,6 +367,7 @@ pub(super) fn read_recording(
             .optional("variables", read_variables)?
             .unwrap_or_default(),
         sensor,
+        keep_overload: table.choice("overload", &OVERLOADS)?.unwrap_or(false),
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,

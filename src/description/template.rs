@@ -77,6 +77,7 @@ file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, s
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none
 # mass = [{ position = 0.423, mass = "15 g" }]   # known masses fastened for this recording, default: none
 # sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
+# overload = "keep"            # "reject" (default) taps that drove a channel to its limit | "keep" them from where the decay is whole
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none

@@ -28,6 +28,8 @@ fn prop_intervals_hold_the_truth_as_often_as_they_say() {
         Cell::CloseModes,
         Cell::Hum,
         Cell::TwoTaps,
+        Cell::Rails80,
+        Cell::Rails50,
         Cell::Functions,
     ];
     for cell in cells {

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use crate::recording::ResponseForm;
 use crate::spectral::{DecayCheck, Lines, Window};
-use crate::taps::{Rejection, SecondHit, Tap};
+use crate::taps::{Overload, Rejection, SecondHit, Tap};
 use tapjoint_numerics::stats::median;
 
 pub use verdict::{Check, Outcome, QualityVerdict, Subject};
@@ -54,6 +54,8 @@ pub struct TapEvidence {
     pub peak: f64,
     /// A second hit in its force, if any.
     pub second_hit: Option<SecondHit>,
+    /// Samples at the limit of a channel, if any.
+    pub overload: Option<Overload>,
     /// Why it was rejected; `None` = accepted.
     pub rejection: Option<Rejection>,
 }
@@ -63,6 +65,7 @@ impl From<&Tap> for TapEvidence {
         TapEvidence {
             peak: tap.peak,
             second_hit: tap.second_hit,
+            overload: tap.overload,
             rejection: tap.rejection.clone(),
         }
     }

@@ -10,7 +10,7 @@ use super::{
     TapEvidence, limits,
 };
 use crate::spectral::{Window, random_error};
-use crate::taps::{Rejection, SecondHit};
+use crate::taps::{Overload, Rejection, SecondHit};
 use tapjoint_numerics::stats::times;
 
 const NO_HAMMER: &str = "Not applicable without a hammer: a second hit cannot be told from two modes that beat in the responses.";
@@ -111,7 +111,18 @@ pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<QualityVerdic
             ),
             // Other reasons are looked for first: what they reject was not searched for an overload.
             Some(_) => verdict.missing("Not applicable: rejected for another reason."),
-            None => verdict.found(0.0, Outcome::Good, "No channel at its limit.".to_owned()),
+            None => match tap.overload {
+                Some(Overload {
+                    channel, samples, ..
+                }) => verdict.found(
+                    samples as f64,
+                    Outcome::Doubtful,
+                    format!(
+                        "Channel {channel} is at its limit for {samples} samples (limit 0); only the decay after them is used."
+                    ),
+                ),
+                None => verdict.found(0.0, Outcome::Good, "No channel at its limit.".to_owned()),
+            },
         }
     })
 }

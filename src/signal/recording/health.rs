@@ -25,6 +25,28 @@ const MIN_DROP_OF_PEAK: f64 = 1e-4;
 /// the idle side of a hammer signal is none.
 const MIN_LEVEL_OF_PEAK: f64 = 0.5;
 
+/// An extreme this near to the peak (part of it) is the other end of the same integer format.
+const FULL: f64 = 0.99;
+
+/// Samples this far below the extreme level are near it (part of the level).
+const NEAR_LEVEL: f64 = 0.01;
+
+/// Fewest separate runs at the extreme level that make a rail of it where values are coarse: by chance two crests may
+/// be equal.
+const LEAST_HITS: u64 = 4;
+
+/// Steps of the values coarser than this part of the level say nothing about single samples on it.
+const QUANTUM_OF_PEAK: f64 = 1e-3;
+
+/// With steps finer than this part of the level two neighbours at the extreme are equal by a limit alone.
+const FINE_QUANTUM: f64 = 1e-6;
+
+/// Part of the peak by which the steps to both sides of a crest must differ, or the crest is that of a computed tone.
+const LOPSIDED_OF_PEAK: f64 = 1e-6;
+
+/// A peak beyond this multiple of the rms is no steady tone, which repeats its crest exactly.
+const PEAK_OF_TONE: f64 = 3.0;
+
 /// Shortest run of equal samples that counts as dropped. Recorders lose whole buffers, of 32
 /// samples at least; a moving signal does not repeat a value that often by chance.
 const MIN_DROPOUT: u64 = 32;
@@ -158,6 +180,10 @@ pub struct ChannelHealth {
     /// Number of flat tops, beyond the list too.
     #[serde(rename = "flat_tops")]
     pub flat_top_count: u64,
+    /// Lower and upper rail (the channel's unit): the level at which samples were cut off, singly or in runs; `None`
+    /// where none was.
+    #[serde(skip)]
+    pub rails: [Option<f64>; 2],
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
     #[serde(skip)]
     pub dropped: Vec<EqualRun>,
@@ -180,6 +206,10 @@ impl ChannelHealth {
         scaled.rms *= factor.abs();
         scaled.peak *= factor.abs();
         (scaled.minimum, scaled.maximum) = (low.min(high), low.max(high));
+        scaled.rails = self.rails.map(|rail| rail.map(|level| level * factor));
+        if factor < 0.0 {
+            scaled.rails.reverse();
+        }
         for run in scaled.flat_tops.iter_mut().chain(&mut scaled.dropped) {
             run.value *= factor;
         }
@@ -209,6 +239,19 @@ impl ChannelHealth {
                 "{} flat tops at its extreme level, the first at {:.6} s ({len} equal samples at {value}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
                 self.flat_top_count,
                 *start as f64 / sample_rate
+            );
+            doubts.push(("flat-tops", problem));
+        }
+        let rails: Vec<String> = self
+            .rails
+            .iter()
+            .flatten()
+            .map(|rail| format!("{rail:.4e}"))
+            .collect();
+        if self.flat_tops.is_empty() && self.first_full_scale.is_none() && !rails.is_empty() {
+            let problem = format!(
+                "single samples pile up at its extreme level {}; an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
+                rails.join(" and ")
             );
             doubts.push(("flat-tops", problem));
         }
@@ -268,6 +311,15 @@ struct Run {
 struct Side {
     sign: f64,
     level: f64,
+    /// Separate runs at the level, of single samples too.
+    hits: u64,
+    /// Those that fall off at one end as flat tops do, and unequally at both. The crests of a computed tone are
+    /// symmetric.
+    lopsided: u64,
+    /// The lopsided ones of two or more samples.
+    pairs: u64,
+    /// Separate runs within [`NEAR_LEVEL`] below it.
+    near: u64,
     places: Vec<EqualRun>,
     count: u64,
 }
@@ -277,18 +329,48 @@ impl Side {
         Self {
             sign,
             level: f64::NEG_INFINITY,
+            hits: 0,
+            lopsided: 0,
+            pairs: 0,
+            near: 0,
             places: Vec::new(),
             count: 0,
         }
     }
 
-    /// Takes the next value; a higher level makes all runs at the old one ordinary.
+    /// Takes the next value that differs from the last; a higher level makes all runs at the old one ordinary.
     fn raise(&mut self, value: f64) {
-        if value * self.sign > self.level {
-            self.level = value * self.sign;
+        let height = value * self.sign;
+        if height > self.level {
+            self.near = match self.level >= height - NEAR_LEVEL * height.abs() {
+                true => self.near + self.hits,
+                false => 0,
+            };
+            (self.level, self.hits) = (height, 1);
+            (self.lopsided, self.pairs) = (0, 0);
             self.places.clear();
             self.count = 0;
+        } else if height == self.level {
+            self.hits += 1;
+        } else if height >= self.level - NEAR_LEVEL * self.level.abs() {
+            self.near += 1;
         }
+    }
+
+    /// Returns the rail of this side: a level with flat tops, or one on which samples pile up. `quantum` is the smallest
+    /// step of the values, `rms` their root mean square about the mean.
+    ///
+    /// Of a smooth signal that is not cut off far more samples lie within 1 % below the highest than exactly on it.
+    /// Coarse steps would pile up by themselves, and so do numbers of few digits.
+    fn rail(&self, quantum: f64, rms: f64) -> Option<f64> {
+        let level = self.level.abs();
+        let few_digits = format!("{level:.6e}").parse() == Ok(level);
+        let certain = self.pairs > 0 && quantum < FINE_QUANTUM * level && !few_digits;
+        let piled = (self.pairs > 0 || self.lopsided > 0 && level > PEAK_OF_TONE * rms)
+            && quantum < QUANTUM_OF_PEAK * level
+            && self.hits >= LEAST_HITS
+            && self.hits > self.near;
+        (self.count > 0 || certain || piled).then_some(self.level * self.sign)
     }
 
     fn holds(&self, value: f64) -> bool {
@@ -374,16 +456,22 @@ impl HealthMeter {
             entry,
             activity,
         } = self.run;
-        if len < MIN_FLAT_TOP {
+        let value = self.last;
+        let extreme = self.high.holds(value) || self.low.holds(value);
+        if len < MIN_FLAT_TOP && !extreme {
             return;
         }
-        let value = self.last;
         let peak = self.high.level.abs().max(self.low.level.abs());
         let smallest_drop = (MIN_DROP_QUANTA * self.quantum).max(MIN_DROP_OF_PEAK * peak);
-        let extreme = self.high.holds(value) || self.low.holds(value);
+        let lopsided = (entry - exit).abs() > LOPSIDED_OF_PEAK * peak;
         if extreme && entry.max(exit) > smallest_drop {
             for side in [&mut self.high, &mut self.low] {
-                if side.holds(value) {
+                if !side.holds(value) {
+                    continue;
+                }
+                side.lopsided += u64::from(lopsided);
+                side.pairs += u64::from(lopsided && len > 1);
+                if len >= MIN_FLAT_TOP {
                     side.count += 1;
                     if side.places.len() < PLACES_KEPT {
                         side.places.push(EqualRun { start, len, value });
@@ -417,10 +505,18 @@ impl HealthMeter {
         health.rms = (self.sum_of_squares / self.count as f64).sqrt();
         health.peak = health.maximum.abs().max(health.minimum.abs());
         health.constant = health.maximum == health.minimum;
-        for side in [self.high, self.low] {
+        for (side, rail) in [self.low, self.high].into_iter().zip(&mut health.rails) {
             if !health.constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * health.peak {
+                *rail = side.rail(self.quantum, health.rms);
                 health.flat_top_count += side.count;
                 health.flat_tops.extend(side.places);
+            }
+        }
+        // An integer format ends at full scale, reached or not by the other side.
+        if health.full_scale_samples > 0 {
+            let ends = [health.minimum, health.maximum];
+            for (rail, end) in health.rails.iter_mut().zip(ends) {
+                *rail = rail.or(Some(end).filter(|end| end.abs() >= FULL * health.peak));
             }
         }
         health.flat_tops.sort_by_key(|flat_top| flat_top.start);

@@ -73,6 +73,8 @@ pub struct TapSettings {
     pub rearm: f64,
     /// Length of signal that the wanted block needs (s), where a block is given.
     pub wanted: Option<f64>,
+    /// True to accept taps that drove a channel to its limit. Their decays are used from where they are whole.
+    pub keep_overload: bool,
 }
 
 impl Default for TapSettings {
@@ -87,6 +89,7 @@ impl Default for TapSettings {
             double_hit_warning: 0.04,
             rearm: 0.05,
             wanted: None,
+            keep_overload: false,
         }
     }
 }
@@ -107,8 +110,22 @@ pub struct Tap {
     /// A second hit within the record, from [`TapSettings::double_hit_warning`] of the peak up; `None`
     /// without one, and without a hammer, where it cannot be told from two modes that beat.
     pub second_hit: Option<SecondHit>,
+    /// Samples of its record at the limit of a channel; `None` without any, and of a tap that is rejected for another
+    /// reason.
+    pub overload: Option<Overload>,
     /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
+}
+
+/// Samples of a tap's record at the limit of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overload {
+    /// The first such channel, 1-based.
+    pub channel: usize,
+    /// Its samples at the limit.
+    pub samples: usize,
+    /// Frame from which no response is cut off any more.
+    pub whole_from: u64,
 }
 
 impl Tap {
@@ -117,9 +134,20 @@ impl Tap {
         self.rejection.is_none()
     }
 
-    /// Length of its record (frames).
+    /// First frame that is used of its record: an overloaded tap has only its decay, from where that is whole.
+    pub fn usable_from(&self) -> u64 {
+        let whole = self.overload.map(|overload| overload.whole_from);
+        whole.unwrap_or(self.record.start).min(self.record.end)
+    }
+
+    /// Length of what is used of its record (frames).
     pub fn frames(&self) -> u64 {
-        self.record.end - self.record.start
+        self.record.end - self.usable_from()
+    }
+
+    /// Returns `true` where its whole record may enter averages: no sample of force or response was cut off.
+    pub fn is_whole(&self) -> bool {
+        self.overload.is_none()
     }
 }
 
@@ -222,6 +250,16 @@ pub enum TapRemark {
         /// Number of times.
         count: usize,
     },
+    /// Taps that drove a channel to its limit were accepted, as asked.
+    OverloadKept {
+        /// Number of taps.
+        count: usize,
+    },
+    /// No tap is left but overloaded ones, and these are rejected.
+    AllOverloaded {
+        /// Number of taps.
+        count: usize,
+    },
 }
 
 impl fmt::Display for TapRemark {
@@ -240,6 +278,17 @@ impl fmt::Display for TapRemark {
                 f,
                 "the force stayed up for more than 50 ms {count} time(s), longer than any hammer pulse; \
                  that was left out: a moved cable, a hand on the hammer, or the wrong channel"
+            ),
+            TapRemark::OverloadKept { count } => write!(
+                f,
+                "{count} tap(s) that drove a channel to its limit are used from where their decays are whole: they \
+                 give frequencies and damping, but enter no frequency response function; lower the gain or tap more \
+                 softly"
+            ),
+            TapRemark::AllOverloaded { count } => write!(
+                f,
+                "no tap is accepted, and {count} only for an overload; overload = \"keep\" in [[recording]], or \
+                 --overload keep, uses their decays from where they are whole; better lower the gain or tap more softly"
             ),
         }
     }
@@ -325,11 +374,29 @@ pub fn find_taps(
     for index in 0..found.events.len() {
         taps.push(tap(recording, source, &found, index, weakest, settings)?);
     }
+    if settings.keep_overload {
+        // One that is cut off to its end has no decay.
+        for tap in taps.iter_mut().filter(|tap| tap.frames() > 0) {
+            if matches!(tap.rejection, Some(Rejection::Overload { .. })) {
+                tap.rejection = None;
+            }
+        }
+    }
     reject_short(&mut taps, recording.sample_rate(), settings.wanted);
+    let mut remarks = found.remarks;
+    let kept = taps.iter().filter(|tap| tap.accepted() && !tap.is_whole());
+    match kept.count() {
+        0 => {}
+        count => remarks.push(TapRemark::OverloadKept { count }),
+    }
+    let overloaded = taps.iter().filter(|tap| !tap.is_whole()).count();
+    if overloaded > 0 && !settings.keep_overload && !taps.iter().any(Tap::accepted) {
+        remarks.push(TapRemark::AllOverloaded { count: overloaded });
+    }
     Ok(Taps {
         taps,
         noise: found.noise,
-        remarks: found.remarks,
+        remarks,
     })
 }
 
@@ -376,6 +443,7 @@ fn tap(
         pulse_end = Some(end);
         second = second_hit(&force, event, own, settings);
     }
+    let mut overloaded = None;
     let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
@@ -387,7 +455,10 @@ fn tap(
             ratio: double.ratio,
             limit: settings.double_hit,
         }),
-        None => overload(recording, source, &record)?,
+        None => {
+            overloaded = overload(recording, source, &record)?;
+            overloaded.map(Rejection::from)
+        }
     };
     Ok(Tap {
         time: event.trigger as f64 / rate,
@@ -396,6 +467,7 @@ fn tap(
         pulse,
         record,
         second_hit: second,
+        overload: overloaded,
         rejection,
     })
 }
@@ -438,46 +510,58 @@ fn force_of(
     Ok(Some(force))
 }
 
-/// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat
-/// tops.
+impl From<Overload> for Rejection {
+    fn from(found: Overload) -> Self {
+        Rejection::Overload {
+            channel: found.channel,
+            samples: found.samples,
+        }
+    }
+}
+
+/// Samples after the last one at a limit that are left out as well: an amplifier takes some to recover.
+const RECOVERY: u64 = 4;
+
+/// Samples of a record at a channel's rails, and where the last of any response is over; `None` without any.
 fn overload(
     recording: &Recording,
     source: &TapSource,
     record: &Range<u64>,
-) -> Result<Option<Rejection>, RecordingError> {
+) -> Result<Option<Overload>, RecordingError> {
+    let mut found: Option<Overload> = None;
     for channel in source.channels() {
         let Some(info) = recording.channels().get(channel) else {
             continue;
         };
-        let health = &info.health;
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for top in &health.flat_tops {
-            if top.value > health.mean {
-                high = high.min(top.value);
-            } else {
-                low = low.max(top.value);
-            }
-        }
-        if health.full_scale_samples > 0 {
-            high = high.min(health.peak);
-            low = low.max(-health.peak);
-        }
-        if low.is_infinite() && high.is_infinite() {
+        let [low, high] = info.health.rails;
+        if low.is_none() && high.is_none() {
             continue;
         }
-        // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
-        let hair = 1e-9 * health.peak;
-        let (low, high) = (low + hair, high - hair);
+        // A hair inside, so that rescaling by a unit cannot make a sample slip through.
+        let hair = 1e-9 * info.health.peak;
+        let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
+        let high = high.map_or(f64::INFINITY, |high| high - hair);
         let samples = recording.read(channel, record.clone())?;
-        let count = samples.iter().filter(|&&x| x >= high || x <= low).count();
-        if count > 0 {
-            return Ok(Some(Rejection::Overload {
-                channel: channel + 1,
-                samples: count,
-            }));
+        let cut_off = samples.iter().enumerate();
+        let cut_off = cut_off.filter(|(_, x)| **x >= high || **x <= low);
+        let (count, last) = cut_off.fold((0, None), |(count, _), (at, _)| (count + 1, Some(at)));
+        let Some(last) = last else {
+            continue;
+        };
+        let overload = found.get_or_insert(Overload {
+            channel: channel + 1,
+            samples: count,
+            whole_from: record.start,
+        });
+        // The clipped pulse of a hammer spoils no decay.
+        let is_force =
+            matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel);
+        if !is_force {
+            let whole_from = record.start + last as u64 + 1 + RECOVERY;
+            overload.whole_from = overload.whole_from.max(whole_from);
         }
     }
-    Ok(None)
+    Ok(found)
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
@@ -495,7 +579,9 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
         if tap.accepted() && available <= SHORT_OF_MEDIAN * needed {
-            tap.rejection = Some(if index == last {
+            tap.rejection = Some(if let Some(overload) = tap.overload {
+                overload.into()
+            } else if index == last {
                 Rejection::CutOff { available, needed }
             } else {
                 Rejection::NextTooSoon { available, needed }
@@ -510,7 +596,7 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
     if let Some(tap) = taps.last_mut().filter(|tap| tap.accepted()) {
         let available = tap.frames() as f64 / rate;
-        if needed.is_finite() && available < CUT_OF_SHORTEST * needed {
+        if needed.is_finite() && available < CUT_OF_SHORTEST * needed && tap.is_whole() {
             tap.rejection = Some(Rejection::CutOff { available, needed });
         }
     }

@@ -454,6 +454,7 @@ fn measured_taps() -> Vec<Tap> {
             pulse: None,
             record: 0..0,
             second_hit: None,
+            overload: None,
             rejection: None,
         })
         .collect();

@@ -38,6 +38,7 @@ fn tap(peak: f64) -> TapEvidence {
     TapEvidence {
         peak,
         second_hit: None,
+        overload: None,
         rejection: None,
     }
 }

@@ -606,6 +606,125 @@ fn regress_flat_tops_of_a_float_recording_are_an_overload() {
     }
 }
 
+/// Decays of 300 Hz at 2048 Hz, cut off: seven samples a period, so that each crest has one or two.
+fn cut_off(limit: f64) -> Recording {
+    let rate = 2048.0;
+    let mut samples = ringing(rate, 6.0, &[0.5, 3.0], &[(300.3, 0.002, 1.0)]);
+    add_noise(&mut samples, 1e-4, &mut random(5));
+    samples.iter_mut().for_each(|x| *x = x.clamp(-limit, limit));
+    recording(rate, vec![samples])
+}
+
+fn keep() -> TapSettings {
+    TapSettings {
+        keep_overload: true,
+        ..TapSettings::default()
+    }
+}
+
+#[test]
+fn recover_overloaded_taps_from_where_they_are_whole() {
+    let recording = cut_off(0.8);
+    assert_eq!(
+        recording.channels()[0].health.rails,
+        [Some(-0.8), Some(0.8)]
+    );
+    let source = TapSource::Responses(vec![0]);
+    let taps = find_taps(&recording, &source, &TapSettings::default()).unwrap();
+    assert_eq!(taps.accepted().count(), 0);
+    assert_eq!(taps.remarks, [TapRemark::AllOverloaded { count: 2 }]);
+    let taps = find_taps(&recording, &source, &keep()).unwrap();
+    assert_eq!(taps.remarks, [TapRemark::OverloadKept { count: 2 }]);
+    assert_eq!(taps.accepted().count(), 2);
+    for tap in taps.accepted() {
+        // No sample that is used lies on a rail.
+        let used = recording
+            .read(0, tap.usable_from()..tap.record.end)
+            .unwrap();
+        let most = used.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        assert!(most < 0.8 && most > 0.7, "{most}");
+        assert_eq!(used.len() as u64, tap.frames());
+    }
+}
+
+#[test]
+fn prop_a_pair_of_equal_samples_at_the_extreme_is_a_rail() {
+    let mut samples = ringing(2048.0, 3.0, &[0.5], &[(300.3, 0.02, 1.0)]);
+    add_noise(&mut samples, 1e-4, &mut random(5));
+    let largest = samples.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    // The crest and one sample beside it are set to one value that has many digits.
+    let crest = samples.iter().position(|x| x.abs() == largest).unwrap();
+    let beside = [crest - 1, crest + 1]
+        .into_iter()
+        .max_by(|a, b| (samples[*a] * samples[crest]).total_cmp(&(samples[*b] * samples[crest])))
+        .unwrap();
+    samples[beside] = samples[crest];
+    let health = &recording(2048.0, vec![samples]).channels()[0]
+        .health
+        .clone();
+    assert_eq!(
+        health.rails.iter().flatten().count(),
+        1,
+        "{:?}",
+        health.rails
+    );
+}
+
+#[test]
+fn limit_crests_are_no_rails() {
+    assert_eq!(cut_off(9.0).channels()[0].health.rails, [None, None]);
+    let mut decay = ringing(5120.0, 20.0, &[0.5], &[(40.3, 0.0005, 0.9)]);
+    add_noise(&mut decay, 1e-5, &mut random(7));
+    // A steady tone in steps of 16 bits has the same highest value again and again, and so has one that repeats itself.
+    let tone = |n: u32| 0.25 * (0.1 * f64::from(n)).sin();
+    let repeated = |n: u32| (std::f64::consts::TAU * f64::from(n % 8) / 8.0).sin();
+    let signals: [Vec<f64>; 3] = [
+        (0..200_000).map(tone).collect(),
+        (0..20_000).map(repeated).collect(),
+        decay,
+    ];
+    for signal in signals {
+        // Steps of 16 and of 12 bits, and printed numbers of five and of four digits.
+        let bits = |bits: i32| {
+            let full = 2f64.powi(bits - 1);
+            signal.iter().map(|x| (x * full).round() / full).collect()
+        };
+        let digits = |digits: usize| {
+            let texts = signal.iter().map(|x| format!("{x:.0$e}", digits - 1));
+            texts.map(|text| text.parse().unwrap()).collect()
+        };
+        let all: [Vec<f64>; 5] = [signal.clone(), bits(16), bits(12), digits(5), digits(4)];
+        for (case, samples) in all.into_iter().enumerate() {
+            let health = &recording(5120.0, vec![samples]).channels()[0]
+                .health
+                .clone();
+            assert_eq!(health.rails, [None, None], "case {case}");
+        }
+    }
+}
+
+#[test]
+fn prop_the_clipped_pulse_of_a_hammer_spoils_no_decay() {
+    let rate = 12_800.0;
+    let times = [0.3, 1.3, 2.3];
+    let pulses = times.map(|time| pulse(time, 2e-3, if time == 1.3 { 60.0 } else { 30.0 }));
+    let mut hammer = force(rate, 3.3, &pulses, Shape::HalfSine);
+    add_noise(&mut hammer, 0.01, &mut random(21));
+    hammer.iter_mut().for_each(|x| *x = x.min(45.0));
+    let mut response = ringing(rate, 3.3, &times, &[(75.0, 0.02, 50.0)]);
+    add_noise(&mut response, 0.01, &mut random(22));
+    let recording = recording(rate, vec![hammer, response]);
+    let source = TapSource::Hammer {
+        channel: 0,
+        responses: vec![1],
+    };
+    let taps = find_taps(&recording, &source, &keep()).unwrap();
+    assert_eq!(taps.accepted().count(), 3);
+    let whole: Vec<bool> = taps.accepted().map(Tap::is_whole).collect();
+    assert_eq!(whole, [true, false, true]);
+    assert_eq!(taps.taps[1].usable_from(), taps.taps[1].record.start);
+}
+
 #[test]
 fn regress_a_weak_tap_is_named_as_such() {
     let (_, samples) = five_taps((5120.0, 31), Shape::SineSquared, |pulses| {

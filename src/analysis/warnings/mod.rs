@@ -11,7 +11,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 65] = [
+pub const WARNING_CODES: [(&str, &str); 66] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -97,6 +97,7 @@ pub const WARNING_CODES: [(&str, &str); 65] = [
         "the response does not come to rest within the block",
     ),
     ("mains", "a peak was taken for mains hum"),
+    ("unlisted-peak", "a strong peak is no listed mode"),
     // Of the checks of good practice.
     (
         "force-ripple",

@@ -601,7 +601,8 @@ impl Accepted<'_> {
                 index == place || stride <= 1.0 || half_width(self.modes[index].pole) >= stride
             });
             let moved = self.sweep(vec![own], &mut fitted, false);
-            let may_be_needed = (fitted.last()).is_none_or(|group| self.may_be_needed(group, place));
+            let may_be_needed =
+                (fitted.last()).is_none_or(|group| self.may_be_needed(group, place));
             if !may_be_needed {
                 self.modes[place].failed = Some(Unfit::Unneeded);
                 return None;

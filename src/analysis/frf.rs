@@ -53,6 +53,21 @@ pub struct Frf {
     pub random_error: Option<Vec<Option<f64>>>,
     /// The recording's resonances on this function.
     pub resonances: Vec<FrfResonance>,
+    /// Curve of the recording's fitted modes over H1; `None` without fitted modes.
+    pub fitted: Option<FittedCurve>,
+}
+
+/// The curve of fitted modes over one frequency response function.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedCurve {
+    /// Number of fitted modes.
+    pub modes: usize,
+    /// Band of the curve (Hz).
+    pub band: (f64, f64),
+    /// Share of the measured function's power in the band that the curve leaves (1), in the form as measured.
+    pub left: f64,
+    /// The curve on each line (unit of the function); `None` outside the band.
+    pub values: Vec<Option<Complex64>>,
 }
 
 /// A resonance on a frequency response function.
@@ -203,6 +218,7 @@ fn frf(
         recording: recording.file.clone(),
         response: response.name.clone(),
         form,
+        fitted: fitted_curve(spectra, index, measured.zip(form)),
         form_words: match form {
             Some(form) => form.name(),
             None if sound => "sound pressure per force",
@@ -219,6 +235,31 @@ fn frf(
         random_error: errors,
         coherence,
         resonances: Vec::new(),
+    })
+}
+
+/// The curve of the fitted modes over the function of one response, from the measured form into the one asked for.
+fn fitted_curve(
+    spectra: &MeasuredSpectra,
+    index: usize,
+    forms: Option<(ResponseForm, ResponseForm)>,
+) -> Option<FittedCurve> {
+    let fitted = spectra.fitted.as_ref()?;
+    let own = fitted.functions.get(index)?.as_ref()?;
+    let lines = &spectra.averages.lines;
+    let mut values = vec![None; lines.points()];
+    let in_band = values.iter_mut().enumerate().skip(fitted.first);
+    for ((line, value), own) in in_band.zip(&own.values) {
+        *value = match forms {
+            Some((from, to)) => from.convert(to, *own, lines.frequency(line)),
+            None => Some(*own),
+        };
+    }
+    Some(FittedCurve {
+        modes: fitted.modes,
+        band: fitted.band,
+        left: own.left,
+        values,
     })
 }
 

@@ -1,5 +1,6 @@
 //! Files of frequency response functions: their resonances, as a recording's.
 
+use super::explained::{fitted_curves, unlisted_peaks};
 use super::fits::{Candidates, Stabilisation, stabilisation};
 use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
@@ -62,12 +63,15 @@ pub(super) fn measure_functions(
         forms.push(form);
         values.push(response.values[first..first + lines.points()].to_vec());
     }
-    let spectra = match is_spectrum {
+    let mut spectra = match is_spectrum {
         true => spectra_of_magnitudes(lines, &values, settings.reading),
         false => spectra_of_functions(lines, values, &forms, settings.reading),
     };
+    spectra.fitted = fitted_curves(&spectra, &forms);
     let warnings = functions.warnings.iter();
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
+    let mut warnings: Vec<Warning> = warnings.collect();
+    warnings.extend(Warning::unlisted_peaks(&functions.file, &spectra.unlisted));
     Ok(RecordingResult {
         file: functions.file.clone(),
         format: Format::FrequencyResponses,
@@ -88,7 +92,7 @@ pub(super) fn measure_functions(
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),
-            warnings: warnings.collect(),
+            warnings,
         },
     })
 }
@@ -153,6 +157,8 @@ fn spectra_of_magnitudes(
         },
         window: Window::Rectangular,
         decay: None,
+        unlisted: unlisted_peaks(&level, &PeakSettings::default(), &readings),
+        fitted: None,
         readings,
         force_noise: None,
         force_window: None,
@@ -210,6 +216,8 @@ fn spectra_of_functions(
         },
         window: Window::Rectangular,
         decay: None,
+        unlisted: unlisted_peaks(&level, &PeakSettings::default(), &readings),
+        fitted: None,
         readings,
         force_noise: None,
         force_window: None,

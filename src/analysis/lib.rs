@@ -11,6 +11,7 @@
 
 mod amplitude;
 mod checks;
+mod explained;
 mod fits;
 mod found;
 mod frf;
@@ -29,8 +30,9 @@ mod wiring;
 
 pub use amplitude::AmplitudeChange;
 use checks::judge;
+pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
-pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
+pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};

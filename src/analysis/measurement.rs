@@ -1,5 +1,6 @@
 //! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
 
+use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation};
 use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
@@ -84,6 +85,10 @@ pub struct MeasuredSpectra {
     pub decay: Option<DecayCheck>,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
+    /// Strong peaks that no reading explains, the strongest first.
+    pub unlisted: Vec<UnlistedPeak>,
+    /// Curves of the fitted modes over the functions; `None` without functions or fitted modes.
+    pub fitted: Option<FittedCurves>,
     /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
     /// without a hammer or a quiet stretch before the first tap.
     pub force_noise: Option<Vec<f64>>,
@@ -168,6 +173,7 @@ pub fn measure(
                     }
                 }
                 warnings.extend(Warning::combinations(file, &found.readings));
+                warnings.extend(Warning::unlisted_peaks(file, &found.unlisted));
                 spectra = Some(found);
             }
             Err(problem @ SpectralError::Padded { .. }) => {
@@ -341,7 +347,8 @@ impl<'a> Stage<'a> {
             transforms,
             ungated,
         } = self.averages(window)?;
-        let mut readings = self.readings(&averages, &transforms, &quiet, window);
+        let level = self.level(&averages, &quiet, window);
+        let mut readings = self.readings(&level, &averages, &transforms, &quiet, window);
         let stabilisation = match self.free_decays()? {
             Some(decays) => {
                 let hum = quiet.hum_beside(&readings, &self.lines, &self.settings.mains);
@@ -359,6 +366,8 @@ impl<'a> Stage<'a> {
             averages,
             window,
             decay: Some(decay),
+            unlisted: unlisted_peaks(&level, &self.settings.peaks, &readings),
+            fitted: None,
             readings,
             force_noise: quiet.force_noise(&self.lines),
             stabilisation,
@@ -447,14 +456,13 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Peaks of the composite level over all sensors, read and labelled.
-    fn readings(
+    /// The composite level over all sensors: of H1 with a hammer, of the responses without one.
+    fn level(
         &self,
         averages: &AveragedSpectra,
-        transforms: &[Vec<Complex64>],
         quiet: &PreTriggerNoise,
         window: Window,
-    ) -> Vec<ModeReading> {
+    ) -> CompositeLevel {
         let powers: Vec<Vec<f64>> = match &averages.h1 {
             Some(h1) => h1
                 .iter()
@@ -467,8 +475,19 @@ impl<'a> Stage<'a> {
                 .collect(),
         };
         let noise = quiet.noise_powers(averages, window);
-        let level = CompositeLevel::new(self.lines, &powers, noise.as_deref());
-        let peaks = find_peaks(&level, &self.settings.peaks);
+        CompositeLevel::new(self.lines, &powers, noise.as_deref())
+    }
+
+    /// Peaks of the composite level, read and labelled.
+    fn readings(
+        &self,
+        level: &CompositeLevel,
+        averages: &AveragedSpectra,
+        transforms: &[Vec<Complex64>],
+        quiet: &PreTriggerNoise,
+        window: Window,
+    ) -> Vec<ModeReading> {
+        let peaks = find_peaks(level, &self.settings.peaks);
         let spectra: Vec<&[Complex64]> = averages
             .h1
             .as_deref()
@@ -476,7 +495,7 @@ impl<'a> Stage<'a> {
             .iter()
             .map(Vec::as_slice)
             .collect();
-        let mut readings = read_peaks(&level, &spectra, &peaks, window);
+        let mut readings = read_peaks(level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
             // A peak over a gap of the force's spectrum: a hammer has none just where the structure resonates, so the
             // quotient's peak is the force's doing. The force on the peak is compared with that on its flanks, where

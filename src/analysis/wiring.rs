@@ -1,6 +1,7 @@
 //! From files and channels to measured recordings: described, bare, or with channels named on the command line.
 
-use super::frf::form_of_kind;
+use super::explained::fitted_curves;
+use super::frf::{form_of, form_of_kind};
 use super::function_file::{FunctionSettings, measure_functions};
 use super::measurement::{MeasureError, MeasureSettings, Measurement, measure};
 use super::recording_result::{
@@ -289,7 +290,7 @@ fn result(
     recording: &Recording,
     settings: &MeasureSettings,
     wiring: &Wiring,
-    measurement: Measurement,
+    mut measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
     let spectra = measurement.spectra.as_ref();
@@ -301,6 +302,11 @@ fn result(
         let same = responses.iter().all(|other| other.unit == first.unit);
         first.unit.clone().filter(|_| same)
     });
+    if let Some(spectra) = measurement.spectra.as_mut() {
+        let force_unit = wiring.hammer_unit.as_deref();
+        let forms = responses.iter().map(|one| form_of(one, force_unit));
+        spectra.fitted = fitted_curves(spectra, &forms.collect::<Vec<_>>());
+    }
     Ok(RecordingResult {
         file: recording.name().to_string(),
         format: recording.format(),

@@ -3,6 +3,7 @@
 
 use super::Warning;
 use crate::amplitude::{AmplitudeChanges, Way};
+use crate::explained::UnlistedPeak;
 use std::fmt;
 use tapjoint_description::DescriptionError;
 use tapjoint_identify::pairing::{MeasuredPeak, MissingCause, MissingMode, Pairing};
@@ -133,6 +134,42 @@ impl Warning {
         })
     }
 
+    /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none.
+    pub(crate) fn unlisted_peaks(file: &str, peaks: &[UnlistedPeak]) -> Option<Self> {
+        let strongest = peaks.first()?;
+        let named = |peak: &UnlistedPeak| {
+            let (frequency, height) = (frequency_words(peak.frequency), peak.above_noise_db);
+            format!("{frequency} Hz, {height:.0} dB over the noise")
+        };
+        let what = match peaks {
+            [one] => format!("a peak at {}, is no listed mode", named(one)),
+            _ => {
+                let mut list: Vec<String> = peaks.iter().take(MOST_PEAKS).map(named).collect();
+                let more = peaks.len() - list.len();
+                if more > 0 {
+                    list.push(format!("and {more} more"));
+                }
+                format!(
+                    "{} peaks are no listed modes: {}",
+                    peaks.len(),
+                    list.join("; ")
+                )
+            }
+        };
+        let [low, high] = [1.0 - ABOUT_PEAK, 1.0 + ABOUT_PEAK];
+        let [low, high] = [low, high].map(|by| frequency_words(by * strongest.frequency));
+        let text = format!(
+            "{what}; zoom there (spectrum --zoom {low}:{high}, or band = [{low}, {high}] in a description), and see in the \
+             chart whether the fitted curve follows the measured one"
+        );
+        Some(Warning {
+            shared: Some("unlisted"),
+            severity: strongest.above_noise_db,
+            about: format!("{file}: {}", named(strongest)),
+            ..Warning::about(file, "unlisted-peak", text)
+        })
+    }
+
     /// Peaks to which no mode of the jointed beam belongs; `None` where there are none.
     pub(crate) fn unpaired(count: usize) -> Option<Self> {
         let text = "as modes they would make every joint fit worse; torsion, another direction of bending, the \
@@ -232,6 +269,21 @@ impl Warning {
         );
         Some(Warning::new("ambiguous-pairing", text))
     }
+}
+
+/// Most peaks that one warning names.
+const MOST_PEAKS: usize = 5;
+/// Band about a peak to be zoomed into: this share of its frequency to either side.
+const ABOUT_PEAK: f64 = 0.1;
+
+/// Returns a frequency with four significant digits at least: "27.13", "544.2", "1032".
+fn frequency_words(frequency: f64) -> String {
+    let decimals = match frequency {
+        f if f < 100.0 => 2,
+        f if f < 1000.0 => 1,
+        _ => 0,
+    };
+    format!("{frequency:.decimals$}")
 }
 
 /// Peaks that a warning about the numbering lists.

@@ -11,7 +11,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 66] = [
+pub const WARNING_CODES: [(&str, &str); 67] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -101,6 +101,7 @@ pub const WARNING_CODES: [(&str, &str); 66] = [
         "combinations",
         "peaks are sums and differences of others, as a nonlinear joint makes them",
     ),
+    ("unlisted-peak", "a strong peak is no listed mode"),
     // Of the checks of good practice.
     (
         "force-ripple",

@@ -27,6 +27,10 @@ const PAST_HIGHEST: f64 = 1.25;
 const MOST_SHOWN_PART: f64 = 0.6;
 /// Opacity of curves of other estimators.
 const FAINT: f64 = 0.4;
+/// Width of a measured curve under that of the fitted modes, and of the latter (pixels): dark and thin over thick and
+/// coloured, so that both are seen where they agree.
+const UNDER: f64 = 3.2;
+const OVER: f64 = 1.2;
 /// Most close-ups in one row; more would be too narrow to read.
 const MOST_CLOSE_UPS: usize = 6;
 /// Lines shown on each side of a close-up's peak.
@@ -93,11 +97,15 @@ pub fn frf(
         return None;
     }
     let (mut phases, mut coherences) = (Vec::new(), Vec::new());
+    let mut fitted_phases = Vec::new();
     for (index, frf) in frfs.iter().enumerate() {
         let (lines, color) = (&spectra.averages.lines, Color::curve(index));
-        let values = frf.values().iter();
-        let phase = values.map(|value| value.map_or(f64::NAN, |value| value.arg().to_degrees()));
-        phases.push(over_lines(lines, &frf.response, color, phase.collect()));
+        let measured = over_lines(lines, &frf.response, color, degrees(frf.values()));
+        phases.push(under_fit(measured, frf));
+        if let Some(fitted) = &frf.fitted {
+            let name = fitted_name(frfs, index);
+            fitted_phases.push(fitted_curve(lines, &name, degrees(&fitted.values)));
+        }
         if let Some(coherence) = &frf.coherence {
             let values = coherence.iter().map(|value| value.unwrap_or(f64::NAN));
             let series = over_lines(lines, &frf.response, color, values.collect());
@@ -107,9 +115,10 @@ pub fn frf(
     let x = frequency_axis(spectra);
     let mut phase = Axis::linear(-190.0, 190.0).of("phase", "\u{b0}");
     phase.period = Some(360.0);
-    let degrees = ["\u{2212}180", "\u{2212}90", "0", "90", "180"];
-    let degrees = degrees.iter().zip([-180.0, -90.0, 0.0, 90.0, 180.0]);
-    let phase = phase.named(degrees.map(|(words, value)| (value, (*words).to_owned())));
+    let names = ["\u{2212}180", "\u{2212}90", "0", "90", "180"];
+    let names = names.iter().zip([-180.0, -90.0, 0.0, 90.0, 180.0]);
+    let phase = phase.named(names.map(|(words, value)| (value, (*words).to_owned())));
+    phases.extend(fitted_phases);
     panels.push(Panel::new(150.0, x.clone(), phase).with(phases));
     let mut below = subtitle(spectra);
     if coherences.is_empty() {
@@ -132,11 +141,18 @@ pub fn frf(
     for panel in &mut panels {
         panel.rules.clone_from(&rules);
     }
+    let mut caption = format!("Response per force (H1) of {name}, magnitude, phase and coherence.");
+    if frfs.iter().any(|frf| frf.fitted.is_some()) {
+        caption.push_str(
+            " Thin dark line: what the fitted modes explain, with a term each for modes below and above the band. Where it \
+             leaves the measured curve, a mode may be missing.",
+        );
+    }
     Some(Chart {
         kind: "frf",
         title: format!("Frequency response functions, {name}"),
         subtitle: below,
-        caption: format!("Response per force (H1) of {name}, magnitude, phase and coherence."),
+        caption,
         blocks: vec![Block::new(1, panels)],
         ..Chart::default()
     })
@@ -158,8 +174,15 @@ fn magnitude_panels(
             0 => "of the file",
             _ => frf.estimator.name(),
         };
-        let named = format!("{}, {estimator}", frf.response);
+        let named = match &frf.fitted {
+            Some(fitted) if frfs.len() > 1 => {
+                let left = percent(fitted.left);
+                format!("{}, {estimator}, {left} left", frf.response)
+            }
+            _ => format!("{}, {estimator}", frf.response),
+        };
         let curve = over_lines(lines, &named, color, magnitudes(frf.values()));
+        let curve = under_fit(curve, frf);
         let unit = unit_words(&frf.unit);
         let series = panel_of(&mut panels, &x, frf.form_words, &unit);
         series.push(curve);
@@ -176,8 +199,68 @@ fn magnitude_panels(
         // The estimator that is meant gives the colour its name.
         panel.series.sort_by(|a, b| b.opacity.total_cmp(&a.opacity));
     }
+    // The axes are those of what was measured.
     scale_to_magnitudes(&mut panels);
+    for (index, frf) in frfs.iter().enumerate() {
+        let Some(fitted) = &frf.fitted else { continue };
+        let name = fitted_name(frfs, index);
+        let curve = fitted_curve(lines, &name, magnitudes(&fitted.values));
+        panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit)).push(curve);
+    }
     panels
+}
+
+/// Makes a measured curve as wide as a curve of fitted modes over it needs.
+fn under_fit(measured: Series, frf: &Frf) -> Series {
+    match frf.fitted {
+        Some(_) => Series {
+            mark: Mark::Line(UNDER),
+            ..measured
+        },
+        None => measured,
+    }
+}
+
+/// Returns the curve of fitted modes.
+fn fitted_curve(lines: &Lines, name: &str, values: Vec<f64>) -> Series {
+    Series {
+        mark: Mark::Line(OVER),
+        ..over_lines(lines, name, Color::Ink, values)
+    }
+}
+
+/// Returns the name of the curve over a function: "24 fitted modes leave 0.30 % of the power, 12 to 830 Hz". In a
+/// picture all curves look alike, so that the first one speaks for all, and the others name their response.
+fn fitted_name(frfs: &[Frf], index: usize) -> String {
+    let fitted = frfs.iter().filter_map(|frf| frf.fitted.as_ref());
+    let Some(first) = fitted.clone().next() else {
+        return String::new();
+    };
+    let modes = match first.modes {
+        1 => "1 fitted mode".to_owned(),
+        count => format!("{count} fitted modes"),
+    };
+    if frfs[..index].iter().any(|frf| frf.fitted.is_some()) {
+        return format!("{modes}, {}", frfs[index].response);
+    }
+    let leaves = if first.modes == 1 { "leaves" } else { "leave" };
+    let Some((least, most)) = extent(fitted.map(|one| one.left)) else {
+        return modes;
+    };
+    let left = match (percent(least), percent(most)) {
+        (least, most) if least == most => most,
+        (least, most) => format!("{} to {most}", least.trim_end_matches(" %")),
+    };
+    let [low, high] = [first.band.0, first.band.1].map(|end| trimmed(end, 4));
+    format!("{modes} {leaves} {left} of the power, {low} to {high} Hz")
+}
+
+/// Returns a share in percent with two digits: "0.30 %"; "under 0.001 %" for less.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        percent if percent < 1e-3 => "under 0.001 %".to_owned(),
+        percent => format!("{} %", significant(percent, 2)),
+    }
 }
 
 /// Returns the estimators shown beside the one that a function is given by; none of one average, where all are the same.
@@ -192,6 +275,14 @@ pub(super) fn magnitudes(values: &[Option<Complex64>]) -> Vec<f64> {
         .iter()
         .map(|value| value.map_or(f64::NAN, |h| h.norm()));
     magnitudes.collect()
+}
+
+/// Returns the phase on each line (degrees); what does not exist is no number.
+fn degrees(values: &[Option<Complex64>]) -> Vec<f64> {
+    let degrees = values
+        .iter()
+        .map(|value| value.map_or(f64::NAN, |h| h.arg().to_degrees()));
+    degrees.collect()
 }
 
 /// Returns the series of the panel of this quantity and unit, which is added where there is none yet.

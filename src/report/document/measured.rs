@@ -5,7 +5,8 @@ use serde::{Serialize, Serializer};
 
 use super::{Document, WarningSection, document_of};
 use tapjoint_analysis::{
-    AmplitudeChange, Analysis, Conditions, Frf, FrfResonance, ModeResult, RecordingResult, Warning,
+    AmplitudeChange, Analysis, Conditions, Frf, FrfResonance, ModeResult, RecordingResult,
+    STRONG_PEAK, Warning,
 };
 use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
@@ -70,6 +71,36 @@ pub struct RecordingSection {
     pub remaining_at_end: Option<f64>,
     /// This recording's own readings.
     pub modes: Vec<ModeSection>,
+    /// What the fitted modes leave of each frequency response function; empty without functions or fitted modes.
+    pub fitted_functions: Vec<FittedFunctionSection>,
+}
+
+/// What the fitted modes leave of one frequency response function. Their poles are those of the fits; residues, and a
+/// term each for the modes below and above the band, are those of the least squares over the band.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct FittedFunctionSection {
+    /// Name of the sensor or channel.
+    pub response: String,
+    /// Number of fitted modes.
+    pub modes: usize,
+    /// Band (Hz): from the lowest to the highest band of a fit.
+    pub band: [f64; 2],
+    /// Share of the measured function's power in the band that is left (%).
+    pub left_percent: f64,
+    /// The same in dB: 10 log10 of the share; null where nothing is left.
+    pub left_db: Option<f64>,
+}
+
+impl FittedFunctionSection {
+    fn new(response: &str, modes: usize, band: (f64, f64), left: f64) -> Self {
+        FittedFunctionSection {
+            response: response.to_owned(),
+            modes,
+            band: [band.0, band.1],
+            left_percent: 100.0 * left,
+            left_db: (left > 0.0).then(|| 10.0 * left.log10()),
+        }
+    }
 }
 
 /// One tap: its peak is a force with a hammer, and a response without one.
@@ -183,7 +214,18 @@ impl RecordingSection {
             recording: Some(recording.file.clone()),
             ..ModeSection::of_reading(reading, Some(recording))
         });
+        let mut fitted_functions = Vec::new();
+        if let Some(fitted) = spectra.and_then(|spectra| spectra.fitted.as_ref()) {
+            for (response, own) in recording.responses.iter().zip(&fitted.functions) {
+                let (name, modes) = (&response.name, fitted.modes);
+                let own = own.as_ref();
+                fitted_functions.extend(
+                    own.map(|own| FittedFunctionSection::new(name, modes, fitted.band, own.left)),
+                );
+            }
+        }
         RecordingSection {
+            fitted_functions,
             aside,
             file: recording.file.clone(),
             format: recording.format.to_string(),
@@ -273,13 +315,10 @@ pub fn datasets_of(name: &str, file: &UniversalFile) -> Vec<DatasetSection> {
     sections
 }
 
-/// Height over the noise (dB) from which a peak that could not be read as a resonance is shown all the same. Noise does
-/// not reach it: its power is exponentially distributed, and exceeds its mean by 20 dB with the probability e^-100.
-const STRONG: f64 = 20.0;
-
-/// Returns true for a peak that is too high for noise, whatever it is. `above_noise_db`: its height (dB), where known.
+/// Returns true for a peak that is too high for noise, and is shown whatever it is. `above_noise_db`: its height (dB),
+/// where known.
 pub(crate) fn is_strong(above_noise_db: Option<f64>) -> bool {
-    above_noise_db.is_some_and(|height| height >= STRONG)
+    above_noise_db.is_some_and(|height| height >= STRONG_PEAK)
 }
 
 /// One resonance.
@@ -508,6 +547,12 @@ pub struct FrfSection {
     pub real: Vec<Option<f64>>,
     /// Imaginary part (unit above).
     pub imaginary: Vec<Option<f64>>,
+    /// What the recording's fitted modes leave of H1, in its form as measured; null without fitted modes.
+    pub fitted: Option<FittedFunctionSection>,
+    /// Real part of the curve of the fitted modes (unit above); null outside its band.
+    pub fitted_real: Option<Vec<Option<f64>>>,
+    /// Imaginary part of that curve.
+    pub fitted_imaginary: Option<Vec<Option<f64>>>,
     /// Coherence; null below two averages.
     pub coherence: Option<Vec<Option<f64>>>,
     /// Relative random error (standard deviation) of the magnitude; null below two averages.
@@ -526,7 +571,13 @@ pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
     let warnings = of_recordings.chain(of_functions);
     let sections = frfs.iter().map(|frf| {
         let values = frf.values();
+        let fitted = frf.fitted.as_ref();
         FrfSection {
+            fitted: fitted.map(|one| {
+                FittedFunctionSection::new(&frf.response, one.modes, one.band, one.left)
+            }),
+            fitted_real: fitted.map(|one| one.values.iter().map(|v| Some((*v)?.re)).collect()),
+            fitted_imaginary: fitted.map(|one| one.values.iter().map(|v| Some((*v)?.im)).collect()),
             recording: frf.recording.clone(),
             response: frf.response.clone(),
             form: frf.form.map(|form| form.name().to_string()),

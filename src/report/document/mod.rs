@@ -8,8 +8,9 @@ mod model;
 
 pub(crate) use measured::is_strong;
 pub use measured::{
-    AmplitudeSection, ChannelSection, DatasetSection, FitSection, FrfSection, HammerSection,
-    ModeSection, RecordingSection, TapSection, datasets_of, frf_document, method_name,
+    AmplitudeSection, ChannelSection, DatasetSection, FitSection, FittedFunctionSection,
+    FrfSection, HammerSection, ModeSection, RecordingSection, TapSection, datasets_of,
+    frf_document, method_name,
 };
 pub use model::{
     Baseline, BaselineSection, EstimateSection, FreeBeamSection, GapPlaceSection, GapSection,

@@ -186,7 +186,7 @@ function options(figure, index) {
   var series = [{ label: panel.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + panel.x.unit; } }];
   curves(panel).forEach(function (curve) {
     series.push({
-      label: curve.name, stroke: color("--" + curve.color), alpha: curve.opacity, width: 1.5, spanGaps: false,
+      label: curve.name, stroke: color("--" + curve.color), alpha: curve.opacity, width: curve.size || 1.5, spanGaps: false,
       points: { show: taps ? false : undefined },
       value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.y.unit)); }
     });

@@ -7,7 +7,8 @@
 //!
 //! [`polyreference`] finds the poles of a whole band from several responses at once, also where two
 //! modes show as one peak. [`fit`] refines poles to the greatest likelihood and says how well they are known.
-//! [`amplitude`] follows frequency and damping along a decay.
+//! [`amplitude`] follows frequency and damping along a decay. [`synthesis`] shows what given poles explain of
+//! measured functions.
 
 pub mod amplitude;
 mod combinations;
@@ -16,6 +17,7 @@ mod magnitude;
 mod peaks;
 pub mod polyreference;
 mod reading;
+pub mod synthesis;
 
 pub use combinations::label_combinations;
 pub use magnitude::{interpolate_magnitude, read_magnitude_peaks};

@@ -158,12 +158,17 @@ impl ResponseForm {
         self.facts().2
     }
 
+    /// Number of times that displacement was differentiated in time.
+    pub fn derivatives(self) -> i32 {
+        self.facts().3
+    }
+
     /// A value of this form at `frequency` (Hz) as a value of another form.
     ///
     /// At 0 Hz there is nothing to integrate from: an acceleration says nothing about where the
     /// structure rests, so that the result does not exist (`None`); derivatives are 0 there.
     pub fn convert(self, to: ResponseForm, value: Complex64, frequency: f64) -> Option<Complex64> {
-        let order = to.facts().3 - self.facts().3;
+        let order = to.derivatives() - self.derivatives();
         if order < 0 && frequency == 0.0 {
             return None;
         }

@@ -328,6 +328,8 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
         window: Window::Rectangular,
         decay: None,
         readings,
+        unlisted: Vec::new(),
+        fitted: None,
         force_noise: None,
         force_window: None,
         stabilisation: Default::default(),

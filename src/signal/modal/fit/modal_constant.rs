@@ -135,11 +135,7 @@ fn constant(
     kind: ResponseForm,
     mut taps: Vec<TapEstimate>,
 ) -> Option<ModalConstant> {
-    let derivatives = match kind {
-        ResponseForm::Receptance => 0,
-        ResponseForm::Mobility => 1,
-        ResponseForm::Accelerance => 2,
-    };
+    let derivatives = kind.derivatives();
     let pole = mode.pole;
     let factor = Complex64::new(0.0, 2.0 * pole.im) / pole.powi(derivatives);
     let order = f64::from(derivatives);

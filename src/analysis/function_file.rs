@@ -70,6 +70,7 @@ pub(super) fn measure_functions(
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     Ok(RecordingResult {
         file: functions.file.clone(),
+        files: Vec::new(),
         format: Format::FrequencyResponses,
         sample_rate: None,
         seconds: None,
@@ -85,6 +86,7 @@ pub(super) fn measure_functions(
             taps: Taps {
                 taps: Vec::new(),
                 noise: 0.0,
+                quiet: 0..0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),

@@ -38,6 +38,7 @@ mod real_data;
 mod recording_uff;
 mod report;
 mod resolution;
+mod several_files;
 mod shared;
 mod simulate;
 mod simulate_cli;

@@ -25,6 +25,7 @@ mod csv;
 mod error;
 mod function_text;
 mod health;
+mod joined;
 mod lvm;
 mod mat;
 mod resample;
@@ -38,6 +39,7 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
+pub use joined::MOST_FILES;
 pub use mat::{VariableRole, Variables};
 pub use response_files::open_frequency_responses;
 pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
@@ -252,6 +254,8 @@ pub struct Recording {
     channels: Vec<ChannelInfo>,
     warnings: Vec<RecordingWarning>,
     source: Arc<dyn Source>,
+    /// The files of a joined recording, in their order.
+    parts: Vec<Recording>,
 }
 
 impl Recording {
@@ -309,6 +313,7 @@ impl Recording {
             channels,
             warnings: Vec::new(),
             source: Arc::new(samples),
+            parts: Vec::new(),
         })
     }
 
@@ -343,6 +348,7 @@ impl Recording {
             channels,
             warnings,
             source: Arc::new(all),
+            parts: Vec::new(),
         })
     }
 
@@ -400,7 +406,8 @@ impl Recording {
             .map_or(0.0, |info| info.health.mean)
     }
 
-    /// The doubts about this recording: of the file as a whole, then channel by channel.
+    /// The doubts about this recording: of the file as a whole, then channel by channel. Those about a joined recording
+    /// are those of its [`parts`](Self::parts).
     pub fn warnings(&self) -> Vec<RecordingWarning> {
         let mut warnings = self.warnings.clone();
         for (at, channel) in self.channels.iter().enumerate() {
@@ -463,6 +470,9 @@ impl Recording {
     /// An unknown channel; a scale that is 0 or not finite.
     pub fn set_scale(&mut self, channel: usize, scale: f64) -> Result<(), RecordingError> {
         self.check_channels(&[channel])?;
+        for part in &mut self.parts {
+            part.set_scale(channel, scale)?;
+        }
         if !scale.is_finite() || scale == 0.0 {
             let problem = format!(
                 "channel {}: scale {scale}; allowed: a finite number other than 0 (negative = mounted the other way)",

@@ -339,6 +339,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
     };
     RecordingResult {
         file: file.into(),
+        files: Vec::new(),
         format: Format::Memory,
         sample_rate: Some(5120.0),
         seconds: Some(20.5),
@@ -354,6 +355,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
             taps: Taps {
                 taps: measured_taps(),
                 noise: 0.01,
+                quiet: 0..0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),
@@ -447,6 +449,7 @@ fn measured_taps() -> Vec<Tap> {
     let mut taps: Vec<Tap> = taps()
         .iter()
         .map(|tap| Tap {
+            file: None,
             time: tap.time,
             peak: tap.peak_force.unwrap_or(1.0),
             pulse_end: None,

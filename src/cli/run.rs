@@ -32,7 +32,7 @@ use tapjoint::report::{
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// Test description (.toml), recording (WAV, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
+    /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
     /// text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE")]
     file: PathBuf,

@@ -71,7 +71,7 @@ position = 0.338               # m
 # kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
 
 [[recording]]                  # once for each file; the same file may be read in several bands
-file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
+file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
 #   files = ["1.wav", "2.wav"] instead of file: one set-up in several files, a tap each or repeats
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1

@@ -112,6 +112,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        files: Vec::new(),
         hammer: None,
         aside: None,
         conditions: Conditions {
@@ -157,6 +158,7 @@ fn taps() -> Vec<TapSection> {
         .iter()
         .enumerate()
         .map(|(index, reason)| TapSection {
+            file: None,
             pulse: None,
             time: 0.31 + 3.4 * index as f64,
             peak_force: Some(41.2 - 2.9 * index as f64),

@@ -70,6 +70,49 @@ def wavs():
     yield "cut", wav(1, 16)[:-7]
 
 
+# ---------------------------------------------------------------- FLAC
+
+
+def crc(content, polynomial, bits):
+    """Remainder of the bytes, the highest bit first, from zero."""
+    top, value = 1 << (bits - 1), 0
+    for byte in content:
+        value ^= byte << (bits - 8)
+        for _ in range(8):
+            value = (value << 1 ^ polynomial if value & top else value << 1) & ((1 << bits) - 1)
+    return value
+
+
+def flac_frame(number, subframes, assignment):
+    """A frame of 192 samples of 16 bits; its subframes are whole bytes."""
+    header = bytes([0xFF, 0xF8, 0x10, assignment << 4 | 4 << 1, number])
+    content = header + bytes([crc(header, 0x07, 8)]) + b"".join(subframes)
+    return content + struct.pack(">H", crc(content, 0x8005, 16))
+
+
+def flac(frames, channels=2, promised=None, blocks=b""):
+    count = 192 * len(frames) if promised is None else promised
+    packed = 5120 << 44 | (channels - 1) << 41 | 15 << 36 | count
+    info = struct.pack(">HH", 192, 192) + bytes(6) + struct.pack(">Q", packed) + bytes(16)
+    first = b"\0" if blocks else b"\x80"
+    return b"fLaC" + first + b"\0\0\x22" + info + blocks + b"".join(frames)
+
+
+def flacs():
+    values = [[round(9000 * x) for x in channel] for channel in samples(192)]
+    verbatim = [b"\x02" + struct.pack(">192h", *channel) for channel in values]
+    constant = b"\0" + struct.pack(">h", -7)
+    yield "verbatim", flac([flac_frame(n, verbatim, 1) for n in range(3)])
+    yield "constant", flac([flac_frame(0, [constant], 0)], channels=1)
+    yield "mixed", flac([flac_frame(0, [verbatim[0], constant], 1)])
+    yield "length-unknown", flac([flac_frame(0, verbatim, 1)], promised=0)
+    yield "longer-promised", flac([flac_frame(0, verbatim, 1)], promised=1000)
+    yield "with-comment", flac([flac_frame(0, verbatim, 1)], blocks=b"\x84\0\0\x08" + bytes(8))
+    yield "cut", flac([flac_frame(n, verbatim, 1) for n in range(2)])[:-30]
+    for name in ("taps", "stereo"):
+        yield f"encoder-{name}", (ROOT / f"src/signal/tests/data/{name}.flac").read_bytes()
+
+
 # ---------------------------------------------------------------- text
 
 
@@ -465,6 +508,7 @@ def main():
     both = ("binary-with-coherence", binary58(4, 5, numbers, 1) + binary58(6, 2, [0.9] * 12, 1))
     targets = {
         "wav": [*wavs()],
+        "flac": [*flacs()],
         "csv": [*texts(), *labview_files()],
         "matlab": [*matlab_files()],
         "universal": [*as_bytes(universal_series()), *series],

@@ -5,7 +5,7 @@
 #   scripts/fuzz.sh SECONDS [TARGET...]             these targets for this time
 #   scripts/fuzz.sh --executions N [TARGET...]      these targets for so many executions
 #
-# Targets: wav csv universal matlab responses description truths reports identify chain.
+# Targets: wav flac csv universal matlab responses description truths reports identify chain.
 # An execution must end within 2 s and 300 MB without a panic. The bytes of one that fails are written to
 # fuzz/artifacts, beside the log of each target, and the script exits with 1. The corpus grows in fuzz/corpus.
 # Coverage is given after 4/5 of the executions and at the end: where both are equal, more time finds nothing new.
@@ -22,7 +22,7 @@ elif [ "$#" -gt 0 ]; then
     shift
 fi
 targets=("$@")
-[ "${#targets[@]}" -gt 0 ] || targets=(wav csv universal matlab responses description truths reports identify chain)
+[ "${#targets[@]}" -gt 0 ] || targets=(wav flac csv universal matlab responses description truths reports identify chain)
 
 # Counters at every edge: flags of libFuzzer that a stable compiler takes. What readers compare is traced too.
 export RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \

@@ -6,6 +6,7 @@ use tapjoint_description::{FoundChannel, FoundContent, FoundRecording, FunctionF
 use tapjoint_signal::recording::{
     FrequencyResponses, ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
+use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
 
 /// Samples of each channel by which a hammer is recognised.
 const LOOKED_AT: u64 = 4_000_000;
@@ -65,10 +66,20 @@ fn series(recording: &Recording) -> Result<FoundContent, RecordingError> {
             },
         });
     }
+    let hammer = hammer(recording)?;
+    let force = hammer.map(|(channel, _)| channel);
+    let responses = (0..channels.len()).filter(|channel| Some(*channel) != force);
+    let responses = responses.collect();
+    let source = match force {
+        Some(channel) => TapSource::Hammer { channel, responses },
+        None => TapSource::Responses(responses),
+    };
+    let taps = find_taps(recording, &source, &TapSettings::default())?;
     Ok(FoundContent::Series {
-        hammer: hammer(recording)?,
+        hammer,
         channels,
         sample_rate: recording.sample_rate(),
+        taps: taps.taps.len(),
     })
 }
 

@@ -74,6 +74,7 @@ pub(super) fn measure_functions(
     warnings.extend(Warning::unlisted_peaks(&functions.file, &spectra.unlisted));
     Ok(RecordingResult {
         file: functions.file.clone(),
+        files: Vec::new(),
         format: Format::FrequencyResponses,
         sample_rate: None,
         seconds: None,
@@ -89,6 +90,7 @@ pub(super) fn measure_functions(
             taps: Taps {
                 taps: Vec::new(),
                 noise: 0.0,
+                quiet: 0..0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),

@@ -269,11 +269,12 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Samples of all channels in a range of frames, each channel's mean taken out.
+    /// Samples of all channels in a range of frames of one file, each channel's mean in the file taken out.
     fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let start = range.start;
         let mut channels = self.recording.read_channels(&self.channels, range)?;
         for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
-            let mean = self.recording.mean(channel);
+            let mean = self.recording.mean_at(channel, start);
             samples.iter_mut().for_each(|x| *x -= mean);
         }
         Ok(channels)
@@ -293,7 +294,7 @@ impl<'a> Stage<'a> {
 
     /// The quiet stretch before the first tap, at most a block.
     fn quiet(&self) -> Result<PreTriggerNoise, RecordingError> {
-        let quiet = self.taps.quiet();
+        let quiet = self.taps.quiet.clone();
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
         let mut force = self.read(start..quiet.end)?;
         let responses = force.split_off(usize::from(self.has_force));

@@ -16,6 +16,8 @@ use tapjoint_signal::taps::{TapSource, Taps};
 pub struct RecordingResult {
     /// File as the description names it.
     pub file: String,
+    /// Its files, where it has several.
+    pub files: Vec<String>,
     /// Kind of file.
     pub format: Format,
     /// Sample rate (Hz); `None` of frequency response functions from a file.
@@ -170,7 +172,7 @@ pub(super) fn close_ups(
         let mut shown = [None, None];
         for (shown, channel) in shown.iter_mut().zip([force, responses.first().copied()]) {
             if let Some(channel) = channel {
-                let mean = recording.mean(channel);
+                let mean = recording.mean_at(channel, first);
                 let samples = recording.read(channel, first..last)?.into_iter();
                 *shown = Some(samples.map(|value| value - mean).collect());
             }
@@ -225,6 +227,7 @@ mod tests {
         let channels = vec![channel(0.0), channel(500.0)];
         let recording = Recording::from_samples("taps", 1000.0, channels).expect("samples");
         let hit = |time, second_hit| Tap {
+            file: None,
             time,
             peak: 1.0,
             pulse_end: None,
@@ -247,6 +250,7 @@ mod tests {
                 hit(0.010, Some(far)),
             ],
             noise: 0.0,
+            quiet: 0..0,
             remarks: Vec::new(),
         };
         let source = TapSource::Hammer {

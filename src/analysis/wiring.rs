@@ -55,7 +55,7 @@ fn measure_described(
     test_file: &str,
 ) -> Result<RecordingResult, PipelineError> {
     let path = folder.join(&description.file);
-    let file = description.file.display().to_string();
+    let file = description.name();
     let read = ReadSettings {
         sample_rate: description.sample_rate,
         time_unit: description.time_unit,
@@ -94,7 +94,10 @@ fn measure_described(
              analyse"
         )));
     }
-    let mut recording = Recording::open(&path, &read)?;
+    let mut recording = match description.more_files[..] {
+        [] => Recording::open(&path, &read)?,
+        _ => open_joined(description, folder, &read)?,
+    };
     let wiring = described_wiring(test, &mut recording, test_file)?;
     let mut settings = MeasureSettings::new(wiring.source());
     settings.band = description.band;
@@ -122,6 +125,20 @@ fn measure_described(
         }
     }
     Ok(result)
+}
+
+/// Opens the files of a recording and joins them, each under its described name.
+fn open_joined(
+    description: &RecordingDescription,
+    folder: &Path,
+    read: &ReadSettings,
+) -> Result<Recording, RecordingError> {
+    let mut parts = Vec::new();
+    for file in description.files() {
+        let opened = Recording::open(&folder.join(file), read)?;
+        parts.push(opened.renamed(file.display().to_string()));
+    }
+    Recording::joined(description.name(), parts)
 }
 
 /// Finds and scales the described channels of a recording.
@@ -309,6 +326,10 @@ fn result(
     }
     Ok(RecordingResult {
         file: recording.name().to_string(),
+        files: recording
+            .parts()
+            .map(|(_, part)| part.name().to_owned())
+            .collect(),
         format: recording.format(),
         sample_rate: Some(recording.sample_rate()),
         seconds: Some(recording.duration()),

@@ -437,12 +437,16 @@ fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     };
     // The new names are in another order than the files.
     let mut names = BTreeMap::new();
-    for (number, recording) in test.recordings.iter().rev().enumerate() {
-        let ending = recording.file.extension().unwrap_or_default();
-        let (Some(file), Some(ending)) = (recording.file.to_str(), ending.to_str()) else {
+    let mut files: Vec<&PathBuf> = Vec::new();
+    for recording in &test.recordings {
+        files.extend(recording.files());
+    }
+    for (number, path) in files.into_iter().rev().enumerate() {
+        let ending = path.extension().unwrap_or_default();
+        let (Some(file), Some(ending)) = (path.to_str(), ending.to_str()) else {
             return Ok(None);
         };
-        if !folder.join(file).is_file() || recording.file.components().count() > 1 {
+        if !folder.join(file).is_file() || path.components().count() > 1 {
             return Ok(None);
         }
         names.insert(file.to_owned(), format!("renamed-{number:04}.{ending}"));
@@ -475,10 +479,11 @@ fn exchanged(
         }
     }
     let after = TestDescription::parse(&text, "test.toml").ok()?;
-    let pairs = test.recordings.iter().zip(&after.recordings);
-    let all = pairs.into_iter().all(|(before, after)| {
-        let name = before.file.to_str().and_then(|file| names.get(file));
-        name.is_some_and(|name| after.file == Path::new(name))
+    let [before, after] =
+        [test, &after].map(|test| test.recordings.iter().flat_map(|one| one.files()));
+    let all = before.zip(after).all(|(before, after)| {
+        let name = before.to_str().and_then(|file| names.get(file));
+        name.is_some_and(|name| after == Path::new(name))
     });
     all.then_some(text)
 }

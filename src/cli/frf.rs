@@ -31,7 +31,7 @@ use tapjoint::spectral::FrfEstimator;
     after_help = "Examples:\n  tapjoint frf taps.wav --hammer 1 --scale-hammer 500 --scale-sensor 2000 --png frf.png\n  tapjoint frf test.toml --form receptance --csv frf.csv"
 )]
 pub(super) struct FrfArguments {
-    /// Recording (WAV, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58, text, LabVIEW, MATLAB) or test description (.toml)
+    /// Recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58, text, LabVIEW, MATLAB) or test description (.toml)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]

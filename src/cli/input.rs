@@ -89,9 +89,11 @@ impl TestFile {
     /// The first recording that cannot be opened, with its line in the description.
     pub(super) fn check_recordings(&self) -> anyhow::Result<()> {
         for recording in &self.test.recordings {
-            let path = self.path_of(&recording.file);
-            readable_file(&path)
-                .map_err(|cause| recording.file_error(&self.name, &path, &cause))?;
+            for file in recording.files() {
+                let path = self.path_of(file);
+                readable_file(&path)
+                    .map_err(|cause| recording.file_error(&self.name, &path, &cause))?;
+            }
         }
         Ok(())
     }

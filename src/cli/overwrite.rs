@@ -184,7 +184,8 @@ fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let recordings = test.recordings.iter();
     recordings
-        .map(|recording| folder.join(&recording.file))
+        .flat_map(|recording| recording.files())
+        .map(|file| folder.join(file))
         .collect()
 }
 

@@ -118,7 +118,7 @@ const MOST_SAMPLES: u64 = 50_000_000;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint inspect taps.wav --hammer 1")]
 pub(super) struct InspectArguments {
-    /// Recordings (WAV, CSV, UFF58, LabVIEW, MATLAB). The datasets of universal files are listed as well
+    /// Recordings (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB). The datasets of universal files are listed as well
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// Only list the datasets of universal files by their headers. This is fast for files of any size,
@@ -198,7 +198,7 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
     after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"
 )]
 pub(super) struct SpectrumArguments {
-    /// Recording (WAV, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58, text, LabVIEW, MATLAB)
+    /// Recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58, text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]

@@ -12,7 +12,7 @@ use super::recording::analyse;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, diagnose_test};
@@ -32,7 +32,7 @@ use tapjoint::report::{
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// Test description (.toml), recording (WAV, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
+    /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
     /// text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -61,13 +61,17 @@ impl RunArguments {
     /// Returns the files that a report may consist of.
     pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
         let name = test.map_or_else(|| stem(&self.file), |test| test.name.clone());
-        let recordings: Vec<&Path> = match test {
-            Some(test) => test.recordings.iter().map(|one| &*one.file).collect(),
-            None => vec![&self.file],
+        let recordings: Vec<PathBuf> = match test {
+            Some(test) => test
+                .recordings
+                .iter()
+                .map(|one| one.name().into())
+                .collect(),
+            None => vec![self.file.clone()],
         };
         let recordings: Vec<_> = recordings
             .into_iter()
-            .map(|file| serde_json::json!({ "file": file_name(file) }))
+            .map(|file| serde_json::json!({ "file": file_name(&file) }))
             .collect();
         let report = serde_json::json!({
             "version": 1,
@@ -185,6 +189,7 @@ pub(super) fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn regress_report_folders_have_names_that_can_be_made() {

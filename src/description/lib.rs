@@ -231,6 +231,8 @@ pub struct SensorDescription {
 pub struct RecordingDescription {
     /// File as written in the description, relative to it.
     pub file: PathBuf,
+    /// Further files of the same set-up, which follow it.
+    pub more_files: Vec<PathBuf>,
     /// Line of the description that names the file.
     pub line: usize,
     /// Position of the hammer's taps (m).

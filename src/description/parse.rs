@@ -8,7 +8,7 @@ use super::{
     RecordingDescription, SensorDescription, TestDescription, Weights, WindowKind, keys,
 };
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint_signal::modal::ReadBy;
 use toml::de::DeTable;
@@ -242,6 +242,20 @@ impl TestDescription {
 }
 
 impl RecordingDescription {
+    /// All files, in their order.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.file).chain(&self.more_files)
+    }
+
+    /// Name for tables: the file, or "1.wav + 2 more".
+    pub fn name(&self) -> String {
+        let first = self.file.display();
+        match self.more_files.len() {
+            0 => first.to_string(),
+            more => format!("{first} + {more} more"),
+        }
+    }
+
     /// Returns the position of a sensor (m) in this recording.
     pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
         self.at.get(&sensor.name).copied().or(sensor.position)

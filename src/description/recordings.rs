@@ -11,9 +11,10 @@ use super::{
     SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
-use tapjoint_signal::recording::TIME_UNITS;
+use tapjoint_signal::recording::{MOST_FILES, TIME_UNITS};
 use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
 
 /// Words of `kind` in `[[sensor]]`.
@@ -298,7 +299,7 @@ pub(super) fn read_recording(
     sensors: &[SensorDescription],
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
-    let file = table.need("file", "a file", "file = \"taps.wav\"")?;
+    let (named, mut files) = read_files(&table)?;
     let position = along(beam.length);
     let mut at = BTreeMap::new();
     if let Some(entry) = table.get("at") {
@@ -351,8 +352,9 @@ pub(super) fn read_recording(
         ));
     }
     Ok(RecordingDescription {
-        file: file.text("a file such as \"taps.wav\"")?.into(),
-        line: file.line,
+        file: files.remove(0),
+        more_files: files,
+        line: named.line,
         tap: table.within("tap", Dimension::Length, &position)?,
         level: table.within("level", Dimension::Ratio, &LEVEL)?,
         band: table.optional("band", read_band)?,
@@ -372,6 +374,44 @@ pub(super) fn read_recording(
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
     })
+}
+
+/// Reads `file` or `files`: the entry that names them, and at least one file.
+fn read_files<'t>(table: &Table<'t>) -> Result<(Entry<'t>, Vec<PathBuf>), DescriptionError> {
+    let wanted = "a file such as \"taps.wav\"";
+    let Some(entry) = table.get("files") else {
+        let file = table.need("file", "a file", "file = \"taps.wav\"")?;
+        let one = file.text(wanted)?.into();
+        return Ok((file, vec![one]));
+    };
+    if table.get("file").is_some() {
+        return Err(entry.error(
+            "`file` and `files` name the recording twice; keep `files` for one set-up in several files, else `file`",
+        ));
+    }
+    if table.get("form").is_some() {
+        return Err(entry.error(
+            "`form` belongs to a file of functions, and several of these are not one recording; write a \
+             [[recording]] with `file` for each",
+        ));
+    }
+    let list = entry.list_up_to(MOST_FILES, "a list of files such as [\"1.wav\", \"2.wav\"]")?;
+    let mut files: Vec<PathBuf> = Vec::new();
+    for item in &list {
+        let file = PathBuf::from(item.text(wanted)?);
+        if files.contains(&file) {
+            return Err(item.error(format!(
+                "\"{}\" is listed twice; its taps would count twice: list each file once",
+                file.display()
+            )));
+        }
+        files.push(file);
+    }
+    if files.is_empty() {
+        let remedy = "write `file = \"taps.wav\"` for a single one";
+        return Err(entry.wrong_count(0, "at least 1 file", remedy));
+    }
+    Ok((entry, files))
 }
 
 /// Reads the names of variables, each a text or a list of texts, by what they are for.

@@ -1,5 +1,7 @@
 //! The commented `test.toml` for a new test.
 
+use tapjoint_signal::recording::MOST_FILES;
+
 use super::{Assembly, FunctionForm, ResponseForm, SENSOR_KINDS, SensorKind};
 
 const HEAD: &str = r#"# Test description for tapjoint. Replace the values by those of your test, then: tapjoint run test.toml
@@ -69,7 +71,8 @@ position = 0.338               # m
 # kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
 
 [[recording]]                  # once for each file; the same file may be read in several bands
-file = "taps.wav"              # WAV, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
+file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
+#   files = ["1.wav", "2.wav"] instead of file: one set-up in several files, a tap each or repeats
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
@@ -158,6 +161,8 @@ pub enum FoundContent {
         hammer: Option<(usize, &'static str)>,
         /// Samples per second (Hz).
         sample_rate: f64,
+        /// Number of taps.
+        taps: usize,
     },
     /// Functions of frequency.
     Functions {
@@ -230,8 +235,46 @@ pub fn template_of(kind: Assembly, files: &[FoundRecording]) -> String {
         }
         tables.push('\n');
     }
+    tables += &one_set_up(files);
     let head = head.replacen("[beam]", &format!("{EXAMPLES}\n[beam]"), 1);
     format!("{head}\n{instruments}{tables}{tail}")
+}
+
+/// Returns one commented table for all files together, where they hold a tap each of one set-up: their names differ in
+/// digits alone, and they have the same channels and rate.
+fn one_set_up(files: &[FoundRecording]) -> String {
+    let alike = |one: &FoundRecording, other: &FoundRecording| {
+        let (
+            FoundContent::Series {
+                channels,
+                sample_rate,
+                taps,
+                ..
+            },
+            FoundContent::Series {
+                channels: theirs,
+                sample_rate: rate,
+                ..
+            },
+        ) = (&one.content, &other.content)
+        else {
+            return false;
+        };
+        let [name, their_name] = [one, other].map(|found| {
+            let letters = found.file.chars().filter(|c| !c.is_ascii_digit());
+            letters.collect::<String>()
+        });
+        *taps == 1 && sample_rate == rate && channels == theirs && name == their_name
+    };
+    let several = 2..=MOST_FILES;
+    if !several.contains(&files.len()) || !files.iter().all(|file| alike(file, &files[0])) {
+        return String::new();
+    }
+    let names = files.iter().map(|found| found.file.as_str().into());
+    let names = toml::Value::Array(names.collect());
+    format!(
+        "#   The files hold one tap each. If all are of one set-up, write instead of the tables above:\n# [[recording]]\n# files = {names}\n\n"
+    )
 }
 
 /// Returns the beginning of a commented line up to its equals sign; what no other line holds where it has none.

@@ -127,7 +127,7 @@ pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
     for recording in document.recordings.iter().flatten() {
         for (index, tap) in recording.taps.iter().enumerate() {
             rows.push(vec![
-                recording.file.clone(),
+                tap.file.clone().unwrap_or_else(|| recording.file.clone()),
                 (index + 1).to_string(),
                 number(Some(tap.time)),
                 number(tap.peak_force.or(tap.peak_response)),

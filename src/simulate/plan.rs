@@ -149,6 +149,14 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, Simulat
                 problem,
             });
         }
+        if !recording.more_files.is_empty() {
+            let problem = " is one of several `files`, and each recording is simulated as one file; write `file`";
+            return Err(SimulateError::Described {
+                file,
+                line,
+                problem,
+            });
+        }
         let highest = recording.band.map(|(_, high)| high);
         let block_seconds = match (recording.block, recording.band) {
             // block/2.56 lines over the band.

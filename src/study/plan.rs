@@ -150,7 +150,7 @@ pub(super) fn plan_of(
         Ok(PlannedConfiguration {
             sensors: sensors.collect::<Result<_, PlanError>>()?,
             tap: recording.tap.ok_or_else(|| PlanError::NoTap {
-                file: recording.file.display().to_string(),
+                file: recording.name(),
             })?,
             masses: recording.masses.clone(),
             level: recording.level.unwrap_or(1.0) / hardest,

@@ -39,6 +39,7 @@ mod real_data;
 mod recording_uff;
 mod report;
 mod resolution;
+mod several_files;
 mod shared;
 mod simulate;
 mod simulate_cli;

@@ -293,8 +293,14 @@ const MOST_CHANGES: usize = 4;
 pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
     let file = recording.name();
     let mut warnings = Vec::new();
-    for warning in recording.warnings() {
-        warnings.push(Warning::of_file(file, &warning));
+    let mut files: Vec<&Recording> = recording.parts().map(|(_, part)| part).collect();
+    if files.is_empty() {
+        files.push(recording);
+    }
+    for one in files {
+        for warning in one.warnings() {
+            warnings.push(Warning::of_file(one.name(), &warning));
+        }
     }
     for remark in &taps.remarks {
         warnings.push(Warning::about(file, "taps", remark));

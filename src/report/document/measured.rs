@@ -23,6 +23,9 @@ use tapjoint_signal::taps::Pulse;
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
+    /// Its files, in their order, where it has several; they follow one another in time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<String>,
     /// Difference from the first recording, for which modes and estimate leave it out: "8.8 times its tap level";
     /// null where they do not.
     pub aside: Option<String>,
@@ -106,6 +109,9 @@ impl FittedFunctionSection {
 /// One tap: its peak is a force with a hammer, and a response without one.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TapSection {
+    /// Its file, where the recording has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// When it begins (s from the start of the recording).
     pub time: f64,
     /// Peak force (`tap_unit`: N in a described test); null without a hammer.
@@ -194,6 +200,7 @@ impl RecordingSection {
         let channels = (1..).zip(recording.channels.iter().cloned());
         let taps = recording.measurement.taps.taps.iter();
         let taps = taps.map(|tap| TapSection {
+            file: tap.file.clone(),
             time: tap.time,
             peak_force: recording.has_hammer.then_some(tap.peak),
             peak_response: (!recording.has_hammer).then_some(tap.peak),
@@ -228,6 +235,7 @@ impl RecordingSection {
             fitted_functions,
             aside,
             file: recording.file.clone(),
+            files: recording.files.clone(),
             format: recording.format.to_string(),
             sample_rate: recording.sample_rate,
             channels: recording.channels.len(),

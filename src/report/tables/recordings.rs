@@ -161,6 +161,7 @@ fn taps_of(
         for (index, tap) in numbered.filter(|(_, tap)| wanted(tap)) {
             rows.push([
                 of_several(recording, recordings),
+                words("File", tap.file.clone().unwrap_or_default()),
                 number("Tap", (index + 1).to_string()),
                 number("Time (s)", format!("{:.3}", tap.time)),
                 number("Peak", optional(peak(tap), 3)),

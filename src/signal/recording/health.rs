@@ -216,6 +216,44 @@ impl ChannelHealth {
         scaled
     }
 
+    /// Returns the health of samples, `frames` of them, that are followed by `others` of another file.
+    pub(super) fn followed_by(&self, frames: u64, other: &Self, others: u64) -> Self {
+        let mut both = self.clone();
+        let (own, more) = (frames as f64, others as f64);
+        let total = own + more;
+        let difference = other.mean - self.mean;
+        both.mean += difference * more / total;
+        // As for the blocks of one file, see [`HealthMeter::add`].
+        let squares = own * self.rms.powi(2) + more * other.rms.powi(2);
+        both.rms = ((squares + difference.powi(2) * own * more / total) / total).sqrt();
+        both.peak = self.peak.max(other.peak);
+        both.minimum = self.minimum.min(other.minimum);
+        both.maximum = self.maximum.max(other.maximum);
+        both.full_scale_samples += other.full_scale_samples;
+        let later = other.first_full_scale.map(|first| first + frames);
+        both.first_full_scale = self.first_full_scale.or(later);
+        both.flat_top_count += other.flat_top_count;
+        both.dropout_count += other.dropout_count;
+        both.dropped_samples += other.dropped_samples;
+        for (runs, more) in [
+            (&mut both.flat_tops, &other.flat_tops),
+            (&mut both.dropped, &other.dropped),
+        ] {
+            let moved = more.iter().map(|run| EqualRun {
+                start: run.start + frames,
+                ..*run
+            });
+            runs.extend(moved);
+            runs.truncate(2 * PLACES_KEPT);
+        }
+        // The nearer rail is the limit wherever both were reached.
+        let [low, high] =
+            [0, 1].map(|side| [self.rails[side], other.rails[side]].into_iter().flatten());
+        both.rails = [low.reduce(f64::max), high.reduce(f64::min)];
+        both.constant = both.minimum == both.maximum;
+        both
+    }
+
     /// Returns the doubts that this health gives rise to: their codes and what is wrong.
     pub(super) fn doubts(&self, sample_rate: f64) -> Vec<(&'static str, String)> {
         let (mean, peak) = (self.mean, self.peak);

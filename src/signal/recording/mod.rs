@@ -1,10 +1,10 @@
-//! Reading recordings: time series (WAV, CSV, universal files) and frequency response functions
+//! Reading recordings: time series (WAV, FLAC, CSV, universal files) and frequency response functions
 //! (universal files, text) as physical quantities.
 //!
 //! [`Recording::open`] recognises the format by the first bytes, reads the file once in blocks,
 //! checks it and gathers the health of every channel. The [`Recording`] is a handle: samples are
 //! read from the file when they are asked for, so an hour of recording need not fit into memory.
-//! Values are in file units (integer WAV: full scale = 1) times the channel's
+//! Values are in file units (integer WAV and FLAC: full scale = 1) times the channel's
 //! [`scale`](ChannelInfo::scale).
 //!
 //! Important conventions: channel indices are 0-based and do not count a time column; the channel
@@ -23,8 +23,10 @@ use std::sync::Arc;
 
 mod csv;
 mod error;
+mod flac;
 mod function_text;
 mod health;
+mod joined;
 mod lvm;
 mod mat;
 mod resample;
@@ -38,6 +40,7 @@ mod write;
 
 pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
+pub use joined::MOST_FILES;
 pub use mat::{VariableRole, Variables};
 pub use response_files::open_frequency_responses;
 pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
@@ -102,6 +105,11 @@ pub enum Format {
         /// 32 or 64.
         bits: u16,
     },
+    /// FLAC with integer samples of so many bits; full scale = 1.
+    Flac {
+        /// Bits.
+        bits: u16,
+    },
     /// Text.
     Csv {
         /// Separator of the columns.
@@ -131,6 +139,7 @@ impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::WavInteger { bits } => write!(f, "WAV, {bits}-bit integer"),
+            Self::Flac { bits } => write!(f, "FLAC, {bits}-bit integer"),
             Self::WavFloat { bits } => write!(f, "WAV, {bits}-bit float"),
             Self::Csv {
                 separator, decimal, ..
@@ -252,6 +261,8 @@ pub struct Recording {
     channels: Vec<ChannelInfo>,
     warnings: Vec<RecordingWarning>,
     source: Arc<dyn Source>,
+    /// The files of a joined recording, in their order.
+    parts: Vec<Recording>,
 }
 
 impl Recording {
@@ -273,6 +284,7 @@ impl Recording {
         }
         match recognise(path, &file)? {
             FileType::Wav => wav::open_wav(path, file, settings),
+            FileType::Flac => flac::open_flac(path, file, settings),
             FileType::Text => csv::open_csv(path, file, settings),
             FileType::Lvm => lvm::open_lvm(path, file, settings),
             FileType::Mat => mat::open_mat(path, file, settings),
@@ -309,6 +321,7 @@ impl Recording {
             channels,
             warnings: Vec::new(),
             source: Arc::new(samples),
+            parts: Vec::new(),
         })
     }
 
@@ -343,6 +356,7 @@ impl Recording {
             channels,
             warnings,
             source: Arc::new(all),
+            parts: Vec::new(),
         })
     }
 
@@ -386,7 +400,7 @@ impl Recording {
     /// of others 0.
     pub fn quantum(&self, channel: usize) -> f64 {
         match (self.format, self.channels.get(channel)) {
-            (Format::WavInteger { bits }, Some(info)) => {
+            (Format::WavInteger { bits } | Format::Flac { bits }, Some(info)) => {
                 info.scale.abs() * 2f64.powi(1 - i32::from(bits))
             }
             _ => 0.0,
@@ -400,7 +414,8 @@ impl Recording {
             .map_or(0.0, |info| info.health.mean)
     }
 
-    /// The doubts about this recording: of the file as a whole, then channel by channel.
+    /// The doubts about this recording: of the file as a whole, then channel by channel. Those about a joined recording
+    /// are those of its [`parts`](Self::parts).
     pub fn warnings(&self) -> Vec<RecordingWarning> {
         let mut warnings = self.warnings.clone();
         for (at, channel) in self.channels.iter().enumerate() {
@@ -463,6 +478,9 @@ impl Recording {
     /// An unknown channel; a scale that is 0 or not finite.
     pub fn set_scale(&mut self, channel: usize, scale: f64) -> Result<(), RecordingError> {
         self.check_channels(&[channel])?;
+        for part in &mut self.parts {
+            part.set_scale(channel, scale)?;
+        }
         if !scale.is_finite() || scale == 0.0 {
             let problem = format!(
                 "channel {}: scale {scale}; allowed: a finite number other than 0 (negative = mounted the other way)",
@@ -710,6 +728,7 @@ impl Cursor for Vec<&[f64]> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileType {
     Wav,
+    Flac,
     Text,
     Lvm,
     Mat,
@@ -721,7 +740,6 @@ const UNREAD: &[(usize, &[u8], &str)] = &[
     (0, b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
     (512, b"\x89HDF\r\n\x1a\n", "a MATLAB 7.3 (HDF5) file"),
     (0, b"MATLAB 7.3", "a MATLAB 7.3 (HDF5) file"),
-    (0, b"fLaC", "FLAC audio"),
     (0, b"OggS", "Ogg audio"),
     (0, b"ID3", "MP3 audio"),
     (0, b"\xff\xfb", "MP3 audio"),
@@ -766,6 +784,9 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     if riff && stands_at(&head, 8, b"WAVE") {
         return Ok(FileType::Wav);
     }
+    if head.starts_with(b"fLaC") {
+        return Ok(FileType::Flac);
+    }
     if head.starts_with(b"MATLAB 5.0") {
         return Ok(FileType::Mat);
     }
@@ -789,7 +810,7 @@ fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
     }
     let first_bytes: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
     let problem = format!(
-        "neither a WAV file, a universal file nor text (first bytes {}); export as WAV, CSV or UFF58",
+        "neither a WAV or FLAC file, a universal file nor text (first bytes {}); export as WAV, CSV or UFF58",
         first_bytes.join(" ")
     );
     Err(RecordingError::new(file, problem))

@@ -35,6 +35,7 @@ pub fn open_frequency_responses(
         FileType::Text => open_text(path, file, settings),
         FileType::Lvm => lvm::open_functions(path, file, settings),
         FileType::Mat => mat::open_functions(path, file, settings),
+        FileType::Flac => Err(time_series(&file, "a FLAC file, a time series")),
         FileType::Wav => Err(time_series(&file, "a WAV file, a time series")),
     }
 }

@@ -68,6 +68,7 @@ pub(super) fn open_wav(
             .collect(),
         warnings,
         source: Arc::new(source),
+        parts: Vec::new(),
     })
 }
 

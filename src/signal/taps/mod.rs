@@ -97,7 +97,9 @@ impl Default for TapSettings {
 /// One tap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tap {
-    /// Time of the trigger (s from the start of the recording).
+    /// Its file, where the recording has several.
+    pub file: Option<String>,
+    /// Time of the trigger (s from the start of the recording; files follow one another).
     pub time: f64,
     /// Peak of the force (N), or of the response on which the tap was found (its unit).
     pub peak: f64,
@@ -132,6 +134,16 @@ impl Tap {
     /// Returns `true` for a tap that enters the averages.
     pub fn accepted(&self) -> bool {
         self.rejection.is_none()
+    }
+
+    /// Counts its frames and its time from a start that lies so many frames earlier.
+    fn move_by(&mut self, frames: u64, rate: f64) {
+        self.time += frames as f64 / rate;
+        self.record = self.record.start + frames..self.record.end + frames;
+        self.pulse_end = self.pulse_end.map(|end| end + frames);
+        if let Some(overload) = &mut self.overload {
+            overload.whole_from += frames;
+        }
     }
 
     /// First frame that is used of its record: an overloaded tap has only its decay, from where that is whole.
@@ -239,7 +251,7 @@ impl fmt::Display for Rejection {
 }
 
 /// Oddity of the search itself.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum TapRemark {
     /// The force pulses point downwards.
     InvertedForce,
@@ -254,6 +266,11 @@ pub enum TapRemark {
     OverloadKept {
         /// Number of taps.
         count: usize,
+    },
+    /// Of several files this one has no tap that is accepted.
+    FileWithoutTap {
+        /// The file.
+        file: String,
     },
     /// No tap is left but overloaded ones, and these are rejected.
     AllOverloaded {
@@ -285,6 +302,9 @@ impl fmt::Display for TapRemark {
                  give frequencies and damping, but enter no frequency response function; lower the gain or tap more \
                  softly"
             ),
+            TapRemark::FileWithoutTap { file } => {
+                write!(f, "{file}: no tap of this file is accepted; the other files are used")
+            }
             TapRemark::AllOverloaded { count } => write!(
                 f,
                 "no tap is accepted, and {count} only for an overload; overload = \"keep\" in [[recording]], or \
@@ -302,6 +322,9 @@ pub struct Taps {
     /// Standard deviation of the noise on which they were looked for (unit of the channel); on
     /// several responses that of the first.
     pub noise: f64,
+    /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up. Of several files those of the
+    /// longest such stretch.
+    pub quiet: Range<u64>,
     /// Oddities.
     pub remarks: Vec<TapRemark>,
 }
@@ -321,11 +344,6 @@ impl Taps {
     pub fn mean_pulse(&self) -> Option<Pulse> {
         let pulses: Vec<Pulse> = self.accepted().filter_map(|tap| tap.pulse).collect();
         Pulse::mean(&pulses)
-    }
-
-    /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up.
-    pub fn quiet(&self) -> Range<u64> {
-        0..self.taps.first().map_or(0, |tap| tap.record.start)
     }
 }
 
@@ -348,7 +366,8 @@ struct Found {
     remarks: Vec<TapRemark>,
 }
 
-/// Finds the taps of a recording, and accepts or rejects each with its reason.
+/// Finds the taps of a recording, and accepts or rejects each with its reason. Of several files each is searched by
+/// itself.
 ///
 /// # Errors
 /// Those of reading the recording.
@@ -357,22 +376,40 @@ pub fn find_taps(
     source: &TapSource,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
-    let found = match source {
-        TapSource::Hammer { channel, responses } => {
-            let mut found = find_pulses(recording, *channel, settings)?;
-            for event in &mut found.events {
-                event.answered = is_answered(recording, responses, event)?;
-            }
-            found
-        }
-        TapSource::Responses(channels) => find_rises(recording, channels, settings)?,
-    };
-    let real = found.events.iter().filter(|event| event.answered);
-    let mut peaks: Vec<f64> = real.map(|event| event.peak).collect();
+    let mut searched = Vec::new();
+    for (start, file) in recording.parts() {
+        searched.push((start, file, search(file, source, settings)?));
+    }
+    let joined = !searched.is_empty();
+    if !joined {
+        searched.push((0, recording, search(recording, source, settings)?));
+    }
+    let events = searched.iter().flat_map(|(.., found)| &found.events);
+    let mut peaks: Vec<f64> = events
+        .filter(|event| event.answered)
+        .map(|event| event.peak)
+        .collect();
     let weakest = settings.weak * median(&mut peaks);
-    let mut taps = Vec::with_capacity(found.events.len());
-    for index in 0..found.events.len() {
-        taps.push(tap(recording, source, &found, index, weakest, settings)?);
+    let rate = recording.sample_rate();
+    let mut taps = Vec::with_capacity(peaks.len());
+    // Last tap of each file.
+    let mut lasts = Vec::new();
+    let mut quiet = 0..0;
+    for (start, file, found) in &searched {
+        let before = taps.len();
+        for index in 0..found.events.len() {
+            let mut tap = tap(file, source, found, index, weakest, settings)?;
+            tap.file = joined.then(|| file.name().to_owned());
+            tap.move_by(*start, rate);
+            taps.push(tap);
+        }
+        if let Some(first) = taps.get(before) {
+            lasts.push(taps.len() - 1);
+            let own = *start..first.record.start;
+            if own.end - own.start > quiet.end - quiet.start || lasts.len() == 1 {
+                quiet = own;
+            }
+        }
     }
     if settings.keep_overload {
         // One that is cut off to its end has no decay.
@@ -382,12 +419,29 @@ pub fn find_taps(
             }
         }
     }
-    reject_short(&mut taps, recording.sample_rate(), settings.wanted);
-    let mut remarks = found.remarks;
-    let kept = taps.iter().filter(|tap| tap.accepted() && !tap.is_whole());
-    match kept.count() {
-        0 => {}
-        count => remarks.push(TapRemark::OverloadKept { count }),
+    reject_short(&mut taps, &lasts, rate, settings.wanted);
+    let mut noise = 0.0_f64;
+    let mut remarks: Vec<TapRemark> = Vec::new();
+    for (_, file, found) in searched {
+        noise = noise.max(found.noise);
+        for remark in found.remarks {
+            if !remarks.contains(&remark) {
+                remarks.push(remark);
+            }
+        }
+        let name = Some(file.name());
+        let mut own = taps.iter().filter(|tap| tap.file.as_deref() == name);
+        if joined && !own.any(Tap::accepted) {
+            let file = file.name().to_owned();
+            remarks.push(TapRemark::FileWithoutTap { file });
+        }
+    }
+    let kept = taps
+        .iter()
+        .filter(|tap| tap.accepted() && !tap.is_whole())
+        .count();
+    if kept > 0 {
+        remarks.push(TapRemark::OverloadKept { count: kept });
     }
     let overloaded = taps.iter().filter(|tap| !tap.is_whole()).count();
     if overloaded > 0 && !settings.keep_overload && !taps.iter().any(Tap::accepted) {
@@ -395,9 +449,28 @@ pub fn find_taps(
     }
     Ok(Taps {
         taps,
-        noise: found.noise,
+        noise,
+        quiet,
         remarks,
     })
+}
+
+/// Finds the events of one file.
+fn search(
+    recording: &Recording,
+    source: &TapSource,
+    settings: &TapSettings,
+) -> Result<Found, RecordingError> {
+    match source {
+        TapSource::Hammer { channel, responses } => {
+            let mut found = find_pulses(recording, *channel, settings)?;
+            for event in &mut found.events {
+                event.answered = is_answered(recording, responses, event)?;
+            }
+            Ok(found)
+        }
+        TapSource::Responses(channels) => find_rises(recording, channels, settings),
+    }
 }
 
 // ---- Accepting and rejecting taps.
@@ -461,6 +534,7 @@ fn tap(
         }
     };
     Ok(Tap {
+        file: None,
         time: event.trigger as f64 / rate,
         peak: event.peak,
         pulse_end,
@@ -565,9 +639,8 @@ fn overload(
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
-/// record sets its length.
-fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
-    let last = taps.len().saturating_sub(1);
+/// record sets its length. `lasts` are the last taps of the files, which may be cut off.
+fn reject_short(taps: &mut [Tap], lasts: &[usize], rate: f64, wanted: Option<f64>) {
     let mut lengths: Vec<f64> = taps
         .iter()
         .filter(|tap| tap.accepted())
@@ -581,22 +654,29 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         if tap.accepted() && available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if let Some(overload) = tap.overload {
                 overload.into()
-            } else if index == last {
+            } else if lasts.contains(&index) {
                 Rejection::CutOff { available, needed }
             } else {
                 Rejection::NextTooSoon { available, needed }
             });
         }
     }
-    let shortest = taps[..last]
+    let others = taps
         .iter()
-        .filter(|tap| tap.accepted())
-        .map(|tap| tap.frames() as f64 / rate)
+        .enumerate()
+        .filter(|(index, tap)| tap.accepted() && !lasts.contains(index));
+    let shortest = others
+        .map(|(_, tap)| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
-    if let Some(tap) = taps.last_mut().filter(|tap| tap.accepted()) {
+    for &last in lasts {
+        let tap = &mut taps[last];
         let available = tap.frames() as f64 / rate;
-        if needed.is_finite() && available < CUT_OF_SHORTEST * needed && tap.is_whole() {
+        if tap.accepted()
+            && tap.is_whole()
+            && needed.is_finite()
+            && available < CUT_OF_SHORTEST * needed
+        {
             tap.rejection = Some(Rejection::CutOff { available, needed });
         }
     }

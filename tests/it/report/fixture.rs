@@ -112,6 +112,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        files: Vec::new(),
         hammer: None,
         aside: None,
         conditions: Conditions {
@@ -157,6 +158,7 @@ fn taps() -> Vec<TapSection> {
         .iter()
         .enumerate()
         .map(|(index, reason)| TapSection {
+            file: None,
             pulse: None,
             time: 0.31 + 3.4 * index as f64,
             peak_force: Some(41.2 - 2.9 * index as f64),
@@ -342,6 +344,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
     };
     RecordingResult {
         file: file.into(),
+        files: Vec::new(),
         format: Format::Memory,
         sample_rate: Some(5120.0),
         seconds: Some(20.5),
@@ -357,6 +360,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
             taps: Taps {
                 taps: measured_taps(),
                 noise: 0.01,
+                quiet: 0..0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),
@@ -450,6 +454,7 @@ fn measured_taps() -> Vec<Tap> {
     let mut taps: Vec<Tap> = taps()
         .iter()
         .map(|tap| Tap {
+            file: None,
             time: tap.time,
             peak: tap.peak_force.unwrap_or(1.0),
             pulse_end: None,

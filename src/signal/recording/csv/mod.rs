@@ -84,6 +84,7 @@ pub(super) fn open_csv(
         channels,
         warnings,
         source: Arc::new(source),
+        parts: Vec::new(),
     })
 }
 

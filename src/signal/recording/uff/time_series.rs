@@ -106,6 +106,7 @@ pub(in crate::recording) fn open_uff(
         channels,
         warnings,
         source: Arc::new(UffSource { values, frames }),
+        parts: Vec::new(),
     })
 }
 

@@ -2,6 +2,7 @@
 
 mod arbitrary;
 mod csv;
+mod flac;
 mod health;
 mod laboratory;
 mod mat;

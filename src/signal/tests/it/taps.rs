@@ -310,7 +310,7 @@ fn prop_records_end_where_the_next_tap_begins() {
         }
         let last = taps.taps.last().expect("six taps");
         assert_eq!(last.record.end, samples.len() as u64, "seed {seed}");
-        assert_eq!(taps.quiet(), 0..taps.taps[0].record.start, "seed {seed}");
+        assert_eq!(taps.quiet, 0..taps.taps[0].record.start, "seed {seed}");
         let shortest = taps.accepted().map(Tap::frames).min();
         assert_eq!(taps.shortest(), shortest, "seed {seed}");
     }
@@ -368,7 +368,7 @@ fn regress_a_recording_that_starts_within_a_tap_says_so() {
     assert_eq!(taps.remarks, [TapRemark::StartsWithinTap]);
     assert_all_accepted(&taps, 3, "starts within");
     assert_eq!((taps.taps[0].time, taps.taps[0].record.start), (0.0, 0));
-    assert_eq!(taps.quiet(), 0..0);
+    assert_eq!(taps.quiet, 0..0);
 
     let ringing = ringing(rate, 3.0, &[0.0], &[(80.0, 0.005, 3.0)]);
     let late = ringing[400..].to_vec();
@@ -904,7 +904,7 @@ fn limit_constant_and_short_channels_hold_no_taps() {
             );
             assert!(taps.remarks.is_empty(), "{what}: {:?}", taps.remarks);
             assert_eq!(taps.shortest(), None, "{what}");
-            assert_eq!(taps.quiet(), 0..0, "{what}");
+            assert_eq!(taps.quiet, 0..0, "{what}");
         }
     }
 }

@@ -172,7 +172,6 @@ pub fn measure(
                         warnings.push(Warning::mains(file, reading.line_frequency, label));
                     }
                 }
-                warnings.extend(Warning::unlisted_peaks(file, &found.unlisted));
                 spectra = Some(found);
             }
             Err(problem @ SpectralError::Padded { .. }) => {

@@ -1,6 +1,6 @@
 //! Files of frequency response functions: their resonances, as a recording's.
 
-use super::explained::{fitted_curves, unlisted_peaks};
+use super::explained::{explain, unlisted_peaks};
 use super::fits::{Candidates, Stabilisation, stabilisation};
 use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
@@ -67,7 +67,7 @@ pub(super) fn measure_functions(
         true => spectra_of_magnitudes(lines, &values, settings.reading),
         false => spectra_of_functions(lines, values, &forms, settings.reading),
     };
-    spectra.fitted = fitted_curves(&spectra, &forms);
+    explain(&mut spectra, &forms);
     let warnings = functions.warnings.iter();
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     let mut warnings: Vec<Warning> = warnings.collect();

@@ -173,7 +173,6 @@ pub fn measure(
                     }
                 }
                 warnings.extend(Warning::combinations(file, &found.readings));
-                warnings.extend(Warning::unlisted_peaks(file, &found.unlisted));
                 spectra = Some(found);
             }
             Err(problem @ SpectralError::Padded { .. }) => {

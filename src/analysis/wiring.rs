@@ -1,6 +1,6 @@
 //! From files and channels to measured recordings: described, bare, or with channels named on the command line.
 
-use super::explained::fitted_curves;
+use super::explained::explain;
 use super::frf::{form_of, form_of_kind};
 use super::function_file::{FunctionSettings, measure_functions};
 use super::measurement::{MeasureError, MeasureSettings, Measurement, measure};
@@ -322,7 +322,9 @@ fn result(
     if let Some(spectra) = measurement.spectra.as_mut() {
         let force_unit = wiring.hammer_unit.as_deref();
         let forms = responses.iter().map(|one| form_of(one, force_unit));
-        spectra.fitted = fitted_curves(spectra, &forms.collect::<Vec<_>>());
+        explain(spectra, &forms.collect::<Vec<_>>());
+        let unlisted = Warning::unlisted_peaks(recording.name(), &spectra.unlisted);
+        measurement.warnings.extend(unlisted);
     }
     Ok(RecordingResult {
         file: recording.name().to_string(),

@@ -547,6 +547,46 @@ mod tests {
         assert_eq!(found[2], alone);
     }
 
+    #[test]
+    fn regress_unlisted_peaks_are_one_warning_with_the_strongest_first() {
+        let peaks = |count: usize| -> Vec<UnlistedPeak> {
+            let all = [544.2, 812.0, 97.25, 1203.4, 300.0, 301.0, 302.0];
+            let peaks = all.iter().zip([31.2, 30.0, 28.0, 27.0, 26.0, 25.0, 24.0]);
+            let peaks = peaks.map(|(frequency, above_noise_db)| UnlistedPeak {
+                frequency: *frequency,
+                lines: 0..1,
+                above_noise_db,
+            });
+            peaks.take(count).collect()
+        };
+        assert_eq!(Warning::unlisted_peaks("a.uff", &[]), None);
+        let text = |count| {
+            Warning::unlisted_peaks("a.uff", &peaks(count))
+                .unwrap()
+                .to_string()
+        };
+        assert_eq!(
+            text(1),
+            "a.uff: a peak at 544.2 Hz, 31 dB over the noise, is no listed mode; zoom there (spectrum --zoom 489.8:598.6, or \
+             band = [489.8, 598.6] in a description), and see in the chart whether the fitted curve follows the measured one"
+        );
+        let two = "a.uff: 2 peaks are no listed modes: 544.2 Hz, 31 dB over the noise; 812.0 Hz, 30 dB over the noise; zoom";
+        assert!(text(2).starts_with(two), "{}", text(2));
+        assert!(
+            text(7).contains("300.0 Hz, 26 dB over the noise; and 2 more; zoom"),
+            "{}",
+            text(7)
+        );
+        let all = ["b.uff", "a.uff"].map(|file| Warning::unlisted_peaks(file, &peaks(1)).unwrap());
+        let found = together(all.to_vec());
+        assert_eq!(found.len(), 1);
+        let text = found[0].to_string();
+        assert!(
+            text.ends_with("(the same of a.uff: 544.2 Hz, 31 dB over the noise)"),
+            "{text}"
+        );
+    }
+
     fn doubt(check: Check, place: (&str, f64), value: f64) -> QualityVerdict {
         QualityVerdict {
             check,

@@ -29,8 +29,8 @@ const MOST_SHOWN_PART: f64 = 0.6;
 const FAINT: f64 = 0.4;
 /// Width of a measured curve under that of the fitted modes, and of the latter (pixels): dark and thin over thick and
 /// coloured, so that both are seen where they agree.
-const UNDER: f64 = 3.2;
-const OVER: f64 = 1.2;
+const UNDER: f64 = 3.4;
+const OVER: f64 = 1.0;
 /// Most close-ups in one row; more would be too narrow to read.
 const MOST_CLOSE_UPS: usize = 6;
 /// Lines shown on each side of a close-up's peak.
@@ -596,5 +596,117 @@ fn event(tap: &Tap, unit: &str, recording: &RecordingResult, found: Option<&Clos
         },
         used: tap.accepted(),
         close_up,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tapjoint_analysis::FittedCurve;
+    use tapjoint_signal::spectral::{AveragedSpectra, Window};
+
+    fn lines() -> Lines {
+        Lines {
+            low: 0.0,
+            high: 40.0,
+            spacing: 1.0,
+            block: 103,
+            duration: 1.0,
+        }
+    }
+
+    /// A function of which the fitted modes leave this share between 10 and 30 Hz.
+    fn function(response: &str, left: Option<f64>) -> Frf {
+        let value = |line: usize| Complex64::new(0.0, line as f64);
+        let h1: Vec<Option<Complex64>> = (0..lines().points())
+            .map(|line| Some(value(line)))
+            .collect();
+        let shown = |line: usize| (10..=30).contains(&line).then(|| value(line));
+        Frf {
+            recording: "a.uff".to_owned(),
+            response: response.to_owned(),
+            form: None,
+            form_words: "accelerance",
+            unit: "(m/s2)/N".to_owned(),
+            lines: lines(),
+            averages: 0,
+            window: Window::Rectangular,
+            estimator: FrfEstimator::H1,
+            h2: Vec::new(),
+            hv: Vec::new(),
+            coherence: None,
+            random_error: None,
+            resonances: Vec::new(),
+            fitted: left.map(|left| FittedCurve {
+                modes: 24,
+                band: (10.0, 30.0),
+                left,
+                values: (0..lines().points()).map(shown).collect(),
+            }),
+            h1,
+        }
+    }
+
+    fn series(frfs: &[Frf]) -> Vec<Series> {
+        let spectra = MeasuredSpectra {
+            averages: AveragedSpectra::empty(lines()),
+            window: Window::Rectangular,
+            decay: None,
+            readings: Vec::new(),
+            unlisted: Vec::new(),
+            fitted: None,
+            force_noise: None,
+            force_window: None,
+            stabilisation: Default::default(),
+        };
+        let mut panels = magnitude_panels(&spectra, frfs, &[]);
+        assert_eq!(panels.len(), 1);
+        panels.remove(0).series
+    }
+
+    #[test]
+    fn regress_fitted_modes_are_a_thin_dark_line_over_what_was_measured() {
+        let shown = series(&[function("A", Some(0.003))]);
+        let names: Vec<&str> = shown.iter().map(|one| one.name.as_str()).collect();
+        let fitted = "24 fitted modes leave 0.30 % of the power, 10 to 30 Hz";
+        assert_eq!(names, ["A, of the file", fitted]);
+        assert_eq!(shown[0].mark, Mark::Line(UNDER));
+        assert_eq!(
+            (shown[1].mark, shown[1].color),
+            (Mark::Line(OVER), Color::Ink)
+        );
+        // Nothing is drawn outside the band.
+        let drawn: Vec<usize> = (0..shown[1].y.len())
+            .filter(|&line| shown[1].y[line].is_finite())
+            .collect();
+        assert_eq!(
+            (drawn[0], drawn[drawn.len() - 1], drawn.len()),
+            (10, 30, 21)
+        );
+    }
+
+    #[test]
+    fn regress_every_function_says_what_is_left_of_it() {
+        let shown = series(&[
+            function("A", Some(0.003)),
+            function("B", Some(0.02)),
+            function("C", None),
+        ]);
+        let names: Vec<&str> = shown.iter().map(|one| one.name.as_str()).collect();
+        let expected = [
+            "A, of the file, 0.30 % left",
+            "B, of the file, 2.0 % left",
+            "C, of the file",
+            "24 fitted modes leave 0.30 to 2.0 % of the power, 10 to 30 Hz",
+            "24 fitted modes, B",
+        ];
+        assert_eq!(names, expected);
+        assert_eq!(shown[2].mark, Mark::Line(1.5));
+    }
+
+    #[test]
+    fn limit_shares_that_round_to_nothing() {
+        assert_eq!(percent(0.0), "under 0.001 %");
+        assert_eq!(percent(0.5), "50 %");
     }
 }

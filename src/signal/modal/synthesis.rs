@@ -15,19 +15,31 @@
 //! - a is the decay that an exponential window added to force and response (1/s), 0 without one.
 //!
 //! # Least squares
-//! The poles are known. R, U and L of each function are those of the least sum of |H measured - H|^2 over the lines,
-//! without weights. U and L are complex: damped modes outside the lines and a delay of the sensor turn their phase.
-//! What the curve leaves is therefore the least that any residues at these poles can leave.
+//! The poles are known. R, U and L of each function are those of the least sum of
+//!
+//! ```text
+//! |H measured - H|^2/sqrt(N + |H measured|^2)
+//! ```
+//!
+//! over the lines. N is the noise power of the function about each line ([`noise_of_function`]). A function may span five
+//! decades. Without weights the errors at its highest peaks, a few percent of them, hide its low modes. Weights by
+//! relative errors let the many lines between the peaks decide, and one mode that is not listed then spoils the peaks
+//! of all others. The root lies halfway. U and L are complex: damped modes outside the lines and a delay of the sensor
+//! turn their phase.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use rayon::prelude::*;
 
+use super::noise_of_function;
 use crate::recording::ResponseForm;
 
 /// Most lines that are factorised at once: a bound on memory. The factors of earlier lines are carried along.
 const MOST_LINES: usize = 2048;
+/// Least magnitude in a weight, as a share of the largest: that of numbers in single precision.
+const LEAST_SHARE: f64 = 1e-7;
 /// Least singular value that counts, relative to the largest, with all columns of length 1. Below it two poles are one for
 /// these lines, and their residues are the smallest that give the curve.
 const DISTINCT: f64 = 1e-10;
@@ -65,37 +77,58 @@ pub struct Synthesis {
 impl SynthesisLines<'_> {
     /// Fits residues and residual terms to measured `functions`, each with a value on every line.
     ///
-    /// `forms` are those of the functions. A function without a known form gets the form that leaves least. The result
+    /// `forms` are those of the functions. A function without a known form gets the form that fits best. The result
     /// is `None` for a function that is zero or no number on some line, and for all where the lines are too few.
     pub fn synthesise(
         &self,
         functions: &[&[Complex64]],
         forms: &[Option<ResponseForm>],
     ) -> Vec<Option<Synthesis>> {
-        let mut best: Vec<Option<Synthesis>> = vec![None; functions.len()];
+        let functions = functions.par_iter().enumerate();
+        let fitted = functions.map(|(index, function)| {
+            let form = forms.get(index).copied().flatten();
+            self.of_function(function, form)
+        });
+        fitted.collect()
+    }
+
+    fn of_function(&self, function: &[Complex64], form: Option<ResponseForm>) -> Option<Synthesis> {
         let lines = self.frequencies;
-        let is_sound = lines.len() > self.unknowns() && lines.iter().all(|line| *line > 0.0);
-        if !is_sound {
-            return best;
+        let is_sound = lines.len() > self.unknowns()
+            && lines.iter().all(|line| *line > 0.0)
+            && function.len() == lines.len();
+        let powers = function.iter().map(Complex64::norm_sqr);
+        let largest = powers.clone().fold(0.0, f64::max);
+        let all: f64 = powers.clone().sum();
+        if !(is_sound && all > 0.0 && all.is_finite()) {
+            return None;
         }
-        for form in ResponseForm::ALL {
-            let mut chosen: Vec<usize> = (0..functions.len()).collect();
-            chosen.retain(|&index| {
-                let own = forms.get(index).copied().flatten();
-                let values = functions[index];
-                own.is_none_or(|own| own == form)
-                    && values.len() == lines.len()
-                    && values.iter().all(|value| value.is_finite())
-            });
-            let columns: Vec<&[Complex64]> = chosen.iter().map(|&at| functions[at]).collect();
-            for (index, found) in chosen.into_iter().zip(self.of_form(form, &columns)) {
-                let known = best[index].as_ref();
-                if found.left.is_finite() && known.is_none_or(|known| found.left < known.left) {
-                    best[index] = Some(found);
-                }
+        let mut weights = noise_of_function(function);
+        for (weight, power) in weights.iter_mut().zip(powers) {
+            let square = *weight + power + LEAST_SHARE.powi(2) * largest;
+            *weight = 1.0 / square.sqrt();
+        }
+        let forms = match form {
+            Some(ref form) => std::slice::from_ref(form),
+            None => &ResponseForm::ALL,
+        };
+        let mut best: Option<(f64, Synthesis)> = None;
+        for &form in forms {
+            let Some(mut found) = self.of_form(form, function, &weights) else {
+                continue;
+            };
+            let (mut left, mut cost) = (0.0, 0.0);
+            for ((value, own), weight) in function.iter().zip(&found.values).zip(&weights) {
+                left += (value - own).norm_sqr();
+                cost += (value - own).norm_sqr() * weight;
+            }
+            found.left = left / all;
+            let is_better = best.as_ref().is_none_or(|(least, _)| cost < *least);
+            if found.left.is_finite() && is_better {
+                best = Some((cost, found));
             }
         }
-        best
+        best.map(|(_, found)| found)
     }
 
     /// Number of real unknowns of one function.
@@ -129,84 +162,81 @@ impl SynthesisLines<'_> {
         columns
     }
 
-    /// Fits functions of one form.
-    fn of_form(&self, form: ResponseForm, functions: &[&[Complex64]]) -> Vec<Synthesis> {
-        let Some(solution) = self.solution(form, functions) else {
-            return Vec::new();
-        };
-        let mut found: Vec<Synthesis> = Vec::with_capacity(functions.len());
+    /// Fits a function of one form, without the share that is left; `None` without an answer.
+    fn of_form(
+        &self,
+        form: ResponseForm,
+        function: &[Complex64],
+        weights: &[f64],
+    ) -> Option<Synthesis> {
+        let solution = self.solution(form, function, weights)?;
+        let complex: Vec<Complex64> = solution
+            .as_slice()
+            .chunks_exact(2)
+            .map(|pair| Complex64::new(pair[0], pair[1]))
+            .collect();
+        let (residues, terms) = complex.split_at(self.poles.len());
         let (scale, order) = (self.scale(), form.derivatives());
-        for column in solution.column_iter() {
-            let complex = |place: usize| Complex64::new(column[2 * place], column[2 * place + 1]);
-            let poles = self.poles.len();
-            found.push(Synthesis {
-                form,
-                residues: (0..poles)
-                    .map(|pole| complex(pole) * scale.powi(1 - order))
-                    .collect(),
-                upper: complex(poles) * scale.powi(-order),
-                lower: complex(poles + 1) * scale.powi(2 - order),
-                values: Vec::with_capacity(self.frequencies.len()),
-                left: 0.0,
-            });
-        }
-        for &frequency in self.frequencies {
-            let columns = self.columns(form, frequency);
-            for (one, unknowns) in found.iter_mut().zip(solution.column_iter()) {
-                let parts = columns.iter().zip(unknowns.iter());
-                one.values.push(parts.map(|(part, by)| part * by).sum());
-            }
-        }
-        for (one, measured) in found.iter_mut().zip(functions) {
-            let pairs = one.values.iter().zip(measured.iter());
-            let left: f64 = pairs.map(|(own, value)| (value - own).norm_sqr()).sum();
-            let all: f64 = measured.iter().map(Complex64::norm_sqr).sum();
-            one.left = left / all;
-        }
-        found
+        let values = self.frequencies.iter().map(|&frequency| {
+            let columns = self.columns(form, frequency).into_iter();
+            columns
+                .zip(solution.iter())
+                .map(|(part, by)| part * by)
+                .sum()
+        });
+        Some(Synthesis {
+            form,
+            values: values.collect(),
+            residues: residues.iter().map(|r| r * scale.powi(1 - order)).collect(),
+            upper: terms[0] * scale.powi(-order),
+            lower: terms[1] * scale.powi(2 - order),
+            left: 0.0,
+        })
     }
 
-    /// Solves for the unknowns of every function, a column for each; `None` without an answer.
+    /// Solves for the unknowns; `None` without an answer.
     ///
-    /// The columns X = Q R are factorised piece by piece: below the R of all earlier lines stand the next ones.
-    fn solution(&self, form: ResponseForm, functions: &[&[Complex64]]) -> Option<DMatrix<f64>> {
+    /// The weighted columns X = Q R are factorised piece by piece: below the R of all earlier lines stand the next ones.
+    fn solution(
+        &self,
+        form: ResponseForm,
+        function: &[Complex64],
+        weights: &[f64],
+    ) -> Option<DVector<f64>> {
         let unknowns = self.unknowns();
         let mut upper = DMatrix::zeros(0, unknowns);
-        let mut shares = DMatrix::zeros(0, functions.len());
-        for first in (0..self.frequencies.len()).step_by(MOST_LINES) {
-            let lines = &self.frequencies[first..];
-            let lines = &lines[..lines.len().min(MOST_LINES)];
+        let mut shares: DVector<f64> = DVector::zeros(0);
+        for first in (0..function.len()).step_by(MOST_LINES) {
+            let lines = first..function.len().min(first + MOST_LINES);
             let known = upper.nrows();
             let rows = known + 2 * lines.len();
             let mut model = upper.resize(rows, unknowns, 0.0);
-            let mut data = shares.resize(rows, functions.len(), 0.0);
-            for (index, &frequency) in lines.iter().enumerate() {
+            let mut data = shares.resize_vertically(rows, 0.0);
+            for (index, line) in lines.enumerate() {
                 let row = known + 2 * index;
-                for (place, value) in self.columns(form, frequency).into_iter().enumerate() {
-                    model[(row, place)] = value.re;
-                    model[(row + 1, place)] = value.im;
+                let root = weights[line].sqrt();
+                let columns = self.columns(form, self.frequencies[line]);
+                for (place, value) in columns.into_iter().enumerate() {
+                    model[(row, place)] = value.re * root;
+                    model[(row + 1, place)] = value.im * root;
                 }
-                for (place, function) in functions.iter().enumerate() {
-                    data[(row, place)] = function[first + index].re;
-                    data[(row + 1, place)] = function[first + index].im;
-                }
+                data[row] = function[line].re * root;
+                data[row + 1] = function[line].im * root;
             }
             let factors = model.qr();
             factors.q_tr_mul(&mut data);
             upper = factors.r();
-            let kept = upper.nrows();
-            shares = data.rows(0, kept).into_owned();
+            shares = data.resize_vertically(upper.nrows(), 0.0);
         }
-        let lengths: DVector<f64> =
-            DVector::from_iterator(unknowns, upper.column_iter().map(|column| column.norm()));
-        for (mut column, length) in upper.column_iter_mut().zip(lengths.iter()) {
+        let lengths: Vec<f64> = upper.column_iter().map(|column| column.norm()).collect();
+        for (mut column, length) in upper.column_iter_mut().zip(&lengths) {
             column.unscale_mut(length.max(f64::MIN_POSITIVE));
         }
         let parts = upper.try_svd(true, true, f64::EPSILON, MOST_STEPS)?;
         let least = DISTINCT * parts.singular_values.max();
         let mut solution = parts.solve(&shares, least).ok()?;
-        for (mut row, length) in solution.row_iter_mut().zip(lengths.iter()) {
-            row.unscale_mut(length.max(f64::MIN_POSITIVE));
+        for (value, length) in solution.iter_mut().zip(&lengths) {
+            *value /= length.max(f64::MIN_POSITIVE);
         }
         Some(solution)
     }

@@ -11,6 +11,7 @@
 mod modal;
 mod modal_fit;
 mod modal_polyreference;
+mod modal_synthesis;
 mod quality;
 mod recording;
 mod recording_uff;

@@ -105,17 +105,16 @@ impl Warning {
     pub(crate) fn combinations(file: &str, readings: &[ModeReading]) -> Option<Self> {
         const MOST_NAMED: usize = 3;
         let mut named = Vec::new();
-        let (mut count, mut step) = (0, 0.0);
+        let (mut count, mut fundamental) = (0, 0.0);
         for reading in readings {
-            let Some(PeakLabel::Combination { line, step: by }) = reading.label else {
+            let Some(label @ PeakLabel::Combination { of, .. }) = reading.label else {
                 continue;
             };
             count += 1;
-            step = by.abs();
+            fundamental = of;
             if count <= MOST_NAMED {
-                let sign = if by < 0.0 { '\u{2212}' } else { '+' };
-                let frequency = reading.frequency;
-                named.push(format!("{frequency:.1} = {line:.1} {sign} {step:.1} Hz"));
+                let sum = label.to_string().replace("combination ", "");
+                named.push(format!("{:.1} = {sum}", reading.frequency));
             }
         }
         let more = count - named.len();
@@ -123,7 +122,7 @@ impl Warning {
             named.push(format!("and {more} more"));
         }
         let text = format!(
-            "{count} peaks lie beside stronger ones at the distance of {step:.1} Hz, the frequency of a mode ({}); a joint \
+            "{count} peaks lie at sums and differences of stronger ones and the mode at {fundamental:.1} Hz ({}); a joint \
              that slips or a contact that opens and closes makes such combinations while that mode rings; they are listed \
              with this label and are not counted as modes; softer taps make them weaker",
             named.join(", ")

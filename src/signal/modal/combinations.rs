@@ -1,9 +1,10 @@
 //! Combination tones: peaks at sums and differences of a mode's frequency and that of a stronger one.
 //!
 //! A joint that slips, or a contact that opens and closes, is not linear. While a mode of frequency f_b rings, it changes
-//! the joint in its own rhythm, and every other line f_a gets neighbours at f_a + f_b and f_a - f_b; they get neighbours
-//! in turn (Nayfeh & Mook 1979, chapter 4: combination resonances). Such a peak decays like a mode and is none. A mode may
-//! lie at such a place by chance. So peaks are only labelled where there are far more of them than chance explains.
+//! the joint in its own rhythm, and every other line f_a gets neighbours at f_a + n f_b and f_a - n f_b; they get
+//! neighbours in turn (Nayfeh & Mook 1979, chapter 4: combination resonances). n is 1 where the joint tells push from
+//! pull, and 2 where it does not (a cubic spring). Such a peak decays like a mode and is none. A mode may lie at such a
+//! place by chance. So peaks are only labelled where there are far more of them than chance explains.
 
 use num_complex::Complex64;
 use statrs::distribution::{DiscreteCDF, Poisson};
@@ -63,21 +64,21 @@ pub fn label_combinations(readings: &mut [ModeReading]) {
         return;
     };
     let mut best: Option<(f64, Vec<Combination>)> = None;
-    for fundamental in &tones {
-        let found = combinations(&tones, fundamental);
+    for (fundamental, number) in tones.iter().flat_map(|tone| [(tone, 1), (tone, 2)]) {
+        let found = combinations(&tones, fundamental, number);
         let expected = expected_by_chance(&tones, fundamental, high - low);
         // Multiples count where the structure is known to be nonlinear.
         let counted = found
             .iter()
             .filter(|one| fundamental.changes || !one.is_multiple);
-        let number = counted.count() as u64;
+        let count = counted.count() as u64;
         let Ok(chance) = Poisson::new(expected.max(f64::MIN_POSITIVE)) else {
             continue;
         };
-        if number < LEAST_NUMBER {
+        if count < LEAST_NUMBER {
             continue;
         }
-        let probability = chance.sf(number - 1) * tones.len() as f64;
+        let probability = chance.sf(count - 1) * 2.0 * tones.len() as f64;
         let level = match fundamental.changes {
             true => LEVEL,
             false => LEVEL_UNSEEN,
@@ -133,10 +134,11 @@ fn stronger<'a>(
     })
 }
 
-/// The tones at sums and differences of stronger lines and the fundamental.
-fn combinations(tones: &[Tone], fundamental: &Tone) -> Vec<Combination> {
+/// The tones at sums and differences of stronger lines and `number` times the fundamental.
+fn combinations(tones: &[Tone], fundamental: &Tone, number: i32) -> Vec<Combination> {
     let mut found = Vec::new();
-    let step = fundamental.frequency;
+    let of = fundamental.frequency;
+    let step = of * f64::from(number);
     for tone in tones.iter().filter(|tone| tone.index != fundamental.index) {
         let mut nearest: Option<(f64, PeakLabel)> = None;
         for line in stronger(tones, tone, fundamental) {
@@ -145,17 +147,17 @@ fn combinations(tones: &[Tone], fundamental: &Tone) -> Vec<Combination> {
             if off <= reach(tone, fundamental)
                 && nearest.as_ref().is_none_or(|(least, _)| off < *least)
             {
-                let step = step.copysign(distance);
+                let times = if distance < 0.0 { -number } else { number };
                 let line = line.frequency;
-                nearest = Some((off, PeakLabel::Combination { line, step }));
+                nearest = Some((off, PeakLabel::Combination { line, times, of }));
             }
         }
         if let Some((_, label)) = nearest {
-            let number = (tone.frequency / step).round();
+            let multiple = (tone.frequency / of).round();
             found.push(Combination {
                 index: tone.index,
                 label,
-                is_multiple: (tone.frequency - number * step).abs() <= number * REACH * step,
+                is_multiple: (tone.frequency - multiple * of).abs() <= multiple * REACH * of,
             });
         }
     }

@@ -175,12 +175,14 @@ pub enum PeakLabel {
     Mains(f64),
     /// The force has a gap there, and the quotient a peak.
     ForceGap,
-    /// A nonlinear joint makes it at the sum of a stronger line (Hz) and a step (Hz, negative for a difference).
+    /// A nonlinear joint makes it at the sum of a stronger line and `times` another mode's frequency.
     Combination {
         /// The stronger line (Hz).
         line: f64,
-        /// The frequency that is added to it (Hz).
-        step: f64,
+        /// 1 or 2; negative for a difference.
+        times: i32,
+        /// Frequency of the other mode (Hz).
+        of: f64,
     },
     /// No decaying oscillation explains it: speckle of noise or reverberation.
     NoResonance,
@@ -191,9 +193,13 @@ impl fmt::Display for PeakLabel {
         match self {
             PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
             PeakLabel::ForceGap => f.write_str("gap of the force"),
-            PeakLabel::Combination { line, step } => {
-                let sign = if *step < 0.0 { '\u{2212}' } else { '+' };
-                write!(f, "combination {line:.1} {sign} {:.1} Hz", step.abs())
+            PeakLabel::Combination { line, times, of } => {
+                let sign = if *times < 0 { '\u{2212}' } else { '+' };
+                let number = match times.abs() {
+                    1 => String::new(),
+                    times => format!("{times} \u{d7} "),
+                };
+                write!(f, "combination {line:.1} {sign} {number}{of:.1} Hz")
             }
             PeakLabel::NoResonance => f.write_str("no clear resonance"),
         }

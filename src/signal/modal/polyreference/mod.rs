@@ -449,8 +449,9 @@ pub fn find_modes(
     };
     let mut searches = vec![search(matrix, whole_band, settings)?];
     let mut bands = sub_bands(matrix, settings.peaks);
+    let about_peaks = bands.len();
     bands.extend(bands_between(matrix, &bands));
-    for band in bands {
+    for (index, band) in bands.into_iter().enumerate() {
         let mut part = search(matrix, band, settings)?;
         // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
         // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds
@@ -473,7 +474,10 @@ pub fn find_modes(
             }
         }
         *whole = kept;
-        searches.push(part);
+        // Bands between the peaks fill no diagram where they find nothing.
+        if index < about_peaks || !part.modes.is_empty() {
+            searches.push(part);
+        }
     }
     Ok(searches)
 }

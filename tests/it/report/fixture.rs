@@ -112,6 +112,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        fitted_functions: Vec::new(),
         hammer: None,
         aside: None,
         conditions: Conditions {

@@ -71,7 +71,8 @@ pub(super) fn measure_functions(
     let warnings = functions.warnings.iter();
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     let mut warnings: Vec<Warning> = warnings.collect();
-    warnings.extend(Warning::unlisted_peaks(&functions.file, &spectra.unlisted));
+    let (file, band) = (&functions.file, (lines.low, lines.high));
+    warnings.extend(Warning::unlisted_peaks(file, &spectra.unlisted, band));
     Ok(RecordingResult {
         file: functions.file.clone(),
         files: Vec::new(),

@@ -323,7 +323,9 @@ fn result(
         let force_unit = wiring.hammer_unit.as_deref();
         let forms = responses.iter().map(|one| form_of(one, force_unit));
         explain(spectra, &forms.collect::<Vec<_>>());
-        let unlisted = Warning::unlisted_peaks(recording.name(), &spectra.unlisted);
+        let lines = &spectra.averages.lines;
+        let band = (lines.low, lines.high);
+        let unlisted = Warning::unlisted_peaks(recording.name(), &spectra.unlisted, band);
         measurement.warnings.extend(unlisted);
     }
     Ok(RecordingResult {

@@ -155,11 +155,17 @@ impl Warning {
                 )
             }
         };
-        let [low, high] = [1.0 - ABOUT_PEAK, 1.0 + ABOUT_PEAK];
-        let [low, high] = [low, high].map(|by| frequency_words(by * strongest.frequency));
+        let [low, high] = [1.0 - ABOUT_PEAK, 1.0 + ABOUT_PEAK].map(|by| by * strongest.frequency);
+        let advice = if band.1 - band.0 > 1.5 * (high - low) {
+            let [low, high] = [low, high].map(frequency_words);
+            format!(
+                "zoom there (spectrum --zoom {low}:{high}, or band = [{low}, {high}] in a description)"
+            )
+        } else {
+            "measure at other points, or longer".to_owned()
+        };
         let text = format!(
-            "{what}; zoom there (spectrum --zoom {low}:{high}, or band = [{low}, {high}] in a description), and see in the \
-             chart whether the fitted curve follows the measured one"
+            "{what}; {advice}, and see in the chart whether the fitted curve follows the measured one"
         );
         Some(Warning {
             shared: Some("unlisted"),
@@ -558,12 +564,9 @@ mod tests {
             });
             peaks.take(count).collect()
         };
-        assert_eq!(Warning::unlisted_peaks("a.uff", &[]), None);
-        let text = |count| {
-            Warning::unlisted_peaks("a.uff", &peaks(count))
-                .unwrap()
-                .to_string()
-        };
+        let of = |file, count| Warning::unlisted_peaks(file, &peaks(count), (0.0, 2000.0));
+        assert_eq!(of("a.uff", 0), None);
+        let text = |count| of("a.uff", count).unwrap().to_string();
         assert_eq!(
             text(1),
             "a.uff: a peak at 544.2 Hz, 31 dB over the noise, is no listed mode; zoom there (spectrum --zoom 489.8:598.6, or \
@@ -576,7 +579,14 @@ mod tests {
             "{}",
             text(7)
         );
-        let all = ["b.uff", "a.uff"].map(|file| Warning::unlisted_peaks(file, &peaks(1)).unwrap());
+        // Where the band is narrow already, there is nothing to zoom.
+        let zoomed = Warning::unlisted_peaks("a.uff", &peaks(1), (490.0, 599.0)).unwrap();
+        let text = zoomed.to_string();
+        assert!(
+            text.contains("no listed mode; measure at other points"),
+            "{text}"
+        );
+        let all = ["b.uff", "a.uff"].map(|file| of(file, 1).unwrap());
         let found = together(all.to_vec());
         assert_eq!(found.len(), 1);
         let text = found[0].to_string();

@@ -221,7 +221,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         match render_frf_picture(recording, frfs, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
-                "{}: no tap without an overload was accepted, so there is no function to draw",
+                "{}: no tap was accepted whole, so there is no function to draw",
                 recording.file
             )),
         }
@@ -230,9 +230,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
     for (file, format) in outputs {
         match format {
             _ if all.is_empty() => {
-                terminal.warn(
-                    "no tap without an overload was accepted, so there is no function to write",
-                );
+                terminal.warn("no tap was accepted whole, so there is no function to write");
             }
             None => file.write(render_frf_csv(&all)?.as_bytes())?,
             Some(format) => file.write(&render_frf_uff(&all, format)?)?,

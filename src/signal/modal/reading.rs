@@ -133,10 +133,12 @@ impl ModeReading {
                 self.source = ReadBy::Line;
                 // Over the flat top of a resonance wider than a line, noise decides which line is the highest, and
                 // the peak of an accelerance lies zeta^2 f higher: both remain within half of the half-power width.
+                // The line nearest to a pole is as good as that pole.
                 let half_width = self.damping_ratio.unwrap_or(0.0) * self.line_frequency;
                 let mut bound = self.line_bound;
                 if half_width > self.half_line {
-                    bound = bound.max(self.half_line + half_width);
+                    let beyond = self.between.map_or(half_width, |between| between.bound);
+                    bound = bound.max(self.half_line + beyond.min(half_width));
                 }
                 (self.line_frequency, bound, bound / 3f64.sqrt())
             }

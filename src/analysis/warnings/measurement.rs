@@ -133,8 +133,12 @@ impl Warning {
         })
     }
 
-    /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none.
-    pub(crate) fn unlisted_peaks(file: &str, peaks: &[UnlistedPeak]) -> Option<Self> {
+    /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none. `band` was analysed (Hz).
+    pub(crate) fn unlisted_peaks(
+        file: &str,
+        peaks: &[UnlistedPeak],
+        band: (f64, f64),
+    ) -> Option<Self> {
         let strongest = peaks.first()?;
         let named = |peak: &UnlistedPeak| {
             let (frequency, height) = (frequency_words(peak.frequency), peak.above_noise_db);

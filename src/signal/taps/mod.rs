@@ -340,9 +340,11 @@ impl Taps {
         self.accepted().map(Tap::frames).min()
     }
 
-    /// The force pulse in the mean of the accepted taps; `None` without a hammer or an accepted tap.
+    /// The force pulse in the mean of the accepted taps that were not overloaded; `None` without a hammer or an accepted tap.
     pub fn mean_pulse(&self) -> Option<Pulse> {
-        let pulses: Vec<Pulse> = self.accepted().filter_map(|tap| tap.pulse).collect();
+        let pulses: Vec<Pulse> = (self.accepted().filter(|tap| tap.is_whole()))
+            .filter_map(|tap| tap.pulse)
+            .collect();
         Pulse::mean(&pulses)
     }
 }

@@ -450,7 +450,10 @@ pub fn find_modes(
     let mut searches = vec![search(matrix, whole_band, settings)?];
     let mut bands = sub_bands(matrix, settings.peaks);
     let about_peaks = bands.len();
-    bands.extend(bands_between(matrix, &bands));
+    // Of functions every entry has its own peaks, and a narrow band without any finds little but noise.
+    if settings.peaks == BandPeaks::Together {
+        bands.extend(bands_between(matrix, &bands));
+    }
     for (index, band) in bands.into_iter().enumerate() {
         let mut part = search(matrix, band, settings)?;
         // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose

@@ -19,7 +19,7 @@ use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
-const MOST_EXTRA: usize = 24;
+const MOST_EXTRA: usize = 40;
 /// Most fits beside which a second pole is looked for, those that leave most first.
 const MOST_MISFITS: usize = 4;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.

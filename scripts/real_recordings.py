@@ -32,6 +32,7 @@ import io
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -216,7 +217,7 @@ def modes_of(recording):
 
 def combinations_of(recording):
     """Peaks that the program lists as sums and differences of others."""
-    return [mode for mode in recording["modes"] if (mode["label"] or "").startswith("combination")]
+    return [mode for mode in recording["modes"] if re.match(r"[\d.]+ [+\u2212] ", mode["label"] or "")]
 
 
 # ---------------------------------------------------------------- beside it

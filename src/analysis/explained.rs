@@ -1,37 +1,42 @@
 //! What the modes of a recording explain, and what is left: curves of the fitted modes over the frequency response
 //! functions, and strong peaks that nothing explains.
 
-use super::measurement::MeasuredSpectra;
 use num_complex::Complex64;
 use std::ops::Range;
 use tapjoint_signal::modal::fit::ModeFit;
 use tapjoint_signal::modal::synthesis::{Synthesis, SynthesisLines};
 use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakLabel, PeakSettings, find_peaks};
 use tapjoint_signal::recording::ResponseForm;
-use tapjoint_signal::spectral::Lines;
+use tapjoint_signal::spectral::{AveragedSpectra, Lines};
 
 /// Curves of the fitted modes over the functions (H1, or those of a file) of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedCurves {
-    /// Number of fitted modes.
+    /// Number of fitted modes. Fitted combinations of others have poles of their own, and are no modes.
     pub modes: usize,
     /// Band of the curves (Hz).
     pub band: (f64, f64),
     /// Index of the spectra's line on which the curves begin.
     pub first: usize,
-    /// The curve of each response; `None` where its function is zero or no number on some line.
+    /// The curve of each response. `None` where its function is zero throughout, has a value that is no number, or
+    /// where the lines are too few for the unknowns.
     pub functions: Vec<Option<Synthesis>>,
 }
 
-/// Puts into the spectra of a recording the curves of its fitted modes, and takes out the strong peaks that these explain.
-/// `forms` are those of the responses.
-pub(super) fn explain(spectra: &mut MeasuredSpectra, forms: &[Option<ResponseForm>]) {
-    spectra.fitted = fitted_curves(spectra, forms);
-    if let (Some(fitted), Some(functions)) = (&spectra.fitted, &spectra.averages.h1) {
-        spectra
-            .unlisted
-            .retain(|peak| !fitted.follow(functions, &peak.lines));
-    }
+/// Returns the curves of a recording's fitted modes, and takes out of the strong peaks those that they explain.
+/// `forms` are those of the responses; `None` without functions or fitted modes.
+pub(super) fn explain(
+    averages: &AveragedSpectra,
+    added_decay: f64,
+    readings: &[ModeReading],
+    forms: &[Option<ResponseForm>],
+    unlisted: &mut Vec<UnlistedPeak>,
+) -> Option<FittedCurves> {
+    let functions = averages.h1.as_deref()?;
+    let lines = &averages.lines;
+    let curves = fitted_curves(functions, lines, added_decay, readings, forms)?;
+    unlisted.retain(|peak| !curves.follow(functions, &peak.lines));
+    Some(curves)
 }
 
 /// Most power that curves leave of a peak that they explain, as a share of its own: an error of a tenth. A mode that makes
@@ -55,38 +60,41 @@ impl FittedCurves {
                 all += function[line].norm_sqr() / total;
             }
         }
-        left <= MOST_LEFT * all
+        all > 0.0 && left <= MOST_LEFT * all
     }
 }
 
-/// Fits the functions of a recording by its fitted modes; `None` without functions or fitted modes.
+/// Fits the functions of a recording by its fitted modes; `None` without fitted modes.
 ///
 /// The poles are those of the fits. Residues, and a term each for the modes below and above the band, are fitted to the
 /// functions themselves. `forms` are those of the responses. The band begins and ends where the bands of the fits do:
 /// beyond, nothing was looked for, or noise alone decides.
 fn fitted_curves(
-    spectra: &MeasuredSpectra,
+    functions: &[Vec<Complex64>],
+    lines: &Lines,
+    added_decay: f64,
+    readings: &[ModeReading],
     forms: &[Option<ResponseForm>],
 ) -> Option<FittedCurves> {
-    let functions = spectra.averages.h1.as_deref()?;
-    let fits = spectra.readings.iter();
+    let fits = readings.iter();
     let fits = fits.filter_map(|reading| Some(&reading.fit.as_deref()?.mode));
     let fits: Vec<&ModeFit> = fits.collect();
-    let (first, last) = range(&spectra.averages.lines, &fits)?;
-    let lines = &spectra.averages.lines;
+    let listed = readings.iter();
+    let listed = listed.filter(|reading| reading.fit.is_some() && reading.label.is_none());
+    let (first, last) = range(lines, &fits)?;
     let frequencies: Vec<f64> = (first..=last).map(|line| lines.frequency(line)).collect();
     let poles: Vec<Complex64> = fits.iter().map(|fit| fit.pole).collect();
     let wanted = SynthesisLines {
         frequencies: &frequencies,
         poles: &poles,
-        added_decay: spectra.window.added_decay(),
+        added_decay,
     };
     let columns: Vec<&[Complex64]> = functions
         .iter()
         .map(|values| values.get(first..=last).unwrap_or_default())
         .collect();
     Some(FittedCurves {
-        modes: fits.len(),
+        modes: listed.count(),
         band: (lines.frequency(first), lines.frequency(last)),
         first,
         functions: wanted.synthesise(&columns, forms),

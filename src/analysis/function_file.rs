@@ -67,12 +67,23 @@ pub(super) fn measure_functions(
         true => spectra_of_magnitudes(lines, &values, settings.reading),
         false => spectra_of_functions(lines, values, &forms, settings.reading),
     };
-    explain(&mut spectra, &forms);
+    spectra.fitted = explain(
+        &spectra.averages,
+        spectra.window.added_decay(),
+        &spectra.readings,
+        &forms,
+        &mut spectra.unlisted,
+    );
     let warnings = functions.warnings.iter();
     let warnings = warnings.map(|warning| Warning::of_file(&functions.file, warning));
     let mut warnings: Vec<Warning> = warnings.collect();
     let (file, band) = (&functions.file, (lines.low, lines.high));
-    warnings.extend(Warning::unlisted_peaks(file, &spectra.unlisted, band));
+    warnings.extend(Warning::unlisted_peaks(
+        file,
+        &spectra.unlisted,
+        band,
+        spectra.fitted.is_some(),
+    ));
     Ok(RecordingResult {
         file: functions.file.clone(),
         files: Vec::new(),
@@ -160,7 +171,8 @@ fn spectra_of_magnitudes(
         },
         window: Window::Rectangular,
         decay: None,
-        unlisted: unlisted_peaks(&level, &PeakSettings::default(), &readings),
+        // Without a phase the noise is not known.
+        unlisted: Vec::new(),
         fitted: None,
         readings,
         force_noise: None,

@@ -71,10 +71,10 @@ pub(super) fn set_aside(
     aside
 }
 
-/// Median peak force of the accepted taps; `None` without a hammer or tap.
+/// Median peak force of the accepted taps; `None` without a tap, or where forces are not known.
 fn median_force(recording: &RecordingResult) -> Option<f64> {
     let mut peaks = recording.tap_peaks();
-    (recording.has_hammer && !peaks.is_empty()).then(|| median(&mut peaks))
+    (recording.has_tap_forces() && !peaks.is_empty()).then(|| median(&mut peaks))
 }
 
 /// Merges and numbers the readings of the recordings that are not set `aside`, and numbers the readings of all others.

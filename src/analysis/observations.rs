@@ -88,7 +88,8 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
         return Vec::new();
     };
     let peaks = recording.tap_peaks();
-    let levels = levels(&peaks, recording.has_hammer);
+    let has_forces = recording.has_tap_forces();
+    let levels = levels(&peaks, has_forces);
     let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
     let mut numbered: Vec<(usize, &ModeReading)> = numbered
         .filter_map(|(reading, number)| Some(((*number)?, reading)))
@@ -110,7 +111,7 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
         seen.retain(|seen| place == 0 || seen.is_of_taps());
         judge_scatter(&mut seen);
         let forces = taps.iter().filter_map(|&tap| peaks.get(tap).copied());
-        let mut forces: Vec<f64> = forces.filter(|_| recording.has_hammer).collect();
+        let mut forces: Vec<f64> = forces.filter(|_| has_forces).collect();
         configurations.push(Configuration {
             file: Some(recording.file.clone()),
             recording: Some(index),
@@ -132,10 +133,10 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
     configurations
 }
 
-/// Places of the taps of each level, the hardest level first; without a hammer all are one.
-fn levels(peaks: &[f64], has_hammer: bool) -> Vec<Vec<usize>> {
+/// Places of the taps of each level, the hardest level first; where forces are not known all are one.
+fn levels(peaks: &[f64], has_forces: bool) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..peaks.len()).collect();
-    if !has_hammer || order.is_empty() {
+    if !has_forces || order.is_empty() {
         return vec![order];
     }
     order.sort_by(|&a, &b| peaks[b].total_cmp(&peaks[a]));
@@ -172,7 +173,7 @@ fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
     let numbered = recording.readings().iter().zip(&recording.mode_numbers);
     for (reading, _) in numbered.filter(|(_, number)| number.is_none()) {
         let label = match reading.label {
-            Some(PeakLabel::NoResonance | PeakLabel::ForceGap | PeakLabel::Combination { .. }) => {
+            Some(PeakLabel::NoResonance | PeakLabel::ForceGap | PeakLabel::Combination(_)) => {
                 continue;
             }
             Some(label) => label.to_string(),

@@ -109,6 +109,12 @@ impl RecordingResult {
         spectra.map_or(&[], |spectra| &spectra.readings)
     }
 
+    /// Returns true where the force of every accepted tap is known: there is a hammer, and no pulse was cut off.
+    pub(super) fn has_tap_forces(&self) -> bool {
+        let mut taps = self.measurement.taps.accepted();
+        self.has_hammer && taps.all(|tap| tap.overload.is_none_or(|overload| !overload.is_force))
+    }
+
     /// Peaks of the accepted taps (`tap_unit`).
     pub(super) fn tap_peaks(&self) -> Vec<f64> {
         let taps = self.measurement.taps.accepted();

@@ -322,10 +322,21 @@ fn result(
     if let Some(spectra) = measurement.spectra.as_mut() {
         let force_unit = wiring.hammer_unit.as_deref();
         let forms = responses.iter().map(|one| form_of(one, force_unit));
-        explain(spectra, &forms.collect::<Vec<_>>());
+        spectra.fitted = explain(
+            &spectra.averages,
+            spectra.window.added_decay(),
+            &spectra.readings,
+            &forms.collect::<Vec<_>>(),
+            &mut spectra.unlisted,
+        );
         let lines = &spectra.averages.lines;
         let band = (lines.low, lines.high);
-        let unlisted = Warning::unlisted_peaks(recording.name(), &spectra.unlisted, band);
+        let unlisted = Warning::unlisted_peaks(
+            recording.name(),
+            &spectra.unlisted,
+            band,
+            spectra.fitted.is_some(),
+        );
         measurement.warnings.extend(unlisted);
     }
     Ok(RecordingResult {

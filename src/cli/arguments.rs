@@ -121,7 +121,7 @@ pub(super) struct RecordingArguments {
     /// frequency, samples, time, rate, points
     #[arg(long, value_name = "ROLE=NAME", value_parser = variable)]
     pub(super) variable: Vec<(VariableRole, String)>,
-    /// Taps that drove a channel to its limit: reject them, or keep their decays from where they are whole;
+    /// Taps that drove a channel to its limit: reject them, or keep the decay after the last clipped sample;
     /// default: reject
     #[arg(long, value_name = "WHAT", value_parser = overload())]
     pub(super) overload: Option<bool>,
@@ -483,7 +483,10 @@ fn time_unit() -> impl TypedValueParser<Value = f64> {
 fn overload() -> impl TypedValueParser<Value = bool> {
     words(
         OVERLOADS,
-        ["Reject them", "Use their decays from where they are whole"],
+        [
+            "Reject them",
+            "Use their decay after the last clipped sample",
+        ],
     )
 }
 

@@ -221,7 +221,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         match render_frf_picture(recording, frfs, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
-                "{}: no tap was accepted whole, so there is no function to draw",
+                "{}: no function to draw: no tap was accepted, or each was overloaded",
                 recording.file
             )),
         }
@@ -230,7 +230,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
     for (file, format) in outputs {
         match format {
             _ if all.is_empty() => {
-                terminal.warn("no tap was accepted whole, so there is no function to write");
+                terminal.warn("no function to write: no tap was accepted, or each was overloaded");
             }
             None => file.write(render_frf_csv(&all)?.as_bytes())?,
             Some(format) => file.write(&render_frf_uff(&all, format)?)?,

@@ -80,7 +80,7 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none
 # mass = [{ position = 0.423, mass = "15 g" }]   # known masses fastened for this recording, default: none
 # sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
-# overload = "keep"            # "reject" (default) taps that drove a channel to its limit | "keep" them from where the decay is whole
+# overload = "keep"            # "reject" (default) taps that drove a channel to its limit | "keep" the decay after the last clipped sample
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none
@@ -240,8 +240,8 @@ pub fn template_of(kind: Assembly, files: &[FoundRecording]) -> String {
     format!("{head}\n{instruments}{tables}{tail}")
 }
 
-/// Returns one commented table for all files together, where they hold a tap each of one set-up: their names differ in
-/// digits alone, and they have the same channels and rate.
+/// Returns one commented table for all files together, where each holds one tap and all may be of one set-up. Then their
+/// names differ in digits alone, and they have the same channels and rate.
 fn one_set_up(files: &[FoundRecording]) -> String {
     let alike = |one: &FoundRecording, other: &FoundRecording| {
         let (
@@ -273,7 +273,7 @@ fn one_set_up(files: &[FoundRecording]) -> String {
     let names = files.iter().map(|found| found.file.as_str().into());
     let names = toml::Value::Array(names.collect());
     format!(
-        "#   The files hold one tap each. If all are of one set-up, write instead of the tables above:\n# [[recording]]\n# files = {names}\n\n"
+        "#   The files hold one tap each. If all are of one set-up, write this instead of the tables above:\n# [[recording]]\n# files = {names}\n\n"
     )
 }
 

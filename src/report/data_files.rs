@@ -17,7 +17,7 @@ const PARAMETERS: &str =
 const MODES: &str = "mode,label,recording,method,frequency_Hz,std_Hz,line_frequency_Hz,half_line_Hz,\
      interpolated_frequency_Hz,interpolated_bound_Hz,damping,damping_std,lambda,coherence,random_error";
 /// Heads of `taps.csv`.
-const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fall_10_dB_Hz,fall_20_dB_Hz,usable_to_Hz";
+const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fall_10_dB_Hz,fall_20_dB_Hz,usable_to_Hz,file";
 /// Heads of `perturbation.csv`. `kind` names the change of the frequencies. `percent` is its size where all
 /// were changed alike, and `mode` the mode that was changed alone. `statistic` says how `kx`, `ky` and `kz`
 /// (values without unit, or percent) follow from the estimates.
@@ -127,7 +127,7 @@ pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
     for recording in document.recordings.iter().flatten() {
         for (index, tap) in recording.taps.iter().enumerate() {
             rows.push(vec![
-                tap.file.clone().unwrap_or_else(|| recording.file.clone()),
+                recording.file.clone(),
                 (index + 1).to_string(),
                 number(Some(tap.time)),
                 number(tap.peak_force.or(tap.peak_response)),
@@ -138,6 +138,7 @@ pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
                 number(tap.pulse.and_then(|pulse| pulse.fall_10_db)),
                 number(tap.pulse.and_then(|pulse| pulse.fall_20_db)),
                 number(tap.pulse.map(|pulse| pulse.usable_to)),
+                tap.file.clone().unwrap_or_else(|| recording.file.clone()),
             ]);
         }
     }

@@ -35,6 +35,11 @@ fn cut(folder: &Path, name: &str) -> Vec<String> {
     names
 }
 
+/// Copies the other recording of the described test.
+fn copy_high(folder: &Path) {
+    fs::copy(Path::new(FOLDER).join("high.wav"), folder.join("high.wav")).unwrap();
+}
+
 /// The description of the recordings with `files` for one of its files.
 fn described(lists: &[(&str, Vec<String>)]) -> String {
     let mut text = fs::read_to_string(Path::new(FOLDER).join("test.toml")).unwrap();
@@ -121,11 +126,7 @@ fn regress_a_file_without_a_tap_is_a_doubt_and_not_the_end() {
     write_wav(&path, first.sample_rate() as u32, &quiet, WavFormat::Pcm24).unwrap();
     low.insert(1, "quiet.wav".to_owned());
     cut(folder.path(), "high");
-    fs::copy(
-        Path::new(FOLDER).join("high.wav"),
-        folder.path().join("high.wav"),
-    )
-    .unwrap();
+    copy_high(folder.path());
     let found = analyse(&described(&[("low", low)]), folder.path()).unwrap();
     let texts: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
     assert!(
@@ -139,11 +140,7 @@ fn regress_a_file_without_a_tap_is_a_doubt_and_not_the_end() {
 fn limit_wrong_lists_of_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let low = cut(folder.path(), "low");
-    fs::copy(
-        Path::new(FOLDER).join("high.wav"),
-        folder.path().join("high.wav"),
-    )
-    .unwrap();
+    copy_high(folder.path());
     let samples = vec![vec![0.0, 0.5, 0.0]; 3];
     let other = folder.path().join("other.wav");
     write_wav(&other, 4321, &samples, WavFormat::Pcm24).unwrap();
@@ -188,11 +185,7 @@ fn limit_wrong_lists_of_files_are_named() {
 fn regress_no_file_of_a_list_is_overwritten_and_init_proposes_the_list() {
     let folder = tempfile::tempdir().unwrap();
     let low = cut(folder.path(), "low");
-    fs::copy(
-        Path::new(FOLDER).join("high.wav"),
-        folder.path().join("high.wav"),
-    )
-    .unwrap();
+    copy_high(folder.path());
     let text = described(&[("low", low.clone())]);
     fs::write(folder.path().join("test.toml"), text).unwrap();
     let before = fs::read(folder.path().join(&low[1])).unwrap();

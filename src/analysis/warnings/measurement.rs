@@ -107,13 +107,12 @@ impl Warning {
         let mut named = Vec::new();
         let (mut count, mut fundamental) = (0, 0.0);
         for reading in readings {
-            let Some(label @ PeakLabel::Combination { of, .. }) = reading.label else {
+            let Some(PeakLabel::Combination(sum)) = reading.label else {
                 continue;
             };
             count += 1;
-            fundamental = of;
+            fundamental = sum.of;
             if count <= MOST_NAMED {
-                let sum = label.to_string().replace("combination ", "");
                 named.push(format!("{:.1} = {sum}", reading.frequency));
             }
         }
@@ -123,8 +122,8 @@ impl Warning {
         }
         let text = format!(
             "{count} peaks lie at sums and differences of stronger ones and the mode at {fundamental:.1} Hz ({}); a joint \
-             that slips or a contact that opens and closes makes such combinations while that mode rings; they are listed \
-             with this label and are not counted as modes; softer taps make them weaker",
+             that slips makes such combinations while that mode rings, and so does a contact that opens and closes; they \
+             are listed with this label and are no modes; softer taps make them weaker",
             named.join(", ")
         );
         (count > 0).then(|| Warning {
@@ -133,11 +132,13 @@ impl Warning {
         })
     }
 
-    /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none. `band` was analysed (Hz).
+    /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none. `band` was analysed (Hz);
+    /// `has_curves` says that charts show curves of the fitted modes.
     pub(crate) fn unlisted_peaks(
         file: &str,
         peaks: &[UnlistedPeak],
         band: (f64, f64),
+        has_curves: bool,
     ) -> Option<Self> {
         let strongest = peaks.first()?;
         let named = |peak: &UnlistedPeak| {
@@ -168,9 +169,11 @@ impl Warning {
         } else {
             "measure at other points, or longer".to_owned()
         };
-        let text = format!(
-            "{what}; {advice}, and see in the chart whether the fitted curve follows the measured one"
-        );
+        let look = match has_curves {
+            true => ", and see in the chart whether the fitted curve follows the measured one",
+            false => "",
+        };
+        let text = format!("{what}; {advice}{look}");
         Some(Warning {
             shared: Some("unlisted"),
             severity: strongest.above_noise_db,
@@ -285,7 +288,7 @@ const MOST_PEAKS: usize = 5;
 /// Band about a peak to be zoomed into: this share of its frequency to either side.
 const ABOUT_PEAK: f64 = 0.1;
 
-/// Returns a frequency with four significant digits at least: "27.13", "544.2", "1032".
+/// Returns a frequency in words: "27.13", "544.2", "1032".
 fn frequency_words(frequency: f64) -> String {
     let decimals = match frequency {
         f if f < 100.0 => 2,
@@ -568,7 +571,7 @@ mod tests {
             });
             peaks.take(count).collect()
         };
-        let of = |file, count| Warning::unlisted_peaks(file, &peaks(count), (0.0, 2000.0));
+        let of = |file, count| Warning::unlisted_peaks(file, &peaks(count), (0.0, 2000.0), true);
         assert_eq!(of("a.uff", 0), None);
         let text = |count| of("a.uff", count).unwrap().to_string();
         assert_eq!(
@@ -584,10 +587,10 @@ mod tests {
             text(7)
         );
         // Where the band is narrow already, there is nothing to zoom.
-        let zoomed = Warning::unlisted_peaks("a.uff", &peaks(1), (490.0, 599.0)).unwrap();
+        let zoomed = Warning::unlisted_peaks("a.uff", &peaks(1), (490.0, 599.0), false).unwrap();
         let text = zoomed.to_string();
         assert!(
-            text.contains("no listed mode; measure at other points"),
+            text.ends_with("no listed mode; measure at other points, or longer"),
             "{text}"
         );
         let all = ["b.uff", "a.uff"].map(|file| of(file, 1).unwrap());

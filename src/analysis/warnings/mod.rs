@@ -11,7 +11,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 67] = [
+pub const WARNING_CODES: [(&str, &str); 68] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -82,6 +82,10 @@ pub const WARNING_CODES: [(&str, &str); 67] = [
         "samples are repeated inside the moving signal",
     ),
     ("offset", "the mean of a channel is large beside its peak"),
+    (
+        "header-length",
+        "a file holds more samples than its header states",
+    ),
     (
         "hammer-channel",
         "by its name a response may be the hammer's channel",

@@ -27,8 +27,8 @@ const PAST_HIGHEST: f64 = 1.25;
 const MOST_SHOWN_PART: f64 = 0.6;
 /// Opacity of curves of other estimators.
 const FAINT: f64 = 0.4;
-/// Width of a measured curve under that of the fitted modes, and of the latter (pixels): dark and thin over thick and
-/// coloured, so that both are seen where they agree.
+/// Widths (pixels) of a measured curve and of the curve of the fitted modes over it. A thin dark line over a thick coloured
+/// one: both are seen where they agree.
 const UNDER: f64 = 3.4;
 const OVER: f64 = 1.0;
 /// Most close-ups in one row; more would be too narrow to read.

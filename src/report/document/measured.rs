@@ -205,7 +205,11 @@ impl RecordingSection {
             peak_force: recording.has_hammer.then_some(tap.peak),
             peak_response: (!recording.has_hammer).then_some(tap.peak),
             accepted: tap.accepted(),
-            reason: tap.rejection.as_ref().map(ToString::to_string),
+            reason: match (&tap.rejection, &tap.overload) {
+                (Some(rejection), _) => Some(rejection.to_string()),
+                (None, Some(overload)) => Some(format!("decay only: {overload}")),
+                (None, None) => None,
+            },
             pulse: tap.pulse,
         });
         let gate = spectra.and_then(|spectra| spectra.force_window);
@@ -372,7 +376,7 @@ pub struct ModeSection {
     pub above_noise_db: Option<f64>,
     /// The recording it was read from.
     pub recording: Option<String>,
-    /// Name of a peak that is no mode: "mains 50 Hz".
+    /// Name of a peak that is no mode: "mains 50 Hz", or the sum that a nonlinear joint makes, "845.7 + 80.5 Hz".
     pub label: Option<String>,
     /// True for a peak that no resonance explains.
     #[serde(skip)]
@@ -497,7 +501,7 @@ impl ModeSection {
             recording: None,
             label: reading.label.map(|label| label.to_string()),
             is_unclear,
-            is_combination: matches!(reading.label, Some(PeakLabel::Combination { .. })),
+            is_combination: matches!(reading.label, Some(PeakLabel::Combination(_))),
         }
     }
 }

@@ -221,11 +221,9 @@ pub(crate) fn listed(modes: &[usize]) -> String {
 
 /// "4", "mains 50 Hz" or "845.7 + 80.5 Hz", from a resonance's number and its label.
 fn mode_name(number: Option<usize>, label: Option<&str>) -> String {
-    match (number, label) {
-        (Some(number), _) => number.to_string(),
-        // The sum says what it is, and fits into the column.
-        (None, Some(label)) => label.trim_start_matches("combination ").to_owned(),
-        (None, None) => UNPAIRED.to_owned(),
+    match number {
+        Some(number) => number.to_string(),
+        None => label.unwrap_or(UNPAIRED).to_owned(),
     }
 }
 

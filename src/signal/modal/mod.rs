@@ -26,8 +26,9 @@ pub use peaks::{
     near_mains, noise_of_function,
 };
 pub use reading::{
-    BandReadings, FittedReading, Interpolation, MergedMode, ModeReading, NoInterpolation,
-    PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes, read_peaks,
+    BandReadings, Combination, FittedReading, Interpolation, MergedMode, ModeReading,
+    NoInterpolation, PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes,
+    read_peaks,
 };
 
 use nalgebra::allocator::Allocator;

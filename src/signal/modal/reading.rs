@@ -131,9 +131,9 @@ impl ModeReading {
             // On a line the truth lies anywhere within the bound.
             None => {
                 self.source = ReadBy::Line;
-                // Over the flat top of a resonance wider than a line, noise decides which line is the highest, and
-                // the peak of an accelerance lies zeta^2 f higher: both remain within half of the half-power width.
-                // The line nearest to a pole is as good as that pole.
+                // Over the flat top of a resonance wider than a line, noise decides which line is the highest. The
+                // peak of an accelerance lies zeta^2 f higher. Both remain within half of the half-power width. The
+                // line nearest to a pole is as good as that pole.
                 let half_width = self.damping_ratio.unwrap_or(0.0) * self.line_frequency;
                 let mut bound = self.line_bound;
                 if half_width > self.half_line {
@@ -177,15 +177,8 @@ pub enum PeakLabel {
     Mains(f64),
     /// The force has a gap there, and the quotient a peak.
     ForceGap,
-    /// A nonlinear joint makes it at the sum of a stronger line and `times` another mode's frequency.
-    Combination {
-        /// The stronger line (Hz).
-        line: f64,
-        /// 1 or 2; negative for a difference.
-        times: i32,
-        /// Frequency of the other mode (Hz).
-        of: f64,
-    },
+    /// A nonlinear joint makes it of two others.
+    Combination(Combination),
     /// No decaying oscillation explains it: speckle of noise or reverberation.
     NoResonance,
 }
@@ -195,16 +188,31 @@ impl fmt::Display for PeakLabel {
         match self {
             PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
             PeakLabel::ForceGap => f.write_str("gap of the force"),
-            PeakLabel::Combination { line, times, of } => {
-                let sign = if *times < 0 { '\u{2212}' } else { '+' };
-                let number = match times.abs() {
-                    1 => String::new(),
-                    times => format!("{times} \u{d7} "),
-                };
-                write!(f, "combination {line:.1} {sign} {number}{of:.1} Hz")
-            }
+            PeakLabel::Combination(sum) => sum.fmt(f),
             PeakLabel::NoResonance => f.write_str("no clear resonance"),
         }
+    }
+}
+
+/// A frequency that is the sum of a stronger line and a multiple of a mode's frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Combination {
+    /// The stronger line (Hz).
+    pub line: f64,
+    /// Multiple of the mode's frequency: 1 or 2, negative for a difference.
+    pub times: i32,
+    /// The mode (Hz).
+    pub of: f64,
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.times < 0 { '\u{2212}' } else { '+' };
+        let number = match self.times.abs() {
+            1 => String::new(),
+            times => format!("{times} \u{d7} "),
+        };
+        write!(f, "{:.1} {sign} {number}{:.1} Hz", self.line, self.of)
     }
 }
 

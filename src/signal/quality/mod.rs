@@ -60,6 +60,13 @@ pub struct TapEvidence {
     pub rejection: Option<Rejection>,
 }
 
+impl TapEvidence {
+    /// Returns false where its peak was cut off.
+    fn has_peak(&self) -> bool {
+        self.overload.is_none_or(|overload| !overload.is_force)
+    }
+}
+
 impl From<&Tap> for TapEvidence {
     fn from(tap: &Tap) -> Self {
         TapEvidence {
@@ -149,19 +156,22 @@ pub struct RecordingEvidence {
 }
 
 impl RecordingEvidence {
-    /// Number of taps averaged.
+    /// Number of taps averaged: with a hammer those that were not overloaded.
     pub fn averages(&self) -> usize {
-        self.accepted().count()
+        let taps = self.accepted();
+        taps.filter(|tap| self.force.is_none() || tap.overload.is_none())
+            .count()
     }
 
-    /// The taps averaged.
+    /// The taps that are used.
     fn accepted(&self) -> impl Iterator<Item = &TapEvidence> {
         self.taps.iter().filter(|tap| tap.rejection.is_none())
     }
 
-    /// Median peak of the accepted taps; `None` without any.
+    /// Median peak of the accepted taps whose peak is known; `None` without any.
     fn tap_level(&self) -> Option<f64> {
-        let mut peaks: Vec<f64> = self.accepted().map(|tap| tap.peak).collect();
+        let taps = self.accepted().filter(|tap| tap.has_peak());
+        let mut peaks: Vec<f64> = taps.map(|tap| tap.peak).collect();
         (!peaks.is_empty()).then(|| median(&mut peaks))
     }
 

@@ -10,7 +10,7 @@ use super::{
     TapEvidence, limits,
 };
 use crate::spectral::{Window, random_error};
-use crate::taps::{Overload, Rejection, SecondHit};
+use crate::taps::{Rejection, SecondHit};
 use tapjoint_numerics::stats::times;
 
 const NO_HAMMER: &str = "Not applicable without a hammer: a second hit cannot be told from two modes that beat in the responses.";
@@ -104,21 +104,20 @@ fn of_taps(
 pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_taps(recording, Check::Overload, 0.0, |tap, verdict| {
         match &tap.rejection {
-            Some(Rejection::Overload { channel, samples }) => verdict.found(
-                *samples as f64,
+            Some(Rejection::Overload(overload)) => verdict.found(
+                overload.samples as f64,
                 Outcome::Bad,
-                format!("Channel {channel} is at its limit for {samples} samples (limit 0)."),
+                format!("{} (limit 0).", overload.to_string().replacen('c', "C", 1)),
             ),
             // Other reasons are looked for first: what they reject was not searched for an overload.
             Some(_) => verdict.missing("Not applicable: rejected for another reason."),
             None => match tap.overload {
-                Some(Overload {
-                    channel, samples, ..
-                }) => verdict.found(
-                    samples as f64,
+                Some(overload) => verdict.found(
+                    overload.samples as f64,
                     Outcome::Doubtful,
                     format!(
-                        "Channel {channel} is at its limit for {samples} samples (limit 0); only the decay after them is used."
+                        "{} (limit 0); only the decay is used.",
+                        overload.to_string().replacen('c', "C", 1)
                     ),
                 ),
                 None => verdict.found(0.0, Outcome::Good, "No channel at its limit.".to_owned()),
@@ -143,13 +142,14 @@ pub(super) fn check_weak(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     })
 }
 
-/// Largest over smallest accepted peak.
+/// Largest over smallest accepted peak that was not cut off.
 pub(super) fn check_tap_levels(recording: &RecordingEvidence) -> QualityVerdict {
     let verdict = recording.verdict(Check::TapLevels, limits::TAP_LEVELS);
-    let peaks: Vec<f64> = recording.accepted().map(|tap| tap.peak).collect();
+    let taps = recording.accepted().filter(|tap| tap.has_peak());
+    let peaks: Vec<f64> = taps.map(|tap| tap.peak).collect();
     let smallest = peaks.iter().copied().fold(f64::INFINITY, f64::min);
     if peaks.len() < 2 || smallest <= 0.0 {
-        return verdict.missing("Not applicable: fewer than two accepted taps.");
+        return verdict.missing("Not applicable: fewer than two accepted taps with a known peak.");
     }
     let ratio = peaks.iter().copied().fold(0.0, f64::max) / smallest;
     let outcome = Outcome::doubtful_unless(ratio <= limits::TAP_LEVELS);

@@ -171,6 +171,22 @@ impl RecordingWarning {
         (present < promised).then(|| Self::new("truncated", message))
     }
 
+    /// A file of unknown length ends within a frame.
+    pub(super) fn ends_within_frame(present: u64) -> Self {
+        let message = format!(
+            "the file is truncated: it ends within a frame, after {present} samples per channel; the recorder or a copy was probably interrupted; what is there is used"
+        );
+        Self::new("truncated", message)
+    }
+
+    /// A file holds more samples than its header states.
+    pub(super) fn more_than_promised(present: u64, promised: u64) -> Self {
+        let message = format!(
+            "the header promises {promised} samples per channel, and {present} are there; all of them are used; the recorder was probably interrupted"
+        );
+        Self::new("header-length", message)
+    }
+
     /// Short and stable name of the kind of doubt, for reports.
     pub fn code(&self) -> &'static str {
         self.code

@@ -54,10 +54,19 @@ pub(super) fn open_flac(
     let mut meters = vec![HealthMeter::new(Some(full_scale)); info.channels];
     let mut buffer = Vec::new();
     let mut samples = Vec::new();
-    while info.promised == 0 || source.frames < info.promised {
+    let mut cut = false;
+    loop {
         let place = (source.frames, bytes.at);
-        let Some(block) = source.decode(&mut bytes, source.frames, buffer)? else {
-            break;
+        let block = match source.decode(&mut bytes, source.frames, buffer) {
+            Ok(Some(block)) => block,
+            // Between two frames nothing was read; within one the file was cut.
+            Ok(None) => {
+                cut = bytes.at > place.1;
+                break;
+            }
+            // Other data, such as tags, may follow the promised samples.
+            Err(_) if info.promised > 0 && source.frames >= info.promised => break,
+            Err(problem) => return Err(problem),
         };
         for (channel, meter) in (0..).zip(&mut meters) {
             samples.clear();
@@ -80,6 +89,15 @@ pub(super) fn open_flac(
     let mut warnings = Vec::new();
     warnings.extend(settings.ignored_rate(sample_rate));
     warnings.extend(RecordingWarning::truncated(source.frames, info.promised));
+    if cut && info.promised == 0 {
+        warnings.push(RecordingWarning::ends_within_frame(source.frames));
+    }
+    if info.promised > 0 && source.frames > info.promised {
+        warnings.push(RecordingWarning::more_than_promised(
+            source.frames,
+            info.promised,
+        ));
+    }
     let meters = meters.into_iter();
     Ok(Recording {
         name: source.file.clone(),
@@ -224,6 +242,14 @@ impl FlacSource {
                 return Err(damaged(problem));
             }
         };
+        // A frame has the number of its first sample, or its own where all but the last are equally long.
+        let duration = u64::from(block.duration());
+        let number = self.places.partition_point(|(before, _)| *before < first) as u64;
+        if block.time() != first && block.time() != number * duration {
+            return Err(damaged(
+                "frames are missing before the next one, or stand in another order",
+            ));
+        }
         let channels = self.info.channels;
         if block.channels() as usize != channels {
             let found = block.channels();

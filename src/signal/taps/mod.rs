@@ -128,6 +128,17 @@ pub struct Overload {
     pub samples: usize,
     /// Frame from which no response is cut off any more.
     pub whole_from: u64,
+    /// True where the force is cut off as well: its peak and its pulse are not known.
+    pub is_force: bool,
+}
+
+impl fmt::Display for Overload {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Overload {
+            channel, samples, ..
+        } = self;
+        write!(f, "channel {channel} is at its limit for {samples} samples")
+    }
 }
 
 impl Tap {
@@ -176,12 +187,7 @@ pub enum Rejection {
         limit: f64,
     },
     /// A channel was driven to its limit.
-    Overload {
-        /// Channel, 1-based.
-        channel: usize,
-        /// Samples at the limit.
-        samples: usize,
-    },
+    Overload(Overload),
     /// No sensor moved.
     NoResponse,
     /// Too weak beside the others.
@@ -221,12 +227,7 @@ impl fmt::Display for Rejection {
                 1e3 * delay,
                 100.0 * limit
             ),
-            Rejection::Overload { channel, samples } => {
-                write!(
-                    f,
-                    "overload: channel {channel} is at its limit for {samples} samples"
-                )
-            }
+            Rejection::Overload(overload) => write!(f, "overload: {overload}"),
             Rejection::NoResponse => f.write_str(
                 "no sensor answers it: the hammer was moved or laid down, or a disturbance",
             ),
@@ -298,17 +299,18 @@ impl fmt::Display for TapRemark {
             ),
             TapRemark::OverloadKept { count } => write!(
                 f,
-                "{count} tap(s) that drove a channel to its limit are used from where their decays are whole: they \
-                 give frequencies and damping, but enter no frequency response function; lower the gain or tap more \
-                 softly"
+                "{count} tap(s) drove a channel to its limit; their decays are used after the last sample that was cut off; \
+                 they give frequencies and damping, and enter no frequency response function; lower the gain or tap \
+                 more softly"
             ),
             TapRemark::FileWithoutTap { file } => {
                 write!(f, "{file}: no tap of this file is accepted; the other files are used")
             }
             TapRemark::AllOverloaded { count } => write!(
                 f,
-                "no tap is accepted, and {count} only for an overload; overload = \"keep\" in [[recording]], or \
-                 --overload keep, uses their decays from where they are whole; better lower the gain or tap more softly"
+                "no tap is accepted; {count} drove a channel to its limit; lower the gain or tap more softly; \
+                 overload = \"keep\" in [[recording]], or --overload keep, uses their decays after the last sample \
+                 that was cut off"
             ),
         }
     }
@@ -340,11 +342,9 @@ impl Taps {
         self.accepted().map(Tap::frames).min()
     }
 
-    /// The force pulse in the mean of the accepted taps that were not overloaded; `None` without a hammer or an accepted tap.
+    /// The force pulse in the mean of the accepted taps; `None` without a hammer, or where every pulse was cut off.
     pub fn mean_pulse(&self) -> Option<Pulse> {
-        let pulses: Vec<Pulse> = (self.accepted().filter(|tap| tap.is_whole()))
-            .filter_map(|tap| tap.pulse)
-            .collect();
+        let pulses: Vec<Pulse> = self.accepted().filter_map(|tap| tap.pulse).collect();
         Pulse::mean(&pulses)
     }
 }
@@ -416,7 +416,7 @@ pub fn find_taps(
     if settings.keep_overload {
         // One that is cut off to its end has no decay.
         for tap in taps.iter_mut().filter(|tap| tap.frames() > 0) {
-            if matches!(tap.rejection, Some(Rejection::Overload { .. })) {
+            if matches!(tap.rejection, Some(Rejection::Overload(_))) {
                 tap.rejection = None;
             }
         }
@@ -433,7 +433,7 @@ pub fn find_taps(
         }
         let name = Some(file.name());
         let mut own = taps.iter().filter(|tap| tap.file.as_deref() == name);
-        if joined && !own.any(Tap::accepted) {
+        if joined && taps.iter().any(Tap::accepted) && !own.any(Tap::accepted) {
             let file = file.name().to_owned();
             remarks.push(TapRemark::FileWithoutTap { file });
         }
@@ -532,7 +532,7 @@ fn tap(
         }),
         None => {
             overloaded = overload(recording, source, &record)?;
-            overloaded.map(Rejection::from)
+            overloaded.map(Rejection::Overload)
         }
     };
     Ok(Tap {
@@ -540,7 +540,7 @@ fn tap(
         time: event.trigger as f64 / rate,
         peak: event.peak,
         pulse_end,
-        pulse,
+        pulse: pulse.filter(|_| overloaded.is_none_or(|overload| !overload.is_force)),
         record,
         second_hit: second,
         overload: overloaded,
@@ -586,16 +586,8 @@ fn force_of(
     Ok(Some(force))
 }
 
-impl From<Overload> for Rejection {
-    fn from(found: Overload) -> Self {
-        Rejection::Overload {
-            channel: found.channel,
-            samples: found.samples,
-        }
-    }
-}
-
-/// Samples after the last one at a limit that are left out as well: an amplifier takes some to recover.
+/// Samples after the last one at a limit that are left out as well. 4: the filter ahead of a converter spreads what was
+/// cut off over its neighbours.
 const RECOVERY: u64 = 4;
 
 /// Samples of a record at a channel's rails, and where the last of any response is over; `None` without any.
@@ -628,11 +620,12 @@ fn overload(
             channel: channel + 1,
             samples: count,
             whole_from: record.start,
+            is_force: false,
         });
         // The clipped pulse of a hammer spoils no decay.
-        let is_force =
-            matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel);
-        if !is_force {
+        if matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel) {
+            overload.is_force = true;
+        } else {
             let whole_from = record.start + last as u64 + 1 + RECOVERY;
             overload.whole_from = overload.whole_from.max(whole_from);
         }
@@ -655,7 +648,7 @@ fn reject_short(taps: &mut [Tap], lasts: &[usize], rate: f64, wanted: Option<f64
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
         if tap.accepted() && available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if let Some(overload) = tap.overload {
-                overload.into()
+                Rejection::Overload(overload)
             } else if lasts.contains(&index) {
                 Rejection::CutOff { available, needed }
             } else {

@@ -16,7 +16,7 @@ use tapjoint::recording::Format;
 use tapjoint::report::document::*;
 use tapjoint::spectral::{AveragedSpectra, Lines, SpectralAverager, Window};
 use tapjoint::structure::{Assembly, BeamTheory};
-use tapjoint::taps::{Rejection, Tap, Taps};
+use tapjoint::taps::{Overload, Rejection, Tap, Taps};
 
 /// Frequencies of the five modes (Hz).
 pub const FREQUENCIES: [f64; 5] = [17.003, 118.04, 335.71, 628.9, 994.2];
@@ -471,10 +471,12 @@ fn measured_taps() -> Vec<Tap> {
         ratio: 0.31,
         limit: 0.1,
     });
-    taps[4].rejection = Some(Rejection::Overload {
+    taps[4].rejection = Some(Rejection::Overload(Overload {
         channel: 1,
         samples: 12,
-    });
+        whole_from: 0,
+        is_force: true,
+    }));
     taps
 }
 

@@ -488,8 +488,8 @@ pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) ->
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
-/// Most sweeps that test one more start. 4: after it all modes are fitted again, and the test asks for a mode far clearer
-/// than what further sweeps move.
+/// Most sweeps that test one more start. 4: further sweeps move the poles by about a standard deviation, and a mode that is
+/// needed stands far clearer. All modes are fitted again after the tests.
 const TEST_SWEEPS: usize = 4;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;

@@ -252,8 +252,8 @@ const LEAST_BAND_LINES: f64 = 120.0;
 /// background.
 const HALF_POWER_WIDTHS: f64 = 16.0;
 
-/// Most lines of a band between the peaks. 600: fifteen for each of the highest order, whose lags are then as long as a
-/// decay of a fifteenth of the block.
+/// Most lines of a band between the peaks. 600: fifteen for each order up to the highest. The longest lag is then a
+/// fifteenth of the block.
 const MOST_LINES_BETWEEN: f64 = 600.0;
 
 /// Largest ratio of the reaches of two peaks of functions in one band. 4: over a wider band the lags of the model order
@@ -325,8 +325,8 @@ pub fn sub_bands(matrix: &ResponseMatrix, peaks: BandPeaks) -> Vec<SubBand> {
     bands
 }
 
-/// Returns bands that cover what lies between the cores of `bands`, ascending: a mode there makes no peak, and over the
-/// whole band the lags of the model order are too short for its decay.
+/// Returns bands that cover what lies between the cores of `bands`, ascending. A mode there makes no peak. Over the whole
+/// band the lags of the model order are too short for its decay.
 fn bands_between(matrix: &ResponseMatrix, bands: &[SubBand]) -> Vec<SubBand> {
     let (low_end, high_end) = matrix.ends();
     let mut found = Vec::new();

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use tapjoint_signal::quality::*;
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::{DecayCheck, Lines, Window};
-use tapjoint_signal::taps::{Rejection, SecondHit};
+use tapjoint_signal::taps::{Overload, Rejection, SecondHit};
 
 const FREQUENCIES: [f64; 3] = [40.0, 110.0, 210.0];
 const DAMPING: f64 = 0.01;
@@ -204,12 +204,33 @@ fn val_second_hits_in_time_and_as_ripple() {
 }
 
 #[test]
+fn regress_averages_leave_out_overloaded_taps_where_there_is_a_force() {
+    let kept = Overload {
+        channel: 1,
+        samples: 3,
+        whole_from: 100,
+        is_force: true,
+    };
+    let all = changed(|_| {});
+    let one = changed(|r| r.taps[1].overload = Some(kept));
+    assert_eq!(one.averages(), all.averages() - 1);
+    let blind = changed(|r| {
+        r.taps[1].overload = Some(kept);
+        r.force = None;
+    });
+    assert_eq!(blind.averages(), all.averages());
+}
+
+#[test]
 fn val_overloaded_weak_and_uneven_taps() {
     let reject = |rejection| changed(|r| r.taps[1].rejection = Some(rejection));
-    let over = reject(Rejection::Overload {
+    let overload = Overload {
         channel: 2,
         samples: 7,
-    });
+        whole_from: 100,
+        is_force: false,
+    };
+    let over = reject(Rejection::Overload(overload));
     assert_doubt(
         &judged(&over, Check::Overload),
         Outcome::Bad,

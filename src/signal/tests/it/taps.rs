@@ -549,12 +549,9 @@ fn regress_overload_of_an_integer_file_rejects_its_tap_alone() {
         let taps = find_taps(&opened, &source, &TapSettings::default()).unwrap();
         let case = format!("{format:?}, channel {channel}");
         match only_rejected(&taps, 5, 3, &case) {
-            Rejection::Overload {
-                channel: named,
-                samples,
-            } => {
-                assert_eq!(*named, channel + 1, "{case}");
-                assert_eq!(*samples as u64, clipped, "{case}");
+            Rejection::Overload(overload) => {
+                assert_eq!(overload.channel, channel + 1, "{case}");
+                assert_eq!(overload.samples as u64, clipped, "{case}");
             }
             other => panic!("{case}: {other}"),
         }
@@ -600,7 +597,7 @@ fn regress_flat_tops_of_a_float_recording_are_an_overload() {
         let case = format!("channel {channel}");
         let rejection = only_rejected(&taps, 4, 1, &case);
         assert!(
-            matches!(rejection, Rejection::Overload { channel: named, samples } if *named == channel + 1 && *samples >= 3),
+            matches!(rejection, Rejection::Overload(found) if found.channel == channel + 1 && found.samples >= 3),
             "{case}: {rejection}"
         );
     }

@@ -137,6 +137,59 @@ fn regress_a_truncated_file_is_read_as_far_as_it_goes() {
     assert_eq!(samples, three()[0][..2880]);
 }
 
+/// [`THREE`] with so many samples promised; 0 says that the writer did not know.
+fn promising(samples: u32) -> Vec<u8> {
+    let mut bytes = THREE.to_vec();
+    bytes[21] &= 0xf0;
+    bytes[22..26].copy_from_slice(&samples.to_be_bytes());
+    bytes
+}
+
+/// Where a frame of [`THREE`] begins: a sync code, two bytes of its form, and its number.
+fn frame_at(number: u8) -> usize {
+    let mut places = THREE.windows(5);
+    let place = places.position(|bytes| bytes[..2] == [0xff, 0xf8] && bytes[4] == number);
+    place.expect("a frame")
+}
+
+#[test]
+fn regress_a_cut_file_of_unknown_length_says_so() {
+    let whole = promising(0);
+    let (_file, recording) = open(&whole);
+    assert!(recording.unwrap().warnings().is_empty());
+    let (_file, recording) = open(&whole[..whole.len() - 100]);
+    let recording = recording.unwrap();
+    assert_eq!(recording.frames(), 5 * 576);
+    let text = recording.warnings()[0].to_string();
+    assert!(text.contains("ends within a frame, after 2880"), "{text}");
+}
+
+#[test]
+fn regress_more_samples_than_promised_are_all_read() {
+    let (_file, recording) = open(&promising(576));
+    let recording = recording.unwrap();
+    assert_eq!(recording.read(0, 0..u64::MAX).unwrap(), three()[0]);
+    let text = recording.warnings()[0].to_string();
+    assert!(
+        text.contains("promises 576 samples per channel, and 3000"),
+        "{text}"
+    );
+    // A tag after the last promised sample is no frame.
+    let tagged = [THREE, b"TAG and text"].concat();
+    let (_file, recording) = open(&tagged);
+    assert!(recording.unwrap().warnings().is_empty());
+}
+
+#[test]
+fn regress_a_missing_frame_is_an_error_that_names_the_place() {
+    for promised in [0, 3000] {
+        let mut bytes = promising(promised);
+        bytes.drain(frame_at(2)..frame_at(3));
+        let parts = ["frames are missing", "from sample 1152"];
+        assert_message(&open_error(bytes), "tested.dat: ", &parts);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]

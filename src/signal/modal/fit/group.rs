@@ -488,9 +488,9 @@ pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) ->
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
-/// Most sweeps that test one more start. 4: further sweeps move the poles by about a standard deviation, and a mode that is
-/// needed stands far clearer. All modes are fitted again after the tests.
-const TEST_SWEEPS: usize = 4;
+/// Most sweeps that test one more start. 6: after as many the poles of a dozen damped modes move by about a standard
+/// deviation, and a mode that is needed stands far clearer. All modes are fitted again after the tests.
+const TEST_SWEEPS: usize = 6;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;
 /// Number of first sweeps over functions that fit amplitudes only and keep poles of known damping. 2: the second sweep

@@ -166,7 +166,7 @@ fn regress_a_cut_file_of_unknown_length_says_so() {
 
 #[test]
 fn regress_more_samples_than_promised_are_all_read() {
-    let (_file, recording) = open(&promising(576));
+    let (_file, recording) = open(promising(576));
     let recording = recording.unwrap();
     assert_eq!(recording.read(0, 0..u64::MAX).unwrap(), three()[0]);
     let text = recording.warnings()[0].to_string();

@@ -278,12 +278,12 @@ fn val_taps_csv() {
     let csv = render_taps_csv(&document).expect("the table is written");
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(
-        lines[1], "low.wav,1,0.31,41.2,N,true,,0.0006,1140,,1000",
+        lines[1], "low.wav,1,0.31,41.2,N,true,,0.0006,1140,,1000,low.wav",
         "every column has its head: {}",
         lines[0]
     );
-    assert_eq!(lines[0].split(',').count(), 11);
-    assert!(lines[2].ends_with(",,,"), "{}", lines[2]);
+    assert_eq!(lines[0].split(',').count(), 12);
+    assert!(lines[2].ends_with(",,,,low.wav"), "{}", lines[2]);
 }
 
 #[test]

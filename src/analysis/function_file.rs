@@ -11,7 +11,7 @@ use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::polyreference::BandPeaks;
 use tapjoint_signal::modal::{
-    CompositeLevel, PeakSettings, find_peaks, read_magnitude_peaks, read_peaks,
+    CompositeLevel, PeakSettings, find_peaks, read_magnitude_peaks, read_peaks, set_strengths,
 };
 use tapjoint_signal::recording::{Format, FrequencyResponses, ResponseForm};
 use tapjoint_signal::spectral::{
@@ -224,6 +224,7 @@ fn spectra_of_functions(
         reading.select_estimate(wanted);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    set_strengths(&mut readings, forms);
     MeasuredSpectra {
         averages: AveragedSpectra {
             h1: Some(values),

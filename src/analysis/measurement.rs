@@ -11,7 +11,7 @@ use tapjoint_signal::modal::amplitude::Decay;
 use tapjoint_signal::modal::fit::TapForce;
 use tapjoint_signal::modal::{
     CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
-    find_peaks, label_combinations, mains_harmonic, near_mains, read_peaks,
+    find_peaks, label_combinations, mains_harmonic, near_mains, read_peaks, set_strengths,
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
@@ -361,6 +361,7 @@ impl<'a> Stage<'a> {
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         label_combinations(&mut readings);
+        set_strengths(&mut readings, &self.settings.kinds);
         Ok(MeasuredSpectra {
             force_window: self.force_window(&readings, &averages, ungated.as_deref()),
             averages,

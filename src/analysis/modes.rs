@@ -9,12 +9,12 @@ use super::structure::{
     masses_in,
 };
 use super::warnings::Warning;
-use std::f64::consts::TAU;
+use std::collections::BTreeSet;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
 use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
-use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, PeakStrength, ShapeAt};
+use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, ShapeAt};
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
@@ -335,57 +335,53 @@ fn number_jointed(
         return Vec::new();
     };
     let unnumbered = apply_numbers(modes, &free, &pairing.chosen.numbers);
+    let placed = recordings
+        .iter()
+        .flat_map(|one| &one.conditions.sensor_positions);
+    let inverted: BTreeSet<String> = placed
+        .filter(|(_, place)| pairing.chosen.inverted.contains(place))
+        .map(|(name, _)| name.clone())
+        .collect();
     [
         Warning::unpaired(unnumbered),
         Warning::missing_modes(&pairing.chosen.missing),
         Warning::ambiguous_pairing(&pairing, &peaks),
+        Warning::inverted_sensors(&Vec::from_iter(inverted)),
     ]
     .into_iter()
     .flatten()
     .collect()
 }
 
-/// A peak with its shape and its strength in each recording.
+/// A peak with its shape and strength.
 fn measured_peak(
     index: usize,
     modes: &[ModeResult],
     recordings: &[&RecordingResult],
 ) -> MeasuredPeak {
     let mode = &modes[index];
-    let (mut shape, mut strengths) = (Vec::new(), Vec::new());
+    let (mut shape, mut strength) = (Vec::new(), None::<f64>);
     for (group, recording) in (1..).zip(recordings) {
         // The recording's own reading of the peak.
         let readings = recording.readings().iter();
         let near = readings.filter(|one| one.label.is_none() && is_within(one, mode, SAME_PEAK));
         let nearest = near.min_by(|a, b| distance(a, mode).total_cmp(&distance(b, mode)));
-        let Some(reading) = nearest else {
-            strengths.push(None);
-            continue;
-        };
+        let Some(reading) = nearest else { continue };
         shape.extend(shape_in(recording, reading, group));
         // Where the reading is nearer to another peak, it is the other peak's.
         let own = distance(reading, mode);
-        let of_another = modes.iter().any(|other| distance(reading, other) < own);
-        strengths.push((!of_another).then(|| PeakStrength {
-            energy: energy(reading),
-            level_db: reading.prominence_db.and(reading.above_noise_db),
-        }));
+        if !modes.iter().any(|other| distance(reading, other) < own) {
+            // The recording that shows the peak best.
+            let both = strength.iter().chain(&reading.strength).copied();
+            strength = both.reduce(f64::max);
+        }
     }
     MeasuredPeak {
         frequency: mode.frequency,
         std: mode.std,
         shape,
-        strengths,
+        strength,
     }
-}
-
-/// Energy of a fitted oscillation in all taps and sensors of its recording: the integral of
-/// (a e^{-zeta omega t})^2/2 is a^2/(4 zeta omega).
-fn energy(reading: &ModeReading) -> Option<f64> {
-    let mode = &reading.fit.as_deref()?.mode;
-    let squares: f64 = mode.amplitudes.iter().map(|a| a.value.norm_sqr()).sum();
-    let decay = TAU * mode.frequency.value * mode.damping_ratio.value;
-    (decay > 0.0 && squares > 0.0).then(|| squares / (4.0 * decay))
 }
 
 /// Shape of a reading's peak in its recording. Modal constants of all recordings share the hammer's unit; a

@@ -173,9 +173,12 @@ fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
     let numbered = recording.readings().iter().zip(&recording.mode_numbers);
     for (reading, _) in numbered.filter(|(_, number)| number.is_none()) {
         let label = match reading.label {
-            Some(PeakLabel::NoResonance | PeakLabel::ForceGap | PeakLabel::Combination(_)) => {
-                continue;
-            }
+            Some(
+                PeakLabel::NoResonance
+                | PeakLabel::Weak
+                | PeakLabel::ForceGap
+                | PeakLabel::Combination(_),
+            ) => continue,
             Some(label) => label.to_string(),
             None => UNPAIRED.to_owned(),
         };

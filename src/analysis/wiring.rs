@@ -105,11 +105,8 @@ fn measure_described(
     settings.taps.keep_overload = description.keep_overload;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
-    if wiring.hammer.is_some() {
-        // The hammer's force makes modal constants of the responses.
-        let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
-        settings.kinds = kinds.collect();
-    }
+    let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
+    settings.kinds = kinds.collect();
     let finished = finish(recording.renamed(file), settings, &wiring);
     let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(problem @ MeasureError::Spectral { .. }) => {

@@ -244,6 +244,20 @@ impl Warning {
         (!list.is_empty()).then(|| Warning::new("missing-mode", text))
     }
 
+    /// The warning about sensors whose signs are those of the model only if they are inverted.
+    pub(crate) fn inverted_sensors(names: &[String]) -> Option<Self> {
+        let subject = match names {
+            [] => return None,
+            [one] => format!("sensor {one} moves"),
+            several => format!("sensors {} move", several.join(", ")),
+        };
+        let text = format!(
+            "{subject} against the direction of the others in the modes' shapes: mounted the other way, or an inverted \
+             channel; the modes were numbered with the sign reversed; reverse the sign of its `scale` or `sensitivity`"
+        );
+        Some(Warning::new("inverted-sensor", text))
+    }
+
     /// The warning about the most probable other numbering, with the peaks that it numbers otherwise.
     pub(crate) fn ambiguous_pairing(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Self> {
         let other = pairing.others.first()?;

@@ -11,7 +11,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 68] = [
+pub const WARNING_CODES: [(&str, &str); 69] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -149,6 +149,10 @@ pub const WARNING_CODES: [(&str, &str); 68] = [
     (
         "ambiguous-pairing",
         "another numbering of the modes is nearly as probable",
+    ),
+    (
+        "inverted-sensor",
+        "a sensor moves against the model's direction in all modes",
     ),
     (
         "numbered-in-order",

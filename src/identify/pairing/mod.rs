@@ -11,16 +11,18 @@
 //!    that a single joint fits perfectly.
 //! 3. *Shape* (`joint`): measured shapes and signs against those of that joint; whether a mode left out
 //!    could have been seen at all.
-//! 4. *Strength*: of several poles that may be the same mode, a weak one has its price.
+//! 4. *Strength* (`strength`): a strong peak left over costs more than a weak one.
 //! 5. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
 //!    Where the plain one (peaks numbered in ascending order) is among them it stays.
 
 mod joint;
+mod strength;
 
 use super::frequency_fit::{FrequencyModel, JointedStructure, Parameter};
 use joint::{JointSearch, Place, View, is_clear};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use strength::{GRID_ODDS, Strengths};
 use tapjoint_beam::StructureError;
 
 /// A measured peak that may be a mode.
@@ -32,9 +34,9 @@ pub struct MeasuredPeak {
     pub std: Option<f64>,
     /// Values of its shape at the sensors; empty where places or amplitudes are unknown.
     pub shape: Vec<ShapeAt>,
-    /// Strength in each recording, in the same order for all peaks. `None` of a recording that did not show it; empty
-    /// where all strengths are unknown.
-    pub strengths: Vec<Option<PeakStrength>>,
+    /// Amplitude over that which a mode of its frequency could have (1): modal constant or velocity, over the strongest at
+    /// its frequency or above. `None` where unknown.
+    pub strength: Option<f64>,
 }
 
 /// A shape's value at one sensor.
@@ -94,6 +96,9 @@ pub struct Numbering {
     pub numbers: Vec<Option<usize>>,
     /// Modes below the highest numbered one that no peak is, and whether each could have been seen.
     pub missing: Vec<MissingMode>,
+    /// Places (m) of sensors whose signs are those of the model only if they are inverted: mounted against the direction
+    /// of the others, or with an inverted channel.
+    pub inverted: Vec<f64>,
     /// Probability of the best over its own (1 for the best).
     pub odds: f64,
 }
@@ -144,12 +149,12 @@ pub fn pair_modes(
     bare.springs.clear();
     let coarse = FrequencyModel::new(&bare, highest)?;
     let fine = FrequencyModel::new(structure, highest)?;
-    let neighbours = Neighbours::of(peaks);
-    let found = candidates(&JointSearch::new(&coarse, peaks, settings), &neighbours);
+    let strengths = Strengths(peaks);
+    let found = candidates(&JointSearch::new(&coarse, peaks, settings), &strengths);
     let search = JointSearch::new(&fine, peaks, settings);
     let mut numberings: Vec<Scored> = found
         .iter()
-        .map(|(assignment, start)| score(&search, assignment, &neighbours, *start))
+        .map(|(assignment, start)| score(&search, assignment, &strengths, *start))
         .collect();
     numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     // The plain numbering is taken where nothing beats it clearly. Numberings are comparable where the data do not
@@ -168,6 +173,7 @@ pub fn pair_modes(
         Numbering {
             numbers: Vec::new(),
             missing: Vec::new(),
+            inverted: Vec::new(),
             odds: 1.0,
         }
     } else {
@@ -190,14 +196,13 @@ struct Scored {
 /// Number of modes beyond that of peaks that are looked for.
 const MOST_MISSING: usize = 3;
 
-/// Price of a peak that is no mode: one in twenty is none, and it may lie anywhere over five e-folds of
-/// frequency.
-const EXTRA_COST: f64 = 3.0 + 1.6;
+/// Peaks nearer than this, relative, may be the same mode: twice what the model usually misses of a frequency.
+const NEAR: f64 = 0.03;
 
 fn score(
     search: &JointSearch<'_>,
     assignment: &Assignment,
-    neighbours: &Neighbours,
+    strengths: &Strengths<'_>,
     start: Place,
 ) -> Scored {
     let pairs = pairs(assignment);
@@ -208,7 +213,6 @@ fn score(
         .filter(|mode| pairs.iter().all(|pair| pair.1 != *mode))
         .map(|mode| view.missing(search, &fit, mode))
         .collect();
-    let extra = (assignment.len() - pairs.len()) as f64;
     // A mode that could be seen is missed once in ten times: a weak tap, a soft tip, a neighbour's flank.
     let unseen: f64 = missing
         .iter()
@@ -218,23 +222,25 @@ fn score(
             MissingCause::Unknown => 2.3,
         })
         .sum();
-    let weak = neighbours.cost(assignment);
     // Shapes may be compared without those of the weak peaks beside a stronger one that is left over and whose own
     // shape is lost in noise. The shape of the weaker one then speaks for neither.
     let mut shaped = pairs.clone();
-    shaped.retain(|pair| {
-        !neighbours.stronger[pair.0].iter().any(|&(other, _)| {
-            let shape = &search.peaks[other].shape;
-            assignment[other].is_none() && !shape.is_empty() && !is_clear(shape)
+    shaped.retain(|&(own, _)| {
+        !search.peaks.iter().enumerate().any(|(other, peak)| {
+            let is_near = (peak.frequency / search.peaks[own].frequency).ln().abs() <= NEAR;
+            let is_left_over = is_near && assignment[other].is_none();
+            let is_stronger = peak.strength > search.peaks[own].strength;
+            is_left_over && is_stronger && !peak.shape.is_empty() && !is_clear(&peak.shape)
         })
     });
-    let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
+    let by_data = fit.cost + strengths.cost(assignment) + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,
         by_data,
         numbering: Numbering {
             numbers: assignment.clone(),
             missing,
+            inverted: view.inverted(search, &shaped),
             odds: 1.0,
         },
     }
@@ -253,6 +259,8 @@ type Assignment = Vec<Option<usize>>;
 
 /// So many assignments are looked at closely.
 const FOLLOWED: usize = 16;
+/// Of so many the peaks beside a numbered one are tried in its place.
+const EXCHANGED: usize = 4;
 /// Usual relative distances of a match on the grid. Its places may miss a frequency by 19 %: with the
 /// first a match costs less than a peak and a mode left over up to 0.08 sqrt(2 (4.6 + 1.5 + ln 5)) = 31 %.
 /// The second is for places that happen to be nearer.
@@ -271,19 +279,17 @@ fn pairs(assignment: &Assignment) -> Vec<(usize, usize)> {
 
 /// The most likely assignments, each with the joint of the grid that suits it best; the plain one is
 /// always there.
-fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignment, Place)> {
+fn candidates(search: &JointSearch<'_>, strengths: &Strengths<'_>) -> Vec<(Assignment, Place)> {
     let peaks: Vec<f64> = search
         .peaks
         .iter()
         .map(|peak| peak.frequency.ln())
         .collect();
-    // A weak peak at its price, lest all places take a strong one's satellites; and without, lest a strong
-    // peak that is no mode hides the mode beside it. The closer look prices both alike.
-    let stronger = neighbours.stronger.iter();
-    let weak = stronger.map(|others| others.iter().map(|one| one.1).fold(0.0, f64::max));
-    let weak: Vec<f64> = weak.collect();
-    let mut prices = vec![vec![0.0; peaks.len()]];
-    prices.extend(weak.iter().any(|price| *price > 0.0).then_some(weak));
+    // The price of each peak left over.
+    let own: Vec<f64> = (0..peaks.len())
+        .map(|peak| strengths.leaving(peak))
+        .collect();
+    let prices = GRID_ODDS.map(|odds| own.iter().map(|price| odds + price).collect::<Vec<f64>>());
     let plain: Assignment = (1..=peaks.len()).map(Some).collect();
     let grid: Vec<(Place, Vec<f64>)> = search
         .grid()
@@ -292,12 +298,14 @@ fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignm
         .collect();
     let mut best: BTreeMap<Assignment, (f64, Place)> = BTreeMap::new();
     for (place, modes) in &grid {
-        let mut offers = Vec::with_capacity(2 * WIDTHS.len() + 1);
+        let mut offers = Vec::with_capacity(GRID_ODDS.len() * WIDTHS.len() + 1);
         for width in WIDTHS {
-            for weak in &prices {
-                let (assignment, cost) = align(search, &peaks, weak, modes, width);
-                let paid: f64 = pairs(&assignment).iter().map(|pair| weak[pair.0]).sum();
-                let cost = cost - paid + neighbours.cost(&assignment);
+            for prices in &prices {
+                let (assignment, cost) = align(search, &peaks, prices, modes, width);
+                let over = prices.iter().zip(&assignment);
+                let paid = over.filter(|(_, number)| number.is_none());
+                let paid: f64 = paid.map(|(price, _)| price).sum();
+                let cost = cost - paid + strengths.cost(&assignment);
                 offers.push((assignment, cost));
             }
         }
@@ -316,18 +324,47 @@ fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignm
         (a.0 != plain).cmp(&(b.0 != plain)).then(by_cost)
     });
     found.truncate(FOLLOWED);
-    found
-        .into_iter()
-        .map(|(assignment, (_, place))| (assignment, place))
-        .collect()
+    let mut followed: Vec<(Assignment, Place)> = Vec::with_capacity(2 * FOLLOWED);
+    for (assignment, (_, place)) in found {
+        followed.push((assignment, place));
+    }
+    // A place of the grid offers the nearer of two peaks about a mode alone. The other is looked at as well.
+    for index in 0..followed.len().min(EXCHANGED) {
+        let (assignment, place) = followed[index].clone();
+        for other in exchanged(&assignment, &peaks) {
+            if followed.iter().all(|one| one.0 != other) {
+                followed.push((other, place));
+            }
+        }
+    }
+    followed
+}
+
+/// Returns the assignments in which one number passes to a peak left over beside its own.
+fn exchanged(assignment: &Assignment, peaks: &[f64]) -> Vec<Assignment> {
+    let mut others = Vec::new();
+    for (own, _) in pairs(assignment) {
+        let below = (0..own)
+            .rev()
+            .take_while(|&peak| assignment[peak].is_none());
+        let above = (own + 1..peaks.len()).take_while(|&peak| assignment[peak].is_none());
+        for peak in below.chain(above) {
+            if (peaks[peak] - peaks[own]).abs() <= WIDTHS[0] {
+                let mut other = assignment.clone();
+                other.swap(own, peak);
+                others.push(other);
+            }
+        }
+    }
+    others
 }
 
 /// The cheapest assignment that keeps the order, by dynamic programming over peaks and modes (both as
-/// logarithms of frequency), weak peaks at their price. Modes above the highest peak are free.
+/// logarithms of frequency), peaks left over at these prices. Modes above the highest peak are free.
 fn align(
     search: &JointSearch<'_>,
     peaks: &[f64],
-    weak: &[f64],
+    prices: &[f64],
     modes: &[f64],
     width: f64,
 ) -> (Assignment, f64) {
@@ -347,12 +384,12 @@ fn align(
     let mut matched = vec![vec![0.0; m]; n];
     for (i, row) in matched.iter_mut().enumerate() {
         for (j, cost) in row.iter_mut().enumerate() {
-            *cost = 0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln() + weak[i];
+            *cost = 0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln();
         }
     }
     for i in 0..=n {
         for j in 0..=m {
-            let extra = (i > 0).then(|| cost[i - 1][j] + EXTRA_COST);
+            let extra = (i > 0).then(|| cost[i - 1][j] + prices[i - 1]);
             let missing = (j > 0).then(|| cost[i][j - 1] + unseen[j - 1]);
             let both = (i > 0 && j > 0).then(|| cost[i - 1][j - 1] + matched[i - 1][j - 1]);
             let ways = [extra, missing, both].into_iter().flatten();
@@ -377,85 +414,4 @@ fn align(
         }
     }
     (assignment, last[end])
-}
-
-// How strongly each peak was seen, and what it costs to take a weak one for a mode while a strong one
-// beside it is left over.
-//
-// A mode whose frequency changes while it rings is fitted by several poles, and some of them carry next
-// to nothing. All lie within the model's discrepancy of the mode, so that frequencies do not tell them
-// apart, and the shape of a weak pole is as good as any direction.
-
-/// Strength of a peak in one recording.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PeakStrength {
-    /// Energy of its fitted oscillation (a unit that all peaks of the recording share); `None` without
-    /// a fit.
-    pub energy: Option<f64>,
-    /// Height of its own peak over the noise (dB); `None` of a pole that makes no peak.
-    pub level_db: Option<f64>,
-}
-
-/// Peaks nearer than this, relative, may be the same mode: twice what the model usually misses of a
-/// frequency.
-const NEAR: f64 = 0.03;
-/// A pole without a peak of its own counts a tenth of its energy where the stronger one makes a peak: poles
-/// that only mend the line of another have large amplitudes that cancel.
-const NO_PEAK: f64 = 0.1;
-/// Largest price of one weak peak: a mode may be near its node at every tap and sensor while torsion
-/// beside it is seen well, once in a hundred times.
-const MOST: f64 = 4.6;
-
-/// For each peak its stronger neighbours, with the price of taking this one while that one is left over.
-struct Neighbours {
-    stronger: Vec<Vec<(usize, f64)>>,
-}
-
-impl Neighbours {
-    fn of(peaks: &[MeasuredPeak]) -> Self {
-        let mut stronger = vec![Vec::new(); peaks.len()];
-        for (index, own) in peaks.iter().enumerate() {
-            for (other, peak) in peaks.iter().enumerate() {
-                let is_near = (peak.frequency / own.frequency).ln().abs() <= NEAR;
-                if let Some(price) = price(own, peak).filter(|_| is_near && other != index) {
-                    stronger[index].push((other, price));
-                }
-            }
-        }
-        Neighbours { stronger }
-    }
-
-    /// Price of an assignment: of each numbered peak beside the strongest one left over.
-    fn cost(&self, numbers: &[Option<usize>]) -> f64 {
-        let numbered = numbers
-            .iter()
-            .zip(&self.stronger)
-            .filter(|one| one.0.is_some());
-        let prices = numbered.map(|(_, stronger)| {
-            let left_over = stronger.iter().filter(|one| numbers[one.0].is_none());
-            left_over.map(|one| one.1).fold(0.0, f64::max)
-        });
-        prices.sum()
-    }
-}
-
-/// ln of the ratio of two amplitudes in the recording that sees the weaker one best; `None` where no
-/// recording saw both, or it is not the weaker one.
-fn price(own: &MeasuredPeak, other: &MeasuredPeak) -> Option<f64> {
-    let mut prices = Vec::new();
-    for (own, other) in own.strengths.iter().zip(&other.strengths) {
-        let (Some(own), Some(other)) = (own, other) else {
-            continue;
-        };
-        if let Some((a, b)) = own.energy.zip(other.energy) {
-            let peakless = own.level_db.is_none() && other.level_db.is_some();
-            let a = if peakless { NO_PEAK * a } else { a };
-            prices.extend((a > 0.0 && b > 0.0).then(|| 0.5 * (b / a).ln()));
-        } else if let Some((a, b)) = own.level_db.zip(other.level_db) {
-            // 20 dB are a factor of ten in amplitude.
-            prices.push((b - a) / 20.0 * std::f64::consts::LN_10);
-        }
-    }
-    let least = prices.into_iter().reduce(f64::min)?;
-    (least > 0.0).then_some(least.min(MOST))
 }

@@ -420,8 +420,11 @@ pub(super) fn rules(recording: &RecordingResult, spectra: &MeasuredSpectra) -> V
     let read = spectra.readings.iter().zip(&recording.mode_numbers);
     // The tables leave out the same peaks.
     let known = read.filter(|(reading, _)| {
-        let is_noise =
-            reading.label == Some(PeakLabel::NoResonance) && !is_strong(reading.above_noise_db);
+        let is_noise = match reading.label {
+            Some(PeakLabel::Weak) => true,
+            Some(PeakLabel::NoResonance) => !is_strong(reading.above_noise_db),
+            _ => false,
+        };
         reading.frequency.is_finite() && !is_noise
     });
     let rules = known.map(|(reading, mode)| {

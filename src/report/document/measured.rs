@@ -381,6 +381,9 @@ pub struct ModeSection {
     /// True for a peak that no resonance explains.
     #[serde(skip)]
     pub is_unclear: bool,
+    /// True for a pole that makes no peak and is too weak for a mode.
+    #[serde(skip)]
+    pub is_weak: bool,
     /// True for a sum or difference of others.
     #[serde(skip)]
     pub is_combination: bool,
@@ -501,6 +504,7 @@ impl ModeSection {
             recording: None,
             label: reading.label.map(|label| label.to_string()),
             is_unclear,
+            is_weak: reading.label == Some(PeakLabel::Weak),
             is_combination: matches!(reading.label, Some(PeakLabel::Combination(_))),
         }
     }

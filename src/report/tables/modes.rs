@@ -19,19 +19,35 @@ const DAMPING_DIGITS: i32 = 4;
 
 /// Returns true for what tables show: resonances, and strong peaks that are none.
 fn is_shown(mode: &&ModeSection) -> bool {
-    !mode.is_unclear || is_strong(mode.above_noise_db)
+    !mode.is_weak && (!mode.is_unclear || is_strong(mode.above_noise_db))
 }
 
 /// "2 peaks without a clear resonance are left out; the JSON has them."; `None` where all are shown.
 pub fn left_out(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref().unwrap_or_default();
-    match modes.iter().filter(|mode| !is_shown(mode)).count() {
-        0 => None,
-        1 => Some("1 peak without a clear resonance is left out; the JSON has it.".to_owned()),
-        count => Some(format!(
-            "{count} peaks without a clear resonance are left out; the JSON has them."
-        )),
+    let weak = modes.iter().filter(|mode| mode.is_weak).count();
+    let unclear = modes.iter().filter(|mode| !is_shown(mode)).count() - weak;
+    let mut parts = Vec::new();
+    let kinds = [
+        (unclear, "without a clear resonance"),
+        (weak, "too weak for a mode"),
+    ];
+    for (count, kind) in kinds {
+        match count {
+            0 => {}
+            1 => parts.push(format!("1 peak {kind}")),
+            count => parts.push(format!("{count} peaks {kind}")),
+        }
     }
+    let (are, them) = match weak + unclear {
+        0 => return None,
+        1 => ("is", "it"),
+        _ => ("are", "them"),
+    };
+    Some(format!(
+        "{} {are} left out; the JSON has {them}.",
+        parts.join(" and ")
+    ))
 }
 
 /// One row for each resonance of the merged list, and for each strong peak that is none; `None` without any.

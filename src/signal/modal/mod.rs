@@ -17,6 +17,7 @@ mod magnitude;
 mod peaks;
 pub mod polyreference;
 mod reading;
+mod strength;
 pub mod synthesis;
 
 pub use combinations::label_combinations;
@@ -30,6 +31,7 @@ pub use reading::{
     NoInterpolation, PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes,
     read_peaks,
 };
+pub use strength::set_strengths;
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{ComplexField, DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};

@@ -48,6 +48,9 @@ pub struct ModeReading {
     pub prominence_db: Option<f64>,
     /// Height above the noise (dB), where known.
     pub above_noise_db: Option<f64>,
+    /// Amplitude over that of the strongest mode at its frequency or above (1, see [`super::set_strengths`]); `None` without
+    /// a fit.
+    pub strength: Option<f64>,
     /// Kind of a peak that is no mode of the structure.
     pub label: Option<PeakLabel>,
     /// The fit of the mode, where it succeeded.
@@ -98,6 +101,7 @@ impl ModeReading {
             damping_std: None,
             prominence_db: None,
             above_noise_db: None,
+            strength: None,
             label: None,
             fit: None,
         };
@@ -179,6 +183,8 @@ pub enum PeakLabel {
     ForceGap,
     /// A nonlinear joint makes it of two others.
     Combination(Combination),
+    /// A pole that makes no peak, and is too weak for a mode.
+    Weak,
     /// No decaying oscillation explains it: speckle of noise or reverberation.
     NoResonance,
 }
@@ -189,6 +195,7 @@ impl fmt::Display for PeakLabel {
             PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
             PeakLabel::ForceGap => f.write_str("gap of the force"),
             PeakLabel::Combination(sum) => sum.fmt(f),
+            PeakLabel::Weak => f.write_str("weak, no peak"),
             PeakLabel::NoResonance => f.write_str("no clear resonance"),
         }
     }

@@ -194,6 +194,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         recording: Some(file.into()),
         label: None,
         is_unclear: false,
+        is_weak: false,
         is_combination: false,
     }
 }

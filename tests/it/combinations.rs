@@ -15,12 +15,12 @@ const SECONDS: f64 = 6.0;
 const QUIET: f64 = 1.0;
 
 /// Frequency (Hz) at small amplitudes, damping ratio, amplitude of a mode.
-struct Mode {
-    frequency: f64,
-    damping_ratio: f64,
-    amplitude: f64,
+pub struct Mode {
+    pub frequency: f64,
+    pub damping_ratio: f64,
+    pub amplitude: f64,
     /// Share by which the frequency is lower at the beginning.
-    softening: f64,
+    pub softening: f64,
 }
 
 impl Mode {
@@ -34,7 +34,7 @@ impl Mode {
 }
 
 /// Readings of one tap on modes whose response the first one modulates: x (1 + m (x_1/A_1)^power), with noise 80 dB below.
-fn readings(modes: &[Mode], modulation: f64, power: i32, seed: u64) -> Vec<ModeReading> {
+pub fn readings(modes: &[Mode], modulation: f64, power: i32, seed: u64) -> Vec<ModeReading> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut samples = Vec::new();
     for index in 0..(RATE * (QUIET + SECONDS)) as usize {

@@ -47,6 +47,7 @@ mod simulate_motion;
 mod simulate_seen;
 mod simulate_test;
 mod specimen;
+mod strengths;
 mod structure;
 mod taps_double_hit;
 mod updated_model;

@@ -9,18 +9,20 @@
 //! 2. *Joint* (`joint`): for each candidate the joint whose frequencies are nearest, and how probable the frequencies
 //!    are over all joints (Laplace's approximation). An assignment that many joints fit is thus not beaten by one
 //!    that a single joint fits perfectly.
-//! 3. *Shape* (`joint`): measured shapes and signs against those of that joint; whether a mode left out
+//! 3. *Shape* (`shapes`): measured shapes and signs against those of that joint; whether a mode left out
 //!    could have been seen at all.
 //! 4. *Strength* (`strength`): a strong peak left over costs more than a weak one.
 //! 5. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
 //!    Where the plain one (peaks numbered in ascending order) is among them it stays.
 
 mod joint;
+mod shapes;
 mod strength;
 
 use super::frequency_fit::{FrequencyModel, JointedStructure, Parameter};
-use joint::{JointSearch, Place, View, is_clear};
+use joint::{JointSearch, Place};
 use rayon::prelude::*;
+use shapes::{View, is_clear};
 use std::collections::BTreeMap;
 use strength::{GRID_ODDS, Strengths};
 use tapjoint_beam::StructureError;
@@ -68,9 +70,9 @@ pub struct PairingSettings {
     pub common_factor: bool,
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
     pub bands: Vec<(f64, f64)>,
-    /// Error of the model in a frequency, relative: 1.5 %, what a beam's stated dimensions, its
-    /// sensor's place and two springs for a joint usually leave (1 % and less in published tests). The
-    /// tails are those of Student's t with 4 degrees of freedom: one mode may be off by 5 %.
+    /// Usual error of the model in a frequency, relative: 1.5 %, what a beam's stated dimensions, its sensor's place and
+    /// two springs for a joint leave (1 % and less in published tests). Its true size is unknown and common to all modes:
+    /// the errors have a multivariate t density with 2 degrees of freedom.
     pub discrepancy: f64,
     /// An assignment less probable than the best by this factor is out: 20.
     pub odds: f64,

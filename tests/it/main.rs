@@ -29,6 +29,7 @@ mod interval_coverage;
 mod joint_law;
 mod laboratory;
 mod modal_fit;
+mod moved_clamp;
 mod observations;
 mod pairing;
 mod pipeline;

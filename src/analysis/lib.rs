@@ -23,6 +23,7 @@ mod measurement;
 mod modes;
 mod observations;
 mod observed_mode;
+mod quiet;
 mod recording_result;
 mod results;
 mod structure;

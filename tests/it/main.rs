@@ -28,6 +28,7 @@ mod identify_perturbation;
 mod interval_coverage;
 mod joint_law;
 mod laboratory;
+mod mains;
 mod modal_fit;
 mod moved_clamp;
 mod observations;

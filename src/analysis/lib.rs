@@ -77,8 +77,8 @@ pub struct Analysis {
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
     pub recordings: Vec<RecordingResult>,
-    /// Difference of each recording from the first, "8.8 times its tap level", for which modes and estimate leave
-    /// it out; `None` where they do not.
+    /// Difference of each recording from the first, "8.8 times its tap level", for which the list of modes leaves
+    /// it out; `None` where it does not.
     pub aside: Vec<Option<String>>,
     /// Resonances of the reference configuration, ascending: the first recording and all others
     /// with its sensor positions and tap level.

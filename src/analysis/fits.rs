@@ -182,7 +182,10 @@ impl Candidates<'_> {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
         let (mut starts, mut peaks) = (Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
-            let own = self.take_nearest(&mut free, reading);
+            let own = match reading.label {
+                Some(PeakLabel::Mains(_)) => self.take_steady(&mut free, reading),
+                _ => self.take_nearest(&mut free, reading),
+            };
             match (reading.label, own) {
                 (None, None) => starts.push(PoleStart {
                     frequency: reading.frequency,
@@ -213,6 +216,23 @@ impl Candidates<'_> {
         });
         let (place, _) = near.min_by(|a, b| a.1.total_cmp(&b.1))?;
         free[place].take()
+    }
+
+    /// Takes the pole of the polyreference fit that stands for a mains line: one that does not decay. Hum may lie on top
+    /// of a mode, whose pole stays free.
+    fn take_steady<'m>(
+        &self,
+        free: &mut [Option<&'m PolyreferenceMode>],
+        reading: &ModeReading,
+    ) -> Option<&'m PolyreferenceMode> {
+        let line = 2.0 * self.lines.half_line();
+        let narrow = free.iter_mut().filter(|mode| {
+            mode.is_some_and(|mode| {
+                let width = mode.damping_ratio * mode.frequency;
+                width < STEADY_WIDTH * line && (mode.frequency - reading.frequency).abs() <= line
+            })
+        });
+        narrow.last()?.take()
     }
 
     /// Returns the reading of a fitted mode that makes no peak.
@@ -291,6 +311,9 @@ impl Candidates<'_> {
         reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
     }
 }
+
+/// Half the half-power width below which a pole does not decay (lines): 27 % over the length of the signal.
+const STEADY_WIDTH: f64 = 0.05;
 
 /// Half the half-power widths of two modes together (Hz).
 fn half_widths(fits: [&ModeFit; 2]) -> f64 {

@@ -1,13 +1,15 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::Analysis;
+use super::lengths::MovedLength;
 use super::results::{
     AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
     MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
     SensitivitySection, common_share,
 };
 use super::structure::{
-    StructureDetails, TestedStructure, frequencies_of, jointed, predicted_specimen,
+    StructureDetails, TestedStructure, estimator_of_lengths, frequencies_of, jointed,
+    predicted_specimen,
 };
 use super::warnings::{Warning, of_estimate, of_prediction};
 use schemars::JsonSchema;
@@ -31,7 +33,9 @@ pub struct IdentifySettings {
     pub method: EstimateMethod,
     /// Details of the structure beyond beam and joint; none.
     pub details: StructureDetails,
-    /// The first so many modes enter; `None` = all.
+    /// The beam at its other free lengths: its modes enter the main estimate; none.
+    pub lengths: Vec<MovedLength>,
+    /// The first so many modes of each length enter; `None` = all.
     pub fit_modes: Option<usize>,
     /// Relative standard uncertainty that a frequency read from recordings has beside that of its reading (1):
     /// [`FREQUENCY_FLOOR`]. Frequencies that a description states have the uncertainty that it states.
@@ -49,6 +53,7 @@ impl Default for IdentifySettings {
         IdentifySettings {
             method: EstimateMethod::Consistent,
             details: StructureDetails::default(),
+            lengths: Vec::new(),
             fit_modes: None,
             frequency_floor: FREQUENCY_FLOOR,
             perturbed: vec![EstimateMethod::Pairs, EstimateMethod::Consistent],
@@ -75,14 +80,17 @@ pub fn identify(
     settings: &IdentifySettings,
 ) -> (Identification, Vec<Warning>) {
     let measured = measured_modes(modes, settings.frequency_floor);
-    let used: Vec<MeasuredMode> = measured
-        .iter()
-        .copied()
-        .take(settings.fit_modes.unwrap_or(usize::MAX))
-        .collect();
+    let fit_modes = settings.fit_modes.unwrap_or(usize::MAX);
+    let used: Vec<MeasuredMode> = measured.iter().copied().take(fit_modes).collect();
+    let mut moved = Vec::with_capacity(settings.lengths.len());
+    for length in &settings.lengths {
+        let mut own = measured_modes(&length.modes, settings.frequency_floor);
+        own.truncate(fit_modes);
+        moved.push(length.clamp(&own));
+    }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
-        let found = super::structure::estimator(structure, &settings.details, &used);
+        let found = estimator_of_lengths(structure, &settings.details, &used, &moved);
         match found.and_then(|found| found.estimate().map(|estimate| (found, estimate))) {
             Ok((found, estimate)) => {
                 estimator = Some(found);
@@ -290,14 +298,17 @@ pub(super) fn perturbations(
         let random = settings.monte_carlo;
         let random =
             random.and_then(|(samples, seed)| estimator.monte_carlo(&near, samples, seed).ok());
-        let estimator = estimator.stiffnesses_near(&near);
+        // The frequencies of other free lengths stay as they are.
+        let all = estimator.frequencies();
+        let of_lengths = all.get(used.len()..).unwrap_or_default();
+        let stiffnesses = estimator.stiffnesses_near(&near);
         add(
             &mut found,
             EstimateMethod::Consistent,
             random,
             &frequencies,
             percents,
-            estimator,
+            |frequencies: &[f64]| stiffnesses(&[frequencies, of_lengths].concat()),
         );
     }
     found

@@ -18,10 +18,12 @@ mod frf;
 mod function_file;
 mod function_fits;
 mod identification;
+mod lengths;
 mod measurement;
 mod modes;
 mod observations;
 mod observed_mode;
+mod quiet;
 mod recording_result;
 mod results;
 mod structure;
@@ -36,10 +38,12 @@ pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, fr
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
+pub use lengths::MovedLength;
+use lengths::numbered;
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };
-use modes::{modes_of_bare, modes_of_test, set_aside};
+use modes::modes_of_bare;
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
 use recording_result::amplitude_changes;
@@ -73,12 +77,14 @@ pub struct Analysis {
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
     pub recordings: Vec<RecordingResult>,
-    /// Difference of each recording from the first, "8.8 times its tap level", for which modes and estimate leave
-    /// it out; `None` where they do not.
+    /// Difference of each recording from the first, "8.8 times its tap level", for which the list of modes leaves
+    /// it out; `None` where it does not.
     pub aside: Vec<Option<String>>,
     /// Resonances of the reference configuration, ascending: the first recording and all others
     /// with its sensor positions and tap level.
     pub modes: Vec<ModeResult>,
+    /// Resonances of the beam at its other free lengths, where the clamp was moved.
+    pub lengths: Vec<MovedLength>,
     /// The joint or the material by the modes; `None` for a bare recording.
     pub identification: Option<Identification>,
     /// Quality of the test: good practice, check by check.
@@ -109,33 +115,32 @@ pub fn run_test(
     for recording in &recordings {
         warnings.extend_from_slice(&recording.measurement.warnings);
     }
-    let mut aside = vec![None; recordings.len()];
-    let modes = if let Some(measured) = &test.measured {
-        modes_of_measured(measured, &structure)
-    } else {
-        aside = set_aside(test, &recordings);
-        let (modes, doubts) = modes_of_test(test, &mut recordings, &aside, &structure, &details);
-        warnings.extend(doubts);
-        modes
-    };
+    let mut found = numbered(test, &mut recordings, &structure, &details);
+    if let Some(measured) = &test.measured {
+        found.modes = modes_of_measured(measured, &structure);
+    }
+    warnings.extend(found.warnings);
     warnings.extend(of_amplitude(amplitude_changes(&recordings)));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
+        lengths: found.lengths,
         details,
         ..settings.clone()
     };
-    let (identification, doubts) = identify(&structure, &modes, &settings);
+    let (identification, doubts) = identify(&structure, &found.modes, &settings);
     let method = identification.method(&structure, settings.method);
-    warnings.extend(neglected_effects(test, &structure, method));
+    let described = test.of_length(None);
+    warnings.extend(neglected_effects(&described, &structure, method));
     warnings.extend(doubts);
     let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
         structure: Some(structure),
-        aside,
+        aside: found.aside,
         recordings,
-        modes,
+        modes: found.modes,
+        lengths: settings.lengths,
         identification: Some(identification),
         verdicts,
         warnings: together(warnings),
@@ -201,6 +206,7 @@ fn analysis_of(mut recording: RecordingResult) -> Analysis {
         verdicts,
         warnings: together(warnings),
         modes,
+        lengths: Vec::new(),
         identification: None,
         recordings: vec![recording],
     }

@@ -2,6 +2,7 @@
 
 use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation};
+use super::quiet::PreTriggerNoise;
 use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -10,15 +11,14 @@ use tapjoint_numerics::stats::{median, root_mean_square};
 use tapjoint_signal::modal::amplitude::Decay;
 use tapjoint_signal::modal::fit::TapForce;
 use tapjoint_signal::modal::{
-    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
-    find_peaks, label_combinations, mains_harmonic, near_mains, read_peaks, set_strengths,
+    CompositeLevel, GRIDS, GridFrequency, MainsSettings, ModeReading, PeakLabel, PeakSettings,
+    ReadBy, find_peaks, label_combinations, label_steady_lines, read_peaks, set_strengths,
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, RUNG_DOWN,
     SpectralAverager, SpectralError, Transformer, Window, apply_force_window, band_limited,
-    choose_window, exponential_to, largest_smooth_block, line_amplitude, measure_decay,
-    noise_beside, noise_power,
+    choose_window, exponential_to, largest_smooth_block, measure_decay,
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
 
@@ -301,10 +301,12 @@ impl<'a> Stage<'a> {
         let windows = self.averaged().filter_map(|tap| pulse_window(tap, rate));
         let energy: f64 = windows.map(PulseWindow::energy).sum();
         let count = self.averaged().count().max(1) as f64;
+        let mains = &self.settings.mains;
         Ok(PreTriggerNoise {
+            grids: GRIDS.map(|nominal| GridFrequency::read(nominal, &responses, rate, mains)),
             force: force.pop(),
             responses,
-            sample_rate: self.recording.sample_rate(),
+            sample_rate: rate,
             block: self.gate as usize,
             force_window: energy / count,
         })
@@ -359,6 +361,8 @@ impl<'a> Stage<'a> {
         for reading in &mut readings {
             reading.select_estimate(self.settings.reading);
         }
+        let mains = &self.settings.mains;
+        label_steady_lines(&mut readings, &quiet.grids, self.lines.duration, mains);
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         label_combinations(&mut readings);
         set_strengths(&mut readings, &self.settings.kinds);
@@ -516,14 +520,9 @@ impl<'a> Stage<'a> {
                 reading.label = Some(PeakLabel::ForceGap);
             }
             let mains = &self.settings.mains;
-            if let Some(label) = quiet.mains_label(peak.index, averages, window, mains) {
-                // A mains line keeps its line reading and loses what only a resonance has.
+            if let Some(harmonic) = quiet.mains_harmonic(peak.index, averages, window, mains) {
                 reading.line_frequency = self.lines.frequency(peak.index);
-                reading.between = None;
-                reading.damping_ratio = None;
-                reading.damping_std = None;
-                reading.label = Some(label);
-                reading.select_estimate(ReadBy::Line);
+                reading.make_mains(harmonic);
             }
         }
         readings
@@ -597,146 +596,6 @@ impl<'a> Stage<'a> {
                 .collect(),
         };
         Ok((decay, force))
-    }
-}
-
-/// Hum is looked for within this many half widths (zeta f) of a resonance plus this many lines: the band of its fit.
-const HUM_REACH: (f64, f64) = (10.0, 12.0);
-/// Most multiples of one mains frequency that are looked for near a resonance, the nearest ones. A damped one at 5 kHz has
-/// more.
-const MOST_HARMONICS: f64 = 40.0;
-/// Most samples before the taps in which hum is looked for: some seconds. Each harmonic passes over all of them.
-const MOST_QUIET: usize = 1 << 17;
-
-/// Samples of a quiet stretch, means taken out, and the block they are compared with.
-struct PreTriggerNoise {
-    /// Force, where there is a hammer.
-    force: Option<Vec<f64>>,
-    /// Responses.
-    responses: Vec<Vec<f64>>,
-    /// Sample rate (Hz).
-    sample_rate: f64,
-    /// Length of a block (samples).
-    block: usize,
-    /// Length of the force window (samples), its mean over the taps.
-    force_window: f64,
-}
-
-impl PreTriggerNoise {
-    /// Power that noise alone would leave in the averages, per response: of H1 where there is a
-    /// hammer, else of the response's transform. `None` where the stretch is too short to tell.
-    ///
-    /// The response's noise is averaged down by the taps, N_x/(n F^2); the force's counts in full,
-    /// |H|^2 N_f/F^2, for it biases H1 as well: where the hammer has no energy, H1 means nothing.
-    fn noise_powers(&self, averages: &AveragedSpectra, window: Window) -> Option<Vec<Vec<f64>>> {
-        let (_, energy) = self.window_sums(window);
-        let lines = &averages.lines;
-        let force_noise = match &self.force {
-            Some(force) => Some(noise_power(force.clone(), self.sample_rate, lines)?),
-            None => None,
-        };
-        let taps = averages.taps as f64;
-        self.responses
-            .iter()
-            .enumerate()
-            .map(|(response, samples)| {
-                let noise = noise_power(samples.clone(), self.sample_rate, lines)?;
-                let power = noise.iter().enumerate().map(|(line, noise)| {
-                    let (Some(force), Some(h1)) = (&averages.force, &averages.h1) else {
-                        return noise * energy;
-                    };
-                    let gain = h1[response].get(line).map_or(0.0, Complex64::norm_sqr);
-                    let of_force = force_noise.as_ref().map_or(0.0, |noise| noise[line]);
-                    let force_power = (force[line] * force[line]).max(f64::MIN_POSITIVE);
-                    (noise * energy / taps + gain * of_force * self.force_window) / force_power
-                });
-                Some(power.collect())
-            })
-            .collect()
-    }
-
-    /// Noise of the force channel in the transforms of its windowed pulses (N s), on
-    /// each line; `None` without a hammer, or where the stretch is too short to tell.
-    fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
-        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
-        for value in &mut noise {
-            *value = (*value * self.force_window).sqrt();
-        }
-        Some(noise)
-    }
-
-    /// The label of a peak on line `index` that is hum, judged on the response in which it is
-    /// strongest.
-    fn mains_label(
-        &self,
-        index: usize,
-        averages: &AveragedSpectra,
-        window: Window,
-        settings: &MainsSettings,
-    ) -> Option<PeakLabel> {
-        let lines = &averages.lines;
-        let frequency = lines.frequency(index);
-        near_mains(frequency, lines.half_line(), settings)?;
-        let shares = averages.responses.iter();
-        let shares = shares.map(|x| x[index] / x.iter().sum::<f64>()).enumerate();
-        let (strongest, _) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let (sum, _) = self.window_sums(window);
-        let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
-        let samples = self.responses.get(strongest)?;
-        let amplitudes = LineAmplitudes {
-            before: line_amplitude(samples, self.sample_rate, frequency)?,
-            within,
-            noise: noise_beside(samples, self.sample_rate, frequency)?,
-        };
-        mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
-    }
-
-    /// Returns the frequencies of mains hum near the readings (Hz): multiples of 50 and 60 Hz that any response shows
-    /// before the first tap.
-    ///
-    /// Under the peak of a resonance hum makes no peak of its own, and has no label. A fit without it would be wrong.
-    fn hum_beside(
-        &self,
-        readings: &[ModeReading],
-        lines: &Lines,
-        settings: &MainsSettings,
-    ) -> Vec<f64> {
-        let (mut labelled, mut found) = (Vec::new(), Vec::new());
-        for reading in readings {
-            if let Some(PeakLabel::Mains(harmonic)) = reading.label {
-                labelled.push(harmonic);
-                continue;
-            }
-            let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
-            let reach = HUM_REACH.0 * width + HUM_REACH.1 * 2.0 * lines.half_line();
-            for mains in [50.0, 60.0] {
-                let reach = reach.min(0.5 * MOST_HARMONICS * mains);
-                let first = ((reading.frequency - reach) / mains).ceil().max(1.0) as usize;
-                let last = ((reading.frequency + reach) / mains).floor().max(0.0) as usize;
-                found.extend((first..=last).map(|number| mains * number as f64));
-            }
-        }
-        found.sort_by(f64::total_cmp);
-        found.dedup();
-        found.retain(|&harmonic| {
-            self.responses.iter().any(|samples| {
-                let samples = &samples[samples.len().saturating_sub(MOST_QUIET)..];
-                let before = line_amplitude(samples, self.sample_rate, harmonic);
-                let noise = noise_beside(samples, self.sample_rate, harmonic);
-                (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)
-            })
-        });
-        found.extend(labelled);
-        found.sort_by(f64::total_cmp);
-        found.dedup();
-        found
-    }
-
-    /// Sum and sum of squares of the window over a block.
-    fn window_sums(&self, window: Window) -> (f64, f64) {
-        let mut weights = vec![1.0; self.block];
-        window.apply(&mut weights, self.sample_rate);
-        (weights.iter().sum(), weights.iter().map(|w| w * w).sum())
     }
 }
 

@@ -45,7 +45,10 @@ pub fn observations(analysis: &Analysis) -> Observations {
         });
         configurations.push(read_elsewhere(modes.collect()));
     } else if analysis.structure.is_some() {
-        for (index, recording) in analysis.recordings.iter().enumerate() {
+        // The model of the diagnosis is the beam of one length.
+        let recordings = analysis.recordings.iter().enumerate();
+        let described = recordings.filter(|(_, one)| one.conditions.free_length.is_none());
+        for (index, recording) in described {
             configurations.extend(of_recording(index, recording));
         }
     }

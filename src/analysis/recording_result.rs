@@ -49,6 +49,9 @@ pub struct RecordingResult {
 /// Circumstances of a recording that are carried to the outputs as described.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Conditions {
+    /// Free length of the beam (m) where the clamp was moved for this recording; left out where it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_length: Option<f64>,
     /// Position of the taps (m).
     pub tap: Option<f64>,
     /// Position of each sensor (m); that in this recording of a sensor that was moved.

@@ -9,7 +9,7 @@ use tapjoint_description::{
 use tapjoint_description::{described_beam, lap_layout};
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, JointedStructure,
-    LapLayout, Parameter, ResidualWeights,
+    LapLayout, MovedClamp, Parameter, ResidualWeights,
 };
 use tapjoint_identify::predict::compare;
 use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
@@ -104,7 +104,7 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
     let tolerance = &test.beam.tolerance;
     StructureDetails {
         lap: lap_layout(test),
-        masses: masses_in(test, test.recordings.first()),
+        masses: masses_in(test, test.reference_recording()),
         tolerances: BeamTolerances {
             length: tolerance.length.map(|std| std / beam.length),
             width: tolerance.width.map(|std| std / beam.width),
@@ -176,12 +176,15 @@ fn settings(
     structure: &TestedStructure,
     details: &StructureDetails,
     used: &[MeasuredMode],
+    moved: &[MovedClamp],
 ) -> ConsistentSettings {
     let fit = fitted(structure, details);
     let units = StiffnessUnits::of(&structure.beam);
     let known = &structure.known;
+    let of_lengths = moved.iter().flat_map(|moved| &moved.modes);
     let all_known = used
         .iter()
+        .chain(of_lengths)
         .all(|mode| mode.std.is_some_and(|std| std > 0.0));
     ConsistentSettings {
         held: Joint {
@@ -209,10 +212,21 @@ pub(super) fn estimator(
     details: &StructureDetails,
     used: &[MeasuredMode],
 ) -> Result<ConsistentEstimator, IdentifyError> {
+    estimator_of_lengths(structure, details, used, &[])
+}
+
+/// The estimator by least squares on the frequencies of these modes and on those of the beam where its clamp was
+/// moved.
+pub(super) fn estimator_of_lengths(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+    moved: &[MovedClamp],
+) -> Result<ConsistentEstimator, IdentifyError> {
     let jointed = jointed(structure, details);
-    let mut settings = settings(structure, details, used);
-    hold_cross_stiffness(structure, &jointed, used, &mut settings)?;
-    ConsistentEstimator::new(&jointed, used, &settings)
+    let mut settings = settings(structure, details, used, moved);
+    hold_cross_stiffness(structure, &jointed, used, moved, &mut settings)?;
+    ConsistentEstimator::of_lengths(&jointed, used, moved, &settings)
 }
 
 /// A known Ktr beside a fitted Kt or Kr: the estimator holds couplings, sqrt(Kt Kr)/Ktr, so that
@@ -221,6 +235,7 @@ fn hold_cross_stiffness(
     structure: &TestedStructure,
     jointed: &JointedStructure,
     used: &[MeasuredMode],
+    moved: &[MovedClamp],
     settings: &mut ConsistentSettings,
 ) -> Result<(), IdentifyError> {
     // Each round reduces the error by the coupling's small share in the frequencies.
@@ -237,7 +252,7 @@ fn hold_cross_stiffness(
     let mut held = 0.0f64;
     for _ in 0..ROUNDS {
         settings.held.coupling = held;
-        let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
+        let fit = ConsistentEstimator::of_lengths(jointed, used, moved, settings)?.fit();
         // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
         let kx = fit.point[Parameter::Kt as usize].exp() / units.kt;
         let ky = fit.point[Parameter::Kr as usize].exp() / units.kr;

@@ -181,6 +181,7 @@ fn conditions(test: &TestDescription, description: &RecordingDescription) -> Con
         }
     }
     Conditions {
+        free_length: description.length,
         tap: description.tap,
         sensor_positions: positions,
         sensor_masses: masses,

@@ -52,7 +52,7 @@ pub(super) const SENSOR: KnownTable = KnownTable::new(
 );
 pub(super) const RECORDING: KnownTable = KnownTable::new(
     "[[recording]]",
-    "file files tap level band block at mass sample_rate time_unit form values variables sensor overload torque temperature date",
+    "file files length tap level band block at mass sample_rate time_unit form values variables sensor overload torque temperature date",
 );
 pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "position mass");
 pub(super) const MEASURED: KnownTable =

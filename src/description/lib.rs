@@ -52,6 +52,35 @@ pub struct TestDescription {
     pub warnings: Vec<DescriptionError>,
 }
 
+impl TestDescription {
+    /// Returns the free lengths (m) of the recordings where the clamp was moved, in the order of the file.
+    pub fn moved_lengths(&self) -> Vec<f64> {
+        let mut lengths = Vec::new();
+        for length in self.recordings.iter().filter_map(|one| one.length) {
+            if !lengths.contains(&length) {
+                lengths.push(length);
+            }
+        }
+        lengths
+    }
+
+    /// Returns the test with the recordings of one free length (m); `None` is that of the beam. The beam has this
+    /// length.
+    #[must_use]
+    pub fn of_length(&self, length: Option<f64>) -> Self {
+        let mut own = self.clone();
+        own.beam.length = length.unwrap_or(self.beam.length);
+        own.recordings
+            .retain(|recording| recording.length == length);
+        own
+    }
+
+    /// Returns the first recording in which the clamp was not moved.
+    pub fn reference_recording(&self) -> Option<&RecordingDescription> {
+        self.recordings.iter().find(|one| one.length.is_none())
+    }
+}
+
 /// An effect of an updated model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectDescription {
@@ -235,6 +264,8 @@ pub struct RecordingDescription {
     pub more_files: Vec<PathBuf>,
     /// Line of the description that names the file.
     pub line: usize,
+    /// Free length (m) of the beam in this recording, where the clamp was moved; `None` where it is that of the beam.
+    pub length: Option<f64>,
     /// Position of the hammer's taps (m).
     pub tap: Option<f64>,
     /// Force of the taps, relative to the test's other recordings (1). The simulator follows it. The

@@ -1,7 +1,9 @@
 //! From text to [`TestDescription`]: the tables in their order, and the settings of the analysis.
 
 use super::reader::{DescriptionError, Entry, Limits, Source, Table};
-use super::recordings::{check_places, read_hammer, read_measured, read_recording, read_sensors};
+use super::recordings::{
+    check_lengths, check_places, read_hammer, read_measured, read_recording, read_sensors,
+};
 use super::structure::{read_beam, read_effect, read_joint};
 use super::{
     AnalysisDescription, Assembly, ChannelRef, FitParameter, JointDescription, JointModel,
@@ -46,10 +48,13 @@ impl TestDescription {
         let hammer_channel = hammer_table.and_then(|table| table.get("channel"));
         let sensor_tables = array_of_tables(&top, "sensor", "[[sensor]]", MOST_SENSORS)?;
         let sensors = read_sensors(&sensor_tables, hammer_channel.as_ref(), &beam)?;
-        let recordings = array_of_tables(&top, "recording", "[[recording]]", MOST_RECORDINGS)?
+        let recording_tables =
+            array_of_tables(&top, "recording", "[[recording]]", MOST_RECORDINGS)?;
+        let recordings = recording_tables
             .iter()
-            .map(|entry| read_recording(entry, &beam, &sensors))
+            .map(|entry| read_recording(entry, &beam, joint.kind, &sensors))
             .collect::<Result<Vec<_>, _>>()?;
+        check_lengths(&recording_tables, &recordings)?;
         check_places(&sensor_tables, &sensors, &recordings)?;
         let measured = top.optional("measured", |entry| {
             let measured = read_measured(&entry.table(&keys::MEASURED)?)?;

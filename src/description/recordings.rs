@@ -4,9 +4,9 @@
 use super::reader::{
     DescriptionError, Entry, Limits, Table, did_you_mean, number, quoted, with_unit,
 };
-use super::structure::along;
+use super::structure::{along, read_free_length};
 use super::{
-    BeamDescription, ChannelPlace, ChannelRef, FunctionForm, HammerDescription,
+    Assembly, BeamDescription, ChannelPlace, ChannelRef, FunctionForm, HammerDescription,
     MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm, Scale, SensorDescription,
     SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
@@ -296,10 +296,21 @@ const FASTENED_MASS: Limits = Limits::above(
 pub(super) fn read_recording(
     entry: &Entry<'_>,
     beam: &BeamDescription,
+    kind: Assembly,
     sensors: &[SensorDescription],
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
     let (named, mut files) = read_files(&table)?;
+    let length = table.optional("length", |entry| {
+        check_is_clamped(entry, kind)?;
+        read_free_length(entry)
+    })?;
+    let described = beam.length;
+    // The beam as this recording has it.
+    let beam = &BeamDescription {
+        length: length.unwrap_or(beam.length),
+        ..beam.clone()
+    };
     let position = along(beam.length);
     let mut at = BTreeMap::new();
     if let Some(entry) = table.get("at") {
@@ -308,6 +319,9 @@ pub(super) fn read_recording(
             check_sensor(name, &entry, sensors)?;
             at.insert(name.to_owned(), entry.within(Dimension::Length, &position)?);
         }
+    }
+    if let Some(entry) = table.get("length").filter(|_| length != Some(described)) {
+        check_places_at_length(&entry, beam.length, &at, sensors)?;
     }
     let masses: Option<Vec<_>> = table.optional("mass", |entry| {
         let wanted = "a list of tables, each under its own header [[recording.mass]],";
@@ -355,6 +369,7 @@ pub(super) fn read_recording(
         file: files.remove(0),
         more_files: files,
         line: named.line,
+        length: length.filter(|length| *length != described),
         tap: table.within("tap", Dimension::Length, &position)?,
         level: table.within("level", Dimension::Ratio, &LEVEL)?,
         band: table.optional("band", read_band)?,
@@ -374,6 +389,92 @@ pub(super) fn read_recording(
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
     })
+}
+
+/// Refuses a free length of a structure that no clamp holds.
+fn check_is_clamped(entry: &Entry<'_>, kind: Assembly) -> Result<(), DescriptionError> {
+    let problem = match kind {
+        Assembly::Cantilever => return Ok(()),
+        Assembly::Lap => {
+            "only a clamped beam gets another free length when its clamp is moved; describe a lap joint of other \
+             lengths as a test of its own, or remove `length`"
+        }
+        Assembly::Free => {
+            "only a clamped beam gets another free length when its clamp is moved; describe a free beam of another \
+             length as a test of its own, or remove `length`"
+        }
+    };
+    Err(entry.error(problem))
+}
+
+/// Looks at the sensors that a recording of another free length (m) does not place itself. `entry` is its `length`.
+fn check_places_at_length(
+    entry: &Entry<'_>,
+    length: f64,
+    at: &BTreeMap<String, f64>,
+    sensors: &[SensorDescription],
+) -> Result<(), DescriptionError> {
+    let mut unmoved = Vec::new();
+    for sensor in sensors {
+        let Some(position) = sensor.position else {
+            continue;
+        };
+        if sensor.kind == SensorKind::Sound || at.contains_key(&sensor.name) {
+            continue;
+        }
+        if position > length {
+            let (name, place) = (&sensor.name, with_unit(position, "m"));
+            return Err(entry.error(format!(
+                "sensor {name} at {place} is outside the beam of this recording, 0 to {}; give its distance from \
+                 the moved clamp: `at = {{ {name} = ... }}`",
+                with_unit(length, "m")
+            )));
+        }
+        unmoved.push(sensor.name.as_str());
+    }
+    if !unmoved.is_empty() {
+        entry.warn(format!(
+            "moves the clamp, and positions count from it; {} is taken where [[sensor]] has it: add `at` with its \
+             distance from the moved clamp",
+            quoted(&unmoved)
+        ));
+    }
+    Ok(())
+}
+
+/// Most free lengths of one test, that of the beam included.
+const MOST_LENGTHS: usize = 5;
+
+/// Refuses a test in which no recording has the length of the beam, and one with too many lengths.
+pub(super) fn check_lengths(
+    entries: &[Entry<'_>],
+    recordings: &[RecordingDescription],
+) -> Result<(), DescriptionError> {
+    let mut lengths: Vec<f64> = Vec::new();
+    for (entry, recording) in entries.iter().zip(recordings) {
+        let Some(length) = recording.length.filter(|length| !lengths.contains(length)) else {
+            continue;
+        };
+        lengths.push(length);
+        let table = entry.table(&keys::RECORDING)?;
+        let entry = table
+            .get("length")
+            .unwrap_or(table.need("file", "a file", "")?);
+        if recordings.iter().all(|one| one.length.is_some()) {
+            return Err(entry.error(
+                "no recording has the length of [beam], to which the estimate refers; write this length into [beam], \
+                 and `length` only where the clamp was moved",
+            ));
+        }
+        if lengths.len() >= MOST_LENGTHS {
+            return Err(entry.error(format!(
+                "this is free length {} of the test, that of [beam] included; allowed: up to {MOST_LENGTHS} lengths; \
+                 describe the others as a test of their own",
+                lengths.len() + 1
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Reads `file` or `files`: the entry that names them, and at least one file.

@@ -135,6 +135,11 @@ pub(super) fn read_beam(table: &Table<'_>) -> Result<BeamDescription, Descriptio
     Ok(beam)
 }
 
+/// Reads the free length (m) of the beam in a recording.
+pub(super) fn read_free_length(entry: &Entry<'_>) -> Result<f64, DescriptionError> {
+    read_property(entry, &LENGTH)
+}
+
 fn needed(table: &Table<'_>, property: &Property) -> Result<f64, DescriptionError> {
     let entry = table.need(property.key, property.wanted, property.example)?;
     read_property(&entry, property)

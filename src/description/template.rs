@@ -73,6 +73,7 @@ position = 0.338               # m
 [[recording]]                  # once for each file; the same file may be read in several bands
 file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .mat, seen from the folder of this file
 #   files = ["1.wav", "2.wav"] instead of file: one set-up in several files, a tap each or repeats
+#   length = "200 mm" where the clamp of a cantilever was moved for this recording: its free length; positions count from the clamp
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56

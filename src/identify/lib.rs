@@ -81,6 +81,17 @@ pub enum IdentifyError {
         /// Number of frequencies given.
         found: usize,
     },
+    /// More lengths of the beam than one fit takes.
+    #[error(
+        "the recordings have {found} free lengths, and one estimate takes up to {most}; leave out the recordings of \
+         some lengths"
+    )]
+    TooManyLengths {
+        /// Number of lengths given, that of the beam included.
+        found: usize,
+        /// Number of lengths allowed.
+        most: usize,
+    },
     /// Measured weights without an uncertainty to weigh by.
     #[error(
         "mode {mode} has no standard uncertainty to weigh it by; state half_line, std or scatter, \

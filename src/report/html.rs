@@ -182,6 +182,7 @@ fn model_sections<'a>(document: &Document) -> Vec<Section<'a>> {
                 tables::correlations(document),
                 tables::methods(document),
                 tables::prediction(document),
+                tables::lengths(document),
                 tables::pairs(document),
             ]),
             ..Section::default()

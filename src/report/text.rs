@@ -34,6 +34,7 @@ pub fn render_text(document: &Document) -> String {
         noted(tables::frfs(document)),
         estimate(document),
         plain(tables::prediction(document)),
+        noted(tables::lengths(document)),
         gap(document),
         joined([
             plain(tables::perturbation(document)),

@@ -212,6 +212,15 @@ pub enum SimulateError {
         "`resolution` is a bias of reading frequencies, which no recording contains; plant it in [measured]"
     )]
     Resolution,
+    /// An effect at a place on a beam whose clamp is moved.
+    #[error(
+        "`{id}` sits at a place on the beam, and a [[recording]] with `length` moves the clamp from which places count; \
+         leave the effect or the recordings with `length` out"
+    )]
+    PlaceOfLengths {
+        /// The effect.
+        id: &'static str,
+    },
     /// An effect that acts on sensors of unknown mass alone.
     #[error(
         "`sensor-mass` is the mass of sensors that the description does not state, and it states that of every sensor; \

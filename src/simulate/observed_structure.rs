@@ -161,7 +161,8 @@ pub(super) fn nominal_specimen(
     recording: &RecordingDescription,
     given: Option<JointStiffness>,
 ) -> Result<Specimen, SimulateError> {
-    let mut specimen = described_specimen(test, joint(test, given)?);
+    let own = test.of_length(recording.length);
+    let mut specimen = described_specimen(&own, joint(test, given)?);
     let sensors = sensor_places(test, recording)?.into_iter();
     let known = sensors.filter(|sensor| sensor.mass > 0.0);
     specimen.masses.extend(known);

@@ -96,7 +96,9 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
             recording.plan.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
         }
     }
-    let nominal = nominal_specimen(test, described[0].recording, plan.joint)?;
+    let first = test.reference_recording();
+    let first = first.unwrap_or(described[0].recording);
+    let nominal = nominal_specimen(test, first, plan.joint)?;
     let suspension = plan.laboratory.specimen.suspension;
     Ok(VirtualTest {
         suspension: suspension.filter(|_| hangs(&nominal)),
@@ -176,8 +178,9 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, Simulat
         if (first.tap, first.level) != (recording.tap, recording.level)
             || first.at != recording.at
             || first.masses != recording.masses
+            || first.length != recording.length
         {
-            let problem = " was described before with another `tap`, `level`, `at` or `mass`; give each recording a file of its own";
+            let problem = " was described before with another `tap`, `level`, `at`, `mass` or `length`; give each recording a file of its own";
             return Err(SimulateError::Described {
                 file,
                 line,
@@ -480,6 +483,15 @@ fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), Simul
     let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
     if planted.contains(&EffectId::Resolution) {
         return Err(SimulateError::Resolution);
+    }
+    let mut placed = effects
+        .iter()
+        .filter(|effect| effect.value("position").is_some());
+    if let Some(effect) = placed.next()
+        && !test.moved_lengths().is_empty()
+    {
+        let id = effect.id.name();
+        return Err(SimulateError::PlaceOfLengths { id });
     }
     let mut masses = test.sensors.iter().map(|sensor| sensor.mass);
     let all_stated = masses.all(|mass| mass.is_some_and(|mass| mass > 0.0));

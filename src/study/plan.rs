@@ -138,7 +138,9 @@ pub(super) fn plan_of(
         .iter()
         .map(|recording| recording.level.unwrap_or(1.0));
     let hardest = levels.fold(0.0, f64::max);
-    let configurations = test.recordings.iter().map(|recording| {
+    // The diagnosis takes the recordings of the beam's own length.
+    let recordings = test.recordings.iter().filter(|one| one.length.is_none());
+    let configurations = recordings.map(|recording| {
         let sensors = test.sensors.iter().map(|sensor| {
             let place = recording
                 .place_of(sensor)

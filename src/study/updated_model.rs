@@ -211,7 +211,9 @@ const KNOWN_MASSES: &str = "\n# Known, not found: what was fastened in the first
 
 /// The masses of the first recording: no recording describes it any more.
 fn fastened(test: &TestDescription) -> String {
-    let masses = test.recordings.first().map(|recording| &recording.masses);
+    let masses = test
+        .reference_recording()
+        .map(|recording| &recording.masses);
     let mut tables = String::new();
     for fastened in masses.into_iter().flatten() {
         let values = line("mass", fastened.mass) + &line("position", fastened.position);
@@ -314,7 +316,9 @@ fn structure_with(
         .collect();
     let heavy = places.iter().filter(|sensor| sensor.mass > 0.0);
     specimen.masses.extend(heavy);
-    let masses = test.recordings.first().map(|recording| &recording.masses);
+    let masses = test
+        .reference_recording()
+        .map(|recording| &recording.masses);
     specimen.masses.extend(masses.into_iter().flatten());
     // A joint that changes with amplitude is seen at the amplitude that counts for a whole decay.
     let power = effects.iter().find_map(|effect| effect.value("exponent"));

@@ -102,6 +102,7 @@ fn observed(recordings: Vec<RecordingResult>) -> Observations {
         aside: vec![None; recordings.len()],
         recordings,
         modes: Vec::new(),
+        lengths: Vec::new(),
         identification: None,
         verdicts: Vec::new(),
         warnings: Vec::new(),

@@ -228,6 +228,15 @@ impl Warning {
         }
     }
 
+    /// The doubt about the beam where its clamp was moved, in these words: "free length 0.2 m".
+    #[must_use]
+    pub(super) fn of_length(self, words: &str) -> Self {
+        Warning {
+            sentence: format!("{words}: {}", self.sentence),
+            ..self
+        }
+    }
+
     /// A doubt about a recording or its search for taps.
     fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
         Warning::new(code, format!("{file}: {sentence}"))

@@ -32,7 +32,7 @@ impl ConsistentEstimator {
     pub fn estimate(&self) -> Result<ConsistentEstimate, IdentifyError> {
         let frequencies = self.frequencies();
         let (renewed, minima) = self.solve(&frequencies);
-        let problem = self.problem(renewed.as_ref().unwrap_or(&self.model), &frequencies);
+        let problem = self.problem(renewed.as_ref().unwrap_or(&self.models), &frequencies);
         let mut minima = minima.into_iter();
         let best = minima.next().ok_or(IdentifyError::NothingToEstimate)?;
         let directions = self.directions();
@@ -45,8 +45,10 @@ impl ConsistentEstimator {
             directions,
         };
         let best = &finished.best;
+        let data = finished.problem.data.iter();
+        let described = data.filter(|datum| datum.structure == 0);
         Ok(ConsistentEstimate {
-            modes_used: self.modes.iter().map(|mode| mode.mode).collect(),
+            modes_used: described.map(|datum| datum.mode).collect(),
             fit: self.settings.fit.clone(),
             quantities: finished.quantities(),
             stiffness_covariance: finished.stiffness_covariance(),
@@ -57,7 +59,7 @@ impl ConsistentEstimator {
             stop: best.stop,
             identifiability: finished.identifiability(),
             joint: joint_at(&best.state.point),
-            beam: beam_at(&self.model.structure().beam, &best.state.point),
+            beam: beam_at(&self.models[0].structure().beam, &best.state.point),
         })
     }
 
@@ -206,6 +208,7 @@ impl Finished<'_> {
     fn modes(&self) -> Vec<FittedMode> {
         let rows = self.problem.data.iter().zip(&self.best.state.responses);
         rows.map(|(datum, found)| FittedMode {
+            structure: datum.structure,
             mode: datum.mode,
             measured: datum.frequency,
             predicted: found.frequency,

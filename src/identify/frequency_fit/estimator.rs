@@ -21,9 +21,12 @@ use tapjoint_numerics::least_squares::{Settings, StopReason};
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
 pub struct ConsistentEstimator {
-    pub(super) model: FrequencyModel,
+    /// The structure as described, then those whose clamp was moved.
+    pub(super) models: Vec<FrequencyModel>,
     pub(super) settings: ConsistentSettings,
     pub(super) modes: Vec<MeasuredMode>,
+    /// Index of the model of each mode.
+    structures: Vec<usize>,
     pub(super) base: Point,
     /// Parameters estimated along with the joint, with their prior.
     pub(super) nuisances: Vec<(Parameter, f64)>,
@@ -43,11 +46,20 @@ pub struct PointFit {
     pub stop: StopReason,
 }
 
+/// The beam where its clamp was moved, with the frequencies that were read there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovedClamp {
+    /// The structure: of the same beam and on the same joint, but of another length.
+    pub structure: JointedStructure,
+    /// Its modes.
+    pub modes: Vec<MeasuredMode>,
+}
+
 /// Start of repetitions of an estimate: the minima of a first one, and the body as it belongs to the
 /// deepest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Neighbourhood {
-    pub(super) model: Option<FrequencyModel>,
+    pub(super) models: Option<Vec<FrequencyModel>>,
     pub(super) starts: Vec<Point>,
     /// Norm of the standardised residuals at each start, the smallest first; all zero where it is not known.
     norms: Vec<f64>,
@@ -57,7 +69,7 @@ impl Neighbourhood {
     /// Returns these points, with the body of the beam as described.
     pub fn at(starts: &[Point]) -> Self {
         Self {
-            model: None,
+            models: None,
             starts: starts.to_vec(),
             norms: vec![0.0; starts.len()],
         }
@@ -96,11 +108,38 @@ impl ConsistentEstimator {
         modes: &[MeasuredMode],
         settings: &ConsistentSettings,
     ) -> Result<Self, IdentifyError> {
-        check(structure, modes, settings)?;
-        // One mode above the highest is asked about in the report on identifiability.
-        let highest = modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-        let model = FrequencyModel::new(structure, highest)?;
-        let mut base = model.nominal();
+        Self::of_lengths(structure, modes, &[], settings)
+    }
+
+    /// Returns the estimator of one joint for the modes of a structure and for those of the same beam where its
+    /// clamp was moved. Each length is known apart from the others, all to the same tolerance (m).
+    ///
+    /// # Errors
+    /// As [`Self::new`], and [`IdentifyError::TooManyLengths`].
+    pub fn of_lengths(
+        structure: &JointedStructure,
+        modes: &[MeasuredMode],
+        moved: &[MovedClamp],
+        settings: &ConsistentSettings,
+    ) -> Result<Self, IdentifyError> {
+        if moved.len() >= Parameter::LENGTHS.len() {
+            return Err(IdentifyError::TooManyLengths {
+                found: moved.len() + 1,
+                most: Parameter::LENGTHS.len(),
+            });
+        }
+        let mut all = modes.to_vec();
+        all.extend(moved.iter().flat_map(|moved| &moved.modes));
+        check(structure, &all, settings)?;
+        let mut models = vec![FrequencyModel::new(structure, model_modes(modes))?];
+        let mut structures = vec![0; modes.len()];
+        let mut base = models[0].nominal();
+        for (moved, length) in moved.iter().zip(&Parameter::LENGTHS[1..]) {
+            let model = FrequencyModel::new(&moved.structure, model_modes(&moved.modes))?;
+            base[length.index()] = moved.structure.beam.length.ln();
+            structures.extend(vec![models.len(); moved.modes.len()]);
+            models.push(model.of_length(*length));
+        }
         if structure.assembly != Assembly::Free {
             let held = settings.held;
             base[Parameter::Kt.index()] = held.kt.ln();
@@ -121,12 +160,19 @@ impl ConsistentEstimator {
                 .filter(|p| !settings.fit.contains(p));
             let known = unfitted.filter_map(|p| Some((p, settings.tolerances.of(p)?)));
             nuisances.extend(known.filter(|(_, std)| *std > 0.0));
+            // The tolerance of the described length in m is that of every other.
+            let tolerance = settings.tolerances.length.filter(|std| *std > 0.0);
+            for (model, length) in models.iter().zip(Parameter::LENGTHS).skip(1) {
+                let ratio = structure.beam.length / model.structure().beam.length;
+                nuisances.extend(tolerance.map(|std| (length, std * ratio)));
+            }
         }
         Ok(Self {
             nuisances,
-            model,
+            models,
             settings: settings.clone(),
-            modes: modes.to_vec(),
+            modes: all,
+            structures,
             base,
         })
     }
@@ -137,7 +183,7 @@ impl ConsistentEstimator {
         fit.contains(&Parameter::Kt) || fit.contains(&Parameter::Kr)
     }
 
-    /// Returns the measured frequencies (Hz).
+    /// Returns the measured frequencies (Hz), those of the described structure first.
     pub fn frequencies(&self) -> Vec<f64> {
         self.modes.iter().map(|mode| mode.frequency).collect()
     }
@@ -155,11 +201,12 @@ impl ConsistentEstimator {
 
     pub(super) fn problem<'a>(
         &'a self,
-        model: &'a FrequencyModel,
+        models: &'a [FrequencyModel],
         frequencies: &[f64],
     ) -> Problem<'a> {
-        let data = self.modes.iter().zip(frequencies);
-        let data = data.map(|(mode, &frequency)| Datum {
+        let data = self.modes.iter().zip(&self.structures).zip(frequencies);
+        let data = data.map(|((mode, &structure), &frequency)| Datum {
+            structure,
             mode: mode.mode,
             frequency,
             std: match self.settings.weights {
@@ -167,14 +214,14 @@ impl ConsistentEstimator {
                 ResidualWeights::Relative => frequency,
             },
         });
-        let nominal = self.model.nominal();
+        // The beam of `base` is the described one, whose properties are never moved there.
         let priors = self.nuisances.iter().map(|&(parameter, std)| Prior {
             parameter,
-            value: nominal[parameter.index()],
+            value: self.base[parameter.index()],
             std,
         });
         Problem {
-            model,
+            models,
             data: data.collect(),
             priors: priors.collect(),
             last_step: LAST_STEP,
@@ -194,9 +241,9 @@ impl ConsistentEstimator {
 
     /// Returns the points from which repetitions of the estimate start: the minima of this one.
     pub fn neighbourhood(&self) -> Neighbourhood {
-        let (model, minima) = self.solve(&self.frequencies());
+        let (models, minima) = self.solve(&self.frequencies());
         Neighbourhood {
-            model,
+            models,
             starts: minima.iter().map(|minimum| minimum.state.point).collect(),
             norms: minima
                 .iter()
@@ -208,7 +255,7 @@ impl ConsistentEstimator {
     /// Fits other frequencies (Hz) of the same modes downhill of known points. The body is that of the
     /// neighbourhood, renewed where the beam moves far from it.
     pub fn refit(&self, frequencies: &[f64], near: &Neighbourhood) -> PointFit {
-        let model = near.model.as_ref().unwrap_or(&self.model);
+        let models = near.models.as_ref().unwrap_or(&self.models);
         let moved = match self.settings.weights {
             ResidualWeights::Measured => {
                 let read = self.modes.iter().zip(frequencies);
@@ -219,8 +266,8 @@ impl ConsistentEstimator {
             ResidualWeights::Relative => f64::INFINITY,
         };
         let starts = near.starts_after(moved);
-        let minima = self.minima(&self.problem(model, frequencies), &starts, &REPEATED);
-        self.deepest(self.renew(model, frequencies, minima).1)
+        let minima = self.minima(&self.problem(models, frequencies), &starts, &REPEATED);
+        self.deepest(self.renew(models, frequencies, minima).1)
     }
 
     /// Returns the non-dimensional stiffnesses as a function of the frequencies (Hz), for
@@ -274,6 +321,11 @@ impl ConsistentEstimator {
     }
 }
 
+/// Number of modes of a model: one above the highest is asked about in the report on identifiability.
+fn model_modes(modes: &[MeasuredMode]) -> usize {
+    modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1
+}
+
 fn is_positive(value: f64) -> bool {
     value > 0.0 && value.is_finite()
 }
@@ -321,9 +373,9 @@ const SAME_MINIMUM: f64 = 0.05;
 const RENEWALS: usize = 6;
 
 impl ConsistentEstimator {
-    /// Returns all minima, the deepest first, and the model renewed where the beam has moved far.
-    pub(super) fn solve(&self, frequencies: &[f64]) -> (Option<FrequencyModel>, Vec<Minimum>) {
-        let problem = self.problem(&self.model, frequencies);
+    /// Returns all minima, the deepest first, and the models renewed where the beam has moved far.
+    pub(super) fn solve(&self, frequencies: &[f64]) -> (Option<Vec<FrequencyModel>>, Vec<Minimum>) {
+        let problem = self.problem(&self.models, frequencies);
         let mut starts = promising(&problem, &self.base, &self.settings.fit);
         starts.extend(self.pairs_guess(&problem));
         let mut minima = self.minima(&problem, &starts, &FULL);
@@ -340,27 +392,34 @@ impl ConsistentEstimator {
             all.extend(minima.iter().map(|minimum| minimum.state.point));
             minima = self.minima(&problem, &all, &FULL);
         }
-        self.renew(&self.model, frequencies, minima)
+        self.renew(&self.models, frequencies, minima)
     }
 
-    /// Follows the beam where the deepest minimum has moved it far from the one that the model was built
-    /// for. Returns the model built anew, if it was, and the minima by it.
+    /// Follows the beam where the deepest minimum has moved it far from the one that the models were built
+    /// for. Returns the models built anew, if they were, and the minima by them.
     fn renew(
         &self,
-        model: &FrequencyModel,
+        models: &[FrequencyModel],
         frequencies: &[f64],
         mut minima: Vec<Minimum>,
-    ) -> (Option<FrequencyModel>, Vec<Minimum>) {
-        let mut renewed = None;
+    ) -> (Option<Vec<FrequencyModel>>, Vec<Minimum>) {
+        let mut renewed: Option<Vec<FrequencyModel>> = None;
         for _ in 0..RENEWALS {
             let Some(best) = minima.first().map(|best| best.state.point) else {
                 break;
             };
-            if !renewed.as_ref().unwrap_or(model).is_far(&best) {
+            let known = renewed.as_deref().unwrap_or(models);
+            if !known.iter().any(|model| model.is_far(&best)) {
                 break;
             }
-            let highest = self.modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-            let Ok(built) = self.model.rebuilt(&best, highest) else {
+            let all = self.models.iter().enumerate();
+            let built = all.map(|(index, model)| {
+                let own = self.modes.iter().zip(&self.structures);
+                let own = own.filter(|(_, structure)| **structure == index);
+                let own: Vec<MeasuredMode> = own.map(|(mode, _)| *mode).collect();
+                model.rebuilt(&best, model_modes(&own))
+            });
+            let Ok(built) = built.collect::<Result<Vec<_>, _>>() else {
                 break;
             };
             let starts: Vec<Point> = minima.iter().map(|minimum| minimum.state.point).collect();
@@ -372,7 +431,7 @@ impl ConsistentEstimator {
 
     /// Returns the pair regression's estimate, where it applies and is a joint.
     fn pairs_guess(&self, problem: &Problem<'_>) -> Option<Point> {
-        let structure = self.model.structure();
+        let structure = self.models[0].structure();
         let halves = structure.lap.position.is_none() && structure.lap.right.is_none();
         let model = match (structure.assembly, &self.settings.fit[..]) {
             (Assembly::Lap, [Parameter::Kt, Parameter::Kr]) if halves => PairsModel::Lap,
@@ -382,11 +441,14 @@ impl ConsistentEstimator {
             }
             _ => return None,
         };
-        let numbers = problem.data.iter().map(|datum| datum.mode);
         let lambdas = problem.measured_lambdas(&self.base);
-        let modes: Vec<ModeLambda> = numbers
-            .zip(lambdas)
-            .map(|(mode, lambda)| ModeLambda { mode, lambda })
+        let data = problem.data.iter().zip(lambdas);
+        let described = data.filter(|(datum, _)| datum.structure == 0);
+        let modes: Vec<ModeLambda> = described
+            .map(|(datum, lambda)| ModeLambda {
+                mode: datum.mode,
+                lambda,
+            })
             .collect();
         let joint = estimate_pairs(model, &modes).ok()?.joint()?;
         joint.check().ok()?;
@@ -519,8 +581,8 @@ impl ConsistentEstimator {
         errors: &[(f64, f64)],
         near: &Neighbourhood,
     ) -> Vec<Stiffnesses> {
-        let model = near.model.as_ref().unwrap_or(&self.model);
-        let stated = self.problem(model, &self.frequencies());
+        let models = near.models.as_ref().unwrap_or(&self.models);
+        let stated = self.problem(models, &self.frequencies());
         let mut normal = StandardNormal.sample_iter(random);
         let mut found = Vec::with_capacity(count);
         for _ in 0..count {

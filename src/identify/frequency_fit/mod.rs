@@ -18,7 +18,7 @@ mod estimator;
 mod model;
 mod problem;
 
-pub use estimator::{ConsistentEstimator, Neighbourhood, PointFit};
+pub use estimator::{ConsistentEstimator, MovedClamp, Neighbourhood, PointFit};
 pub use model::{
     FrequencyModel, JointedStructure, ModeResponse, PARAMETERS, Parameter, Point, Route,
 };
@@ -67,7 +67,7 @@ impl BeamTolerances {
             Parameter::Thickness => self.thickness,
             Parameter::Modulus => self.modulus,
             Parameter::Density => self.density,
-            Parameter::Kt | Parameter::Kr | Parameter::Coupling => None,
+            _ => None,
         }
     }
 }
@@ -164,6 +164,8 @@ pub struct Correlation {
 /// One mode after the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedMode {
+    /// Index of its structure: 0 as described, from 1 on where the clamp was moved.
+    pub structure: usize,
     /// The mode's number.
     pub mode: usize,
     /// Measured frequency (Hz).
@@ -188,7 +190,7 @@ pub struct OtherMinimum {
 /// A joint estimated from the frequencies themselves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConsistentEstimate {
-    /// Numbers of the modes used.
+    /// Numbers of the modes used of the structure as described.
     pub modes_used: Vec<usize>,
     /// Estimated parameters.
     pub fit: Vec<Parameter>,
@@ -277,6 +279,11 @@ impl Quantity {
             Parameter::Length => &[Self::Length],
             Parameter::Width => &[Self::Width],
             Parameter::Thickness => &[Self::Thickness],
+            // The estimate is about the beam as described.
+            Parameter::SecondLength
+            | Parameter::ThirdLength
+            | Parameter::FourthLength
+            | Parameter::FifthLength => &[],
         }
     }
 

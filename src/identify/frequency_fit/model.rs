@@ -164,6 +164,14 @@ pub enum Parameter {
     Width,
     /// Thickness (m); its part in shear and rotary inertia is left out.
     Thickness,
+    /// Length (m) of the beam where its clamp was moved, as [`Self::Length`] is where it was not.
+    SecondLength,
+    /// Length (m) of the beam where its clamp was moved again.
+    ThirdLength,
+    /// Length (m) of the beam where its clamp was moved again.
+    FourthLength,
+    /// Length (m) of the beam where its clamp was moved again.
+    FifthLength,
 }
 
 impl Parameter {
@@ -180,6 +188,19 @@ impl Parameter {
         Self::Length,
         Self::Width,
         Self::Thickness,
+        Self::SecondLength,
+        Self::ThirdLength,
+        Self::FourthLength,
+        Self::FifthLength,
+    ];
+
+    /// Lengths of the beam in one fit: as described first, then where its clamp was moved.
+    pub const LENGTHS: [Self; 5] = [
+        Self::Length,
+        Self::SecondLength,
+        Self::ThirdLength,
+        Self::FourthLength,
+        Self::FifthLength,
     ];
 
     pub(super) fn index(self) -> usize {
@@ -197,15 +218,19 @@ impl Parameter {
             "length",
             "width",
             "thickness",
+            "second-length",
+            "third-length",
+            "fourth-length",
+            "fifth-length",
         ][self.index()]
     }
 }
 
 /// Number of parameters.
-pub const PARAMETERS: usize = 8;
+pub const PARAMETERS: usize = 12;
 
 /// A place in parameter space: logarithms of the SI values, atanh of the coupling. An infinite
-/// logarithm of a stiffness is a rigid joint.
+/// logarithm of a stiffness is a rigid joint. Lengths that no structure of the fit has are of no effect.
 pub type Point = [f64; PARAMETERS];
 
 /// One natural frequency and its derivatives.
@@ -228,6 +253,8 @@ pub struct FrequencyModel {
     free: Option<Vec<f64>>,
     /// ln of modulus, density, length, width, thickness for which the body was built.
     built_at: Point,
+    /// Coordinate of its length.
+    pub(super) length: Parameter,
 }
 
 impl FrequencyModel {
@@ -274,7 +301,13 @@ impl FrequencyModel {
             body,
             free,
             built_at: nominal_point(&structure.beam),
+            length: Parameter::Length,
         })
+    }
+
+    /// Returns the model whose length is this coordinate of a point.
+    pub(super) fn of_length(self, length: Parameter) -> Self {
+        Self { length, ..self }
     }
 
     /// Returns the structure behind it.
@@ -299,7 +332,7 @@ impl FrequencyModel {
         let coupling = point[Parameter::Coupling.index()].tanh();
         ModelAt {
             model: self,
-            unit_frequency: beam_at(&self.structure.beam, point).unit_frequency(),
+            unit_frequency: self.beam_at(point).unit_frequency(),
             compliances,
             last_step,
             by_coupling: (compliances[0] * compliances[1]).sqrt() * (1.0 - coupling * coupling),
@@ -307,9 +340,21 @@ impl FrequencyModel {
         }
     }
 
+    /// Returns a point with the length of this structure for that of the beam.
+    fn own(&self, point: &Point) -> Point {
+        let mut own = *point;
+        own[Parameter::Length.index()] = point[self.length.index()];
+        own
+    }
+
+    /// Returns the beam of this structure at a point.
+    pub(super) fn beam_at(&self, point: &Point) -> Beam {
+        beam_at(&self.structure.beam, &self.own(point))
+    }
+
     /// Returns 1/Kx, 1/Ky and 1/Kz at a point.
     pub(super) fn compliances(&self, point: &Point) -> [f64; 3] {
-        let [a, b] = log_nondimensional(point).map(|log| (-log).exp());
+        let [a, b] = log_nondimensional(&self.own(point)).map(|log| (-log).exp());
         let coupling = point[Parameter::Coupling.index()].tanh();
         [a, b, coupling * (a * b).sqrt()]
     }
@@ -317,8 +362,9 @@ impl FrequencyModel {
     /// Returns two differences from the body, as logarithms: of the ratio of attached masses to the beam's, and of
     /// support springs to the beam's stiffness.
     fn attachment_ratios(&self, point: &Point) -> (f64, f64) {
-        let moved: Point = std::array::from_fn(|i| point[i] - self.built_at[i]);
-        let [_, _, _, modulus, density, length, width, thickness] = moved;
+        let own = self.own(point);
+        let moved: Point = std::array::from_fn(|i| own[i] - self.built_at[i]);
+        let [_, _, _, modulus, density, length, width, thickness, ..] = moved;
         let mass = -(density + length + width + thickness);
         (mass, 3.0 * length - modulus - width - 3.0 * thickness)
     }
@@ -337,12 +383,11 @@ impl FrequencyModel {
 
     /// Returns the model built for the beam at this point.
     pub(super) fn rebuilt(&self, point: &Point, highest: usize) -> Result<Self, StructureError> {
-        let there = self
-            .structure
-            .with_beam(&beam_at(&self.structure.beam, point));
+        let there = self.structure.with_beam(&self.beam_at(point));
         let built = Self::new(&there, highest)?;
         Ok(Self {
             structure: self.structure.clone(),
+            length: self.length,
             ..built
         })
     }
@@ -394,46 +439,51 @@ impl ModelAt<'_> {
         let by_density = -0.5 - by_masses;
         let (mass, support) = self.ratios;
         let correction = (by_masses * mass + by_supports * support).exp();
+        let mut sensitivity = [0.0; PARAMETERS];
+        let slopes = [
+            (Parameter::Kt, by_kt),
+            (Parameter::Kr, by_kr),
+            (Parameter::Coupling, by_coupling),
+            (Parameter::Modulus, by_modulus),
+            (Parameter::Density, by_density),
+            // f = L^-2 g(Kt L^3, Kr L, k L^3, m/L).
+            (
+                self.model.length,
+                -2.0 + 3.0 * (by_kt + by_supports) + by_kr - by_masses,
+            ),
+            (Parameter::Width, by_modulus + by_density),
+            (Parameter::Thickness, 3.0 * by_modulus + by_density),
+        ];
+        for (parameter, slope) in slopes {
+            sensitivity[parameter.index()] = slope;
+        }
         ModeResponse {
             frequency: lambda * lambda * self.unit_frequency * correction,
             lambda,
-            sensitivity: [
-                by_kt,
-                by_kr,
-                by_coupling,
-                by_modulus,
-                by_density,
-                // f = L^-2 g(Kt L^3, Kr L, k L^3, m/L).
-                -2.0 + 3.0 * (by_kt + by_supports) + by_kr - by_masses,
-                by_modulus + by_density,
-                3.0 * by_modulus + by_density,
-            ],
+            sensitivity,
         }
     }
 }
 
 /// Returns ln Kx and ln Ky at a point: Kx = Kt L^3/(E I), Ky = Kr L/(E I), I = b h^3/12.
 pub(super) fn log_nondimensional(point: &Point) -> [f64; 2] {
-    let [kt, kr, _, modulus, _, length, width, thickness] = *point;
+    let [kt, kr, _, modulus, _, length, width, thickness, ..] = *point;
     let stiffness = modulus + width + 3.0 * thickness - 12f64.ln();
     [kt + 3.0 * length - stiffness, kr + length - stiffness]
 }
 
 fn nominal_point(beam: &Beam) -> Point {
-    [
-        0.0,
-        0.0,
-        0.0,
-        beam.modulus.ln(),
-        beam.density.ln(),
-        beam.length.ln(),
-        beam.width.ln(),
-        beam.thickness.ln(),
-    ]
+    let mut point = [0.0; PARAMETERS];
+    point[Parameter::Modulus.index()] = beam.modulus.ln();
+    point[Parameter::Density.index()] = beam.density.ln();
+    point[Parameter::Length.index()] = beam.length.ln();
+    point[Parameter::Width.index()] = beam.width.ln();
+    point[Parameter::Thickness.index()] = beam.thickness.ln();
+    point
 }
 
 pub(super) fn beam_at(beam: &Beam, point: &Point) -> Beam {
-    let [_, _, _, modulus, density, length, width, thickness] = point.map(f64::exp);
+    let [_, _, _, modulus, density, length, width, thickness, ..] = point.map(f64::exp);
     Beam {
         modulus,
         density,

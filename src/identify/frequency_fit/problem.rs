@@ -5,10 +5,11 @@
 //! square the condition number: it is for stiffnesses that the frequencies hardly feel.
 
 use super::model::{
-    FrequencyModel, ModeResponse, PARAMETERS, Parameter, Point, beam_at, log_nondimensional,
+    FrequencyModel, ModeResponse, ModelAt, PARAMETERS, Parameter, Point, log_nondimensional,
 };
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{LN_10, PI};
+use tapjoint_beam::Beam;
 use tapjoint_beam::interface::{InterfaceFunctions, JointWeights};
 use tapjoint_numerics::least_squares::{self, Linearised, Settings, minimise};
 
@@ -59,6 +60,8 @@ const LONGEST_STEP: f64 = 2.0;
 /// One measured frequency with the standard deviation (Hz) by which its residual is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Datum {
+    /// Index of its structure among the models of the problem.
+    pub(super) structure: usize,
     pub(super) mode: usize,
     pub(super) frequency: f64,
     pub(super) std: f64,
@@ -75,7 +78,8 @@ pub(super) struct Prior {
 /// The misfit as a function of the point.
 #[derive(Debug, Clone)]
 pub(super) struct Problem<'a> {
-    pub(super) model: &'a FrequencyModel,
+    /// The structure as described, then those whose clamp was moved.
+    pub(super) models: &'a [FrequencyModel],
     pub(super) data: Vec<Datum>,
     pub(super) priors: Vec<Prior>,
     /// Relative step of lambda that ends the search for a root.
@@ -94,6 +98,8 @@ pub(super) struct Evaluation {
     pub(super) jacobian: Vec<Point>,
     /// Prediction for every mode.
     pub(super) responses: Vec<ModeResponse>,
+    /// Coordinate of the length of every mode's structure.
+    lengths: Vec<Parameter>,
 }
 
 impl Evaluation {
@@ -102,12 +108,16 @@ impl Evaluation {
         // Beyond that (1, relative) a root is not followed.
         const FARTHEST: f64 = 0.1;
         let [here, there] = [&self.point, point].map(log_nondimensional);
-        let moved = [
-            there[0] - here[0],
-            there[1] - here[1],
-            point[2] - self.point[2],
-        ];
-        let responses = self.responses.iter().map(|response| {
+        let changes = Parameter::ALL.map(|one| point[one.index()] - self.point[one.index()]);
+        let responses = self.responses.iter().zip(&self.lengths);
+        let responses = responses.map(|(response, length)| {
+            // Kx grows as the cube of the length, Ky as the length.
+            let further = changes[length.index()] - changes[Parameter::Length.index()];
+            let moved = [
+                there[0] - here[0] + 3.0 * further,
+                there[1] - here[1] + further,
+                changes[Parameter::Coupling.index()],
+            ];
             // lambda changes with the joint alone, half as much as the frequency. A rigid joint stays.
             let changes = response.sensitivity.iter().zip(moved).map(|(s, m)| s * m);
             let change: f64 = changes.filter(|change| change.is_finite()).sum();
@@ -127,10 +137,13 @@ impl Problem<'_> {
             residuals: Vec::with_capacity(rows),
             jacobian: Vec::with_capacity(rows),
             responses: Vec::with_capacity(self.data.len()),
+            lengths: Vec::with_capacity(self.data.len()),
         };
-        let model = self.model.at(point, self.last_step);
+        let models = self.models.iter();
+        let models: Vec<ModelAt<'_>> = models.map(|one| one.at(point, self.last_step)).collect();
         for (datum, guess) in self.data.iter().zip(guesses) {
-            let response = model.response(datum.mode, *guess);
+            let response = models[datum.structure].response(datum.mode, *guess);
+            let length = self.models[datum.structure].length;
             let residual = (response.frequency - datum.frequency) / datum.std;
             let scale = response.frequency / datum.std;
             result.cost += residual * residual;
@@ -138,6 +151,7 @@ impl Problem<'_> {
             let slopes = response.sensitivity.map(|slope| scale * slope);
             result.jacobian.push(slopes);
             result.responses.push(response);
+            result.lengths.push(length);
         }
         for prior in &self.priors {
             let residual = (point[prior.parameter.index()] - prior.value) / prior.std;
@@ -151,9 +165,10 @@ impl Problem<'_> {
 
     /// Returns the measured frequencies as lambda of the beam at a point: where the roots are to be.
     pub(super) fn measured_lambdas(&self, point: &Point) -> Vec<f64> {
-        let beam = beam_at(&self.model.structure().beam, point);
+        let beams: Vec<Beam> = self.models.iter().map(|one| one.beam_at(point)).collect();
         let data = self.data.iter();
-        data.map(|datum| beam.lambda_of(datum.frequency)).collect()
+        data.map(|datum| beams[datum.structure].lambda_of(datum.frequency))
+            .collect()
     }
 
     /// Follows the misfit downhill from `start` along these directions; `None` where it is no number at
@@ -371,7 +386,8 @@ impl Grid {
         let lambdas = problem.measured_lambdas(&self.beam);
         let functions: Vec<InterfaceFunctions> = lambdas
             .iter()
-            .map(|lambda| problem.model.body.functions(*lambda))
+            .zip(&problem.data)
+            .map(|(lambda, datum)| problem.models[datum.structure].body.functions(*lambda))
             .collect();
         let points: Vec<Point> = self.indices().map(|index| self.point(index)).collect();
         let costs: Vec<f64> = points
@@ -430,14 +446,18 @@ pub(super) fn promising(problem: &Problem<'_>, nominal: &Point, fit: &[Parameter
 
 /// Returns the sum of squared misfits of a joint, by one Newton step from each measured frequency.
 fn approximate_cost(problem: &Problem<'_>, functions: &[InterfaceFunctions], point: &Point) -> f64 {
-    let joint = JointWeights::from_compliances(problem.model.compliances(point));
-    let uncounted = problem.model.body.uncounted();
+    let models = problem.models.iter();
+    let joints: Vec<JointWeights> = models
+        .map(|model| JointWeights::from_compliances(model.compliances(point)))
+        .collect();
     let mut cost = 0.0;
     for (datum, at) in problem.data.iter().zip(functions) {
-        let (value, slope) = at.equation(&joint);
+        let joint = &joints[datum.structure];
+        let uncounted = problem.models[datum.structure].body.uncounted();
+        let (value, slope) = at.equation(joint);
         // Neighbouring roots are about pi apart in lambda; f grows as its square.
         let spacing = 2.0 * PI / at.lambda;
-        let (number, count) = (datum.mode + uncounted, at.count(&joint, value));
+        let (number, count) = (datum.mode + uncounted, at.count(joint, value));
         let modes_off = if count >= number {
             count - number
         } else {

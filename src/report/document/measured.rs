@@ -26,8 +26,8 @@ pub struct RecordingSection {
     /// Its files, in their order, where it has several; they follow one another in time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
-    /// Difference from the first recording, for which modes and estimate leave it out: "8.8 times its tap level";
-    /// null where they do not.
+    /// Difference from the first recording, for which the list of modes leaves it out: "8.8 times its tap level", "free
+    /// length 0.2 m"; null where it does not. The estimate takes recordings of another free length by modes of their own.
     pub aside: Option<String>,
     /// Format in words: "WAV, 24-bit integer".
     pub format: String,

@@ -14,8 +14,8 @@ pub use measured::{
 };
 pub use model::{
     Baseline, BaselineSection, EstimateSection, FreeBeamSection, GapPlaceSection, GapSection,
-    IdentifiabilitySection, MisfitSection, PairsSection, PredictionSection, UpdatedModelSection,
-    gap_section,
+    IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
+    UpdatedModelSection, gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
@@ -26,7 +26,7 @@ pub use tapjoint_identify::Uncertain;
 pub use tapjoint_signal::modal::ReadBy;
 
 use crate::format::with_minus_signs;
-use model::estimate_section;
+use model::{estimate_section, lengths_of};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_analysis::{
@@ -57,6 +57,9 @@ pub struct Document {
     /// Resonances merged over the recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<Vec<ModeSection>>,
+    /// Resonances of the beam at its other free lengths, where the clamp was moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lengths: Option<Vec<LengthSection>>,
     /// Frequency response functions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frfs: Option<Vec<FrfSection>>,
@@ -184,6 +187,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
         recordings: (!analysis.recordings.is_empty()).then(|| recordings.collect()),
         modes: Some(modes.collect()),
+        lengths: lengths_of(analysis),
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification.map(|found| predictions(&found.prediction)),

@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::ModeSection;
 use crate::format::significant;
-use tapjoint_analysis::{Estimate, EstimateMethod, Identification};
+use tapjoint_analysis::{Analysis, Estimate, EstimateMethod, Identification};
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
@@ -135,6 +136,48 @@ pub struct PredictionSection {
     pub error_percent: Option<f64>,
     /// True if the mode entered the estimate.
     pub used: bool,
+}
+
+/// The beam at another free length, where the clamp was moved. Its frequencies enter the same estimate.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct LengthSection {
+    /// Free length (m).
+    pub length: f64,
+    /// Its recordings.
+    pub recordings: Vec<String>,
+    /// Its resonances, numbered for this length, ascending.
+    pub modes: Vec<ModeSection>,
+    /// The modes that entered the estimate beside their predictions by it; empty without an estimate.
+    pub prediction: Vec<PredictionSection>,
+}
+
+/// Returns the sections of other free lengths; `None` without any.
+pub(super) fn lengths_of(analysis: &Analysis) -> Option<Vec<LengthSection>> {
+    let found = analysis.identification.as_ref();
+    let estimate = found.and_then(|found| found.consistent.as_ref());
+    let mut sections = Vec::with_capacity(analysis.lengths.len());
+    for (structure, own) in (1..).zip(&analysis.lengths) {
+        let modes = own.modes.iter();
+        let fitted = estimate.iter().flat_map(|estimate| &estimate.modes);
+        let fitted = fitted.filter(|mode| mode.structure == structure);
+        let prediction = fitted.map(|mode| PredictionSection {
+            mode: mode.mode,
+            measured: Some(mode.measured),
+            predicted: Some(mode.predicted),
+            lambda: Some(own.structure.beam.lambda_of(mode.predicted)),
+            error_percent: Some(mode.error_percent),
+            used: true,
+        });
+        sections.push(LengthSection {
+            length: own.length,
+            recordings: own.recordings.clone(),
+            modes: modes
+                .map(|mode| ModeSection::of(mode, &analysis.recordings))
+                .collect(),
+            prediction: prediction.collect(),
+        });
+    }
+    (!sections.is_empty()).then_some(sections)
 }
 
 /// Returns the main estimate, with the closed form beside it.

@@ -12,8 +12,8 @@ pub use joint::{
     parameters, perturbation, sensitivity, spans,
 };
 pub use modes::{
-    fitted_to, frfs, left_out, mode_details, modes, modes_from, prediction, reading_details,
-    readings,
+    fitted_to, frfs, left_out, lengths, mode_details, modes, modes_from, prediction,
+    reading_details, readings,
 };
 pub use recordings::{
     channels, conditions, datasets, hammer, quality, quality_all, quality_count, quality_doubts,

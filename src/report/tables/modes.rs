@@ -80,9 +80,12 @@ pub fn modes(document: &Document) -> Option<Table> {
 /// gives the list.
 pub fn modes_from(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let (mut from, mut aside) = (Vec::new(), Vec::new());
+    let (mut from, mut aside, mut moved) = (Vec::new(), Vec::new(), Vec::new());
     for recording in recordings {
         match &recording.aside {
+            Some(how) if recording.conditions.free_length.is_some() => {
+                moved.push(format!("{} ({how})", recording.file));
+            }
             Some(how) => aside.push(format!("{} ({how})", recording.file)),
             None => from.push(recording.file.clone()),
         }
@@ -90,13 +93,50 @@ pub fn modes_from(document: &Document) -> Option<String> {
     // A file may be read in several bands.
     from.dedup();
     aside.dedup();
-    let enter = match aside.len() {
-        0 => return None,
-        1 => "enters",
-        _ => "enter",
-    };
-    let (from, aside) = (from.join(", "), aside.join(", "));
-    Some(format!("From {from}; {aside} {enter} the diagnosis alone."))
+    moved.dedup();
+    let mut parts = vec![format!("From {}", from.join(", "))];
+    for (others, target) in [
+        (aside, "the diagnosis alone"),
+        (moved, "the estimate by modes of their own"),
+    ] {
+        let enter = if others.len() == 1 { "enters" } else { "enter" };
+        if !others.is_empty() {
+            parts.push(format!("{} {enter} {target}", others.join(", ")));
+        }
+    }
+    (parts.len() > 1).then(|| parts.join("; ") + ".")
+}
+
+/// Measured beside predicted frequencies of the beam at its other free lengths; `None` without any.
+pub fn lengths(document: &Document) -> Option<Table> {
+    let lengths = document.lengths.as_deref()?.iter();
+    let rows = lengths.flat_map(|length| {
+        let modes = length.modes.iter().filter(|mode| mode.mode.is_some());
+        modes.map(|mode| {
+            let mut fitted = length.prediction.iter();
+            let fitted = fitted.find(|row| Some(row.mode) == mode.mode);
+            let value = reading(mode).value;
+            let predicted = fitted.and_then(|row| row.predicted);
+            [
+                number("Free length (m)", trimmed(length.length, 6)),
+                number("Mode", or_missing(mode.mode)),
+                number("Measured (Hz)", value.clone()),
+                number(
+                    "Predicted (Hz)",
+                    or_missing(predicted.map(|hz| with_decimals_of(hz, &value))),
+                ),
+                number(
+                    "Error (%)",
+                    signed_percent(fitted.and_then(|row| row.error_percent)),
+                ),
+                words("Recording", or_missing(mode.recording.as_ref())),
+            ]
+        })
+    });
+    let note = "The same joint holds the beam where the clamp was moved: all lengths enter one estimate. The diagnosis \
+                takes the recordings of the beam's own length alone.";
+    let rows: Vec<_> = rows.collect();
+    (!rows.is_empty()).then(|| Table::of("Modes where the clamp was moved", rows, note))
 }
 
 /// Details of the reading of each resonance of the merged list; `None` where nothing is known but the reading

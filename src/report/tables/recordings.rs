@@ -73,6 +73,7 @@ pub fn conditions(document: &Document) -> Option<Table> {
         });
         [
             words("Recording", &one.file),
+            page_number("Free length (m)", exact(known.free_length)),
             page_number("Tap at (m)", exact(known.tap)),
             page_words("Sensors at (m)", listed(sensors.collect())),
             page_words("Fastened", listed(masses.collect())),

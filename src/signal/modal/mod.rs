@@ -14,6 +14,7 @@ pub mod amplitude;
 mod combinations;
 pub mod fit;
 mod magnitude;
+mod mains;
 mod peaks;
 pub mod polyreference;
 mod reading;
@@ -22,10 +23,10 @@ pub mod synthesis;
 
 pub use combinations::label_combinations;
 pub use magnitude::{interpolate_magnitude, read_magnitude_peaks};
-pub use peaks::{
-    CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
-    near_mains, noise_of_function,
+pub use mains::{
+    GRIDS, GridFrequency, LineAmplitudes, MainsSettings, label_steady_lines, near_mains,
 };
+pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks, noise_of_function};
 pub use reading::{
     BandReadings, Combination, FittedReading, Interpolation, MergedMode, ModeReading,
     NoInterpolation, PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes,

@@ -152,6 +152,16 @@ impl ModeReading {
     }
 }
 
+impl ModeReading {
+    /// Makes it the reading of a mains line: it keeps its line, and loses what only a resonance has.
+    pub fn make_mains(&mut self, harmonic: f64) {
+        self.between = None;
+        self.fit = None;
+        self.label = Some(PeakLabel::Mains(harmonic));
+        self.select_estimate(ReadBy::Line);
+    }
+}
+
 /// Results of the fit of one mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedReading {

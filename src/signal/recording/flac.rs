@@ -179,7 +179,7 @@ impl StreamInfo {
         let bits = (packed >> 36 & 0x1f) as u32 + 1;
         if !(4..=MOST_BITS).contains(&bits) {
             let problem = format!(
-                "{bits} bits a sample; 4 to {MOST_BITS} are read; convert it to 24 bits, or to WAV"
+                "{bits} bits a sample; 4 to {MOST_BITS} are read; `flac -d` converts it to WAV, which is read with all its bits"
             );
             return Err(RecordingError::new(file, problem));
         }

@@ -7,8 +7,8 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint_signal::modal::{
-    BandReadings, CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel,
-    PeakSettings, find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
+    BandReadings, CompositeLevel, GRIDS, GridFrequency, LineAmplitudes, MainsSettings, ModeReading,
+    PeakLabel, PeakSettings, find_peaks, interpolate_pole, merge_modes, near_mains, read_peaks,
 };
 use tapjoint_signal::spectral::{Lines, Window, transform_block};
 
@@ -196,26 +196,45 @@ fn limit_prominence_on_a_flank_counts_from_the_saddle() {
 #[test]
 fn limit_mains_must_be_near_a_multiple_and_there_before_the_tap() {
     let settings = MainsSettings::default();
-    let line = |before: f64, noise: f64| LineAmplitudes {
-        before,
-        within: 1.0,
-        noise,
-    };
-    let steady = line(0.9, 0.01);
-    for (frequency, line, expected, why) in [
-        (50.05, steady, Some(50.0), "a line of 50 Hz"),
-        (180.1, steady, Some(180.0), "a multiple of 60 Hz"),
-        (52.0, steady, None, "not near a multiple"),
-        (50.0, line(0.01, 0.001), None, "it came with the tap"),
+    let unseen = GRIDS.map(|nominal| GridFrequency::unseen(nominal, &settings));
+    let seen = [
+        GridFrequency {
+            frequency: 49.88,
+            bound: 0.02,
+            is_seen: true,
+            ..unseen[0]
+        },
+        unseen[1],
+    ];
+    for (frequency, grids, expected, why) in [
+        (50.05, unseen, Some((50.0, 1)), "a line of 50 Hz"),
+        (180.1, unseen, Some((60.0, 3)), "a multiple of 60 Hz"),
+        (52.0, unseen, None, "not near a multiple"),
+        (349.2, seen, Some((50.0, 7)), "seven times 49.88 Hz"),
+        (350.0, seen, None, "the grid is not there"),
         (
-            1802.7,
-            line(0.9, 0.3),
-            None,
-            "as high as the noise beside it",
+            299.3,
+            seen,
+            Some((50.0, 6)),
+            "the grid that was seen, not five times 60 Hz",
         ),
+        (20.0, unseen, None, "below the grid"),
     ] {
-        let found = mains_harmonic(frequency, 0.1, line, &settings);
+        let found = near_mains(frequency, 0.1, &grids);
+        let found = found.map(|(grid, number)| (grid.nominal, number));
         assert_eq!(found, expected, "{frequency} Hz: {why}");
+    }
+    for (before, noise, expected, why) in [
+        (0.9, 0.01, true, "steady"),
+        (0.01, 0.001, false, "it came with the tap"),
+        (0.9, 0.3, false, "as high as the noise beside it"),
+    ] {
+        let line = LineAmplitudes {
+            before,
+            within: 1.0,
+            noise,
+        };
+        assert_eq!(line.is_steady(&settings), expected, "{why}");
     }
 }
 

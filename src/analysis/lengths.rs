@@ -1,0 +1,112 @@
+//! The recordings of each free length: where the clamp was moved the beam has other modes, on the same joint.
+//!
+//! Each length is numbered as a test of its own. The frequencies of all lengths enter one estimate.
+
+use super::modes::{modes_of_test, set_aside};
+use super::recording_result::RecordingResult;
+use super::results::ModeResult;
+use super::structure::{
+    StructureDetails, TestedStructure, jointed, masses_in, structure_details, tested_structure,
+};
+use super::warnings::Warning;
+use tapjoint_description::TestDescription;
+use tapjoint_identify::MeasuredMode;
+use tapjoint_identify::consistent::MovedClamp;
+
+/// The beam where its clamp was moved, and its modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovedLength {
+    /// Free length (m).
+    pub length: f64,
+    /// Files of its recordings.
+    pub recordings: Vec<String>,
+    /// The structure of this length.
+    pub structure: TestedStructure,
+    /// Its details, with the masses of its first recording.
+    pub details: StructureDetails,
+    /// Its modes, ascending.
+    pub modes: Vec<ModeResult>,
+}
+
+impl MovedLength {
+    /// Returns its part in an estimate, by the frequencies of these modes.
+    pub(super) fn clamp(&self, used: &[MeasuredMode]) -> MovedClamp {
+        MovedClamp {
+            structure: jointed(&self.structure, &self.details),
+            modes: used.to_vec(),
+        }
+    }
+}
+
+/// A free length (m) in words, to the micrometre.
+fn length_words(length: f64) -> String {
+    format!("free length {} m", (1e6 * length).round() / 1e6)
+}
+
+/// The numbered modes of a test.
+pub(super) struct NumberedTest {
+    /// Modes of the beam as described.
+    pub(super) modes: Vec<ModeResult>,
+    /// Modes of the other free lengths.
+    pub(super) lengths: Vec<MovedLength>,
+    /// Difference of each recording from the first.
+    pub(super) aside: Vec<Option<String>>,
+    /// Doubts about the numbers.
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// Merges and numbers the readings of the recordings, those of each free length apart from the others.
+pub(super) fn numbered(
+    test: &TestDescription,
+    recordings: &mut Vec<RecordingResult>,
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> NumberedTest {
+    let mut found = NumberedTest {
+        modes: Vec::new(),
+        lengths: Vec::new(),
+        aside: vec![None; recordings.len()],
+        warnings: Vec::new(),
+    };
+    let described = test.recordings.iter();
+    let own_lengths: Vec<Option<f64>> = described.map(|recording| recording.length).collect();
+    let mut all: Vec<Option<RecordingResult>> = recordings.drain(..).map(Some).collect();
+    let moved = test.moved_lengths().into_iter().map(Some);
+    for length in [None].into_iter().chain(moved) {
+        let of_length = (0..all.len()).filter(|&index| own_lengths[index] == length);
+        let places: Vec<usize> = of_length.collect();
+        let taken = places.iter().filter_map(|&place| all[place].take());
+        let mut own: Vec<RecordingResult> = taken.collect();
+        let own_test = test.of_length(length);
+        let aside = set_aside(&own_test, &own);
+        if let Some(length) = length {
+            let structure = tested_structure(&own_test);
+            let details = StructureDetails {
+                masses: masses_in(&own_test, own_test.recordings.first()),
+                ..structure_details(&own_test, &structure.beam)
+            };
+            let (modes, doubts) = modes_of_test(&own_test, &mut own, &aside, &structure, &details);
+            let doubts = doubts.into_iter();
+            let doubts = doubts.map(|doubt| doubt.of_length(&length_words(length)));
+            found.warnings.extend(doubts);
+            found.lengths.push(MovedLength {
+                length,
+                recordings: own.iter().map(|recording| recording.file.clone()).collect(),
+                structure,
+                details,
+                modes,
+            });
+        } else {
+            let (modes, doubts) = modes_of_test(&own_test, &mut own, &aside, structure, details);
+            found.modes = modes;
+            found.warnings.extend(doubts);
+        }
+        for ((place, own), aside) in places.into_iter().zip(own).zip(aside) {
+            all[place] = Some(own);
+            let words: Vec<String> = length.map(length_words).into_iter().chain(aside).collect();
+            found.aside[place] = (!words.is_empty()).then(|| words.join(", "));
+        }
+    }
+    recordings.extend(all.into_iter().flatten());
+    found
+}

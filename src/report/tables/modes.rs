@@ -232,6 +232,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         UncertaintySource::Residual => "residual",
         UncertaintySource::TapScatter => "taps",
         UncertaintySource::TwoPoles => "two poles",
+        UncertaintySource::Decays => "decays",
     });
     // The damping ratio (%) with its standard deviation.
     let std = mode.damping_std.map(|std| 100.0 * std);

@@ -185,6 +185,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         std: Some(0.03 * lines.half_line()),
         low: Some(frequency - 0.06 * lines.half_line()),
         high: Some(frequency + 0.06 * lines.half_line()),
+        at_amplitude: None,
         fit: None,
         damping: Some(0.0031),
         damping_std: Some(0.00012),
@@ -229,6 +230,7 @@ fn value(value: f64, relative: f64) -> Option<Uncertain> {
         std: Some(std),
         low: Some(value - 1.96 * std),
         high: Some(value + 1.96 * std),
+        at_amplitude: None,
         ..Uncertain::default()
     })
 }

@@ -246,9 +246,10 @@ impl WholeDecay<'_> {
             .then_some(Candidate { fit, criterion })
     }
 
-    /// Fits the model again with every number of exponents from its own on.
+    /// Fits the model again with every number of exponents from its own on, three at least: a change linear in the
+    /// amplitude may be too small for the criterion, and yet not for the interval.
     fn with_more_exponents(&self, best: &Candidate) -> Vec<Candidate> {
-        let own = best.fit.model.exponents.len();
+        let own = best.fit.model.exponents.len().max(LINEAR_DRIFT);
         let mut all: Vec<Candidate> = Vec::new();
         for degree in DEGREES.into_iter().filter(|degree| *degree >= own) {
             let start = all.last().unwrap_or(best);
@@ -538,8 +539,8 @@ struct Prior {
     weight: f64,
 }
 
-/// Standard deviations up to which a correlation of residuals counts as chance.
-const CHANCE: f64 = 2.0;
+/// Standard deviations by which a correlation of residuals counts as chance.
+const CHANCE: f64 = 1.0;
 /// Most steps of a fit.
 const STEPS: usize = 25;
 /// Share of the sum of squares at which another step gains nothing.

@@ -230,7 +230,6 @@ fn value(value: f64, relative: f64) -> Option<Uncertain> {
         std: Some(std),
         low: Some(value - 1.96 * std),
         high: Some(value + 1.96 * std),
-        at_amplitude: None,
         ..Uncertain::default()
     })
 }

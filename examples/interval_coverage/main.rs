@@ -3,8 +3,8 @@
 //! Each line of the table is a cell of `cells.rs`: how many modes, the share that was missed, the share of intervals
 //! that hold the truth with its 95 % limits (Wilson), the share beyond three standard deviations, the length of the
 //! interval over that of the Cramer-Rao bound (median, white noise), the share read by a fit, and the share of damping
-//! intervals that hold the truth. Drifting frequencies count as inside where the interval holds a frequency that the
-//! mode has between its largest amplitude and a tenth of it.
+//! intervals that hold the truth. The truth of a drifting frequency is that at the amplitude that the program states.
+//! Where the scatter of taps decides, deviations are those of Student's t, as normal ones that are as improbable.
 //!
 //! `cargo run --release --example interval_coverage -- [--modes N] [--seed S] [--cell NAME] [--noise] [--misses N]
 //! [--recordings DIR]`

@@ -20,8 +20,8 @@ use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
 const MOST_EXTRA: usize = 40;
-/// Most fits beside which a second pole is looked for, those that leave most first.
-const MOST_MISFITS: usize = 4;
+/// Most fits beside which a second pole is looked for: of those whose residuals agree from line to line, the most first.
+const MOST_MISFITS: usize = 8;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 pub(super) const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
@@ -96,7 +96,7 @@ impl Candidates<'_> {
                 starts.push(start);
                 added.push(extra);
                 accepted = together;
-            } else {
+            } else if test.likeness.is_none_or(|likeness| likeness >= UNLIKE) {
                 pairs.extend(self.pair(test));
             }
         }
@@ -105,10 +105,14 @@ impl Candidates<'_> {
             (accepted, fits) = self.settled(&mut starts, &mut added, &settings);
         }
         let mut misfits: Vec<&ModeFit> = fits.iter().flatten().collect();
-        misfits.retain(|fit| fit.inflation > 1.0);
-        misfits.sort_by(|a, b| b.inflation.total_cmp(&a.inflation));
+        misfits.retain(|fit| fit.residual_correlation > 0.0);
+        misfits.sort_by(|a, b| {
+            let inflations = b.inflation.total_cmp(&a.inflation);
+            inflations.then(b.residual_correlation.total_cmp(&a.residual_correlation))
+        });
         for fit in misfits.into_iter().take(MOST_MISFITS) {
-            // One pole leaves more than noise, and no search proposed a second: it is looked for half a width away.
+            // One pole may leave more than noise, and no search proposed a second: it is looked for half a width away.
+            // Whatever its shape, the interval holds it too.
             let (frequency, ratio) = (fit.frequency.value, fit.damping_ratio.value);
             let near = |pole: &ModeFit| {
                 (pole.frequency.value - frequency).abs() < APART * ratio * frequency
@@ -258,11 +262,9 @@ impl Candidates<'_> {
         (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < MOST_DAMPING
     }
 
-    /// Returns a tested pole with its neighbour, where the data ask for both, of one shape and near each other.
+    /// Returns a tested pole with its neighbour, where the data ask for both, near each other.
     fn pair(&self, test: ExtraMode) -> Option<[ModeFit; 2]> {
-        let alike = test.likeness.is_none_or(|likeness| likeness >= UNLIKE);
-        let (true, Ok(extra), Some(neighbour)) = (test.needed && alike, test.fit, test.neighbour)
-        else {
+        let (true, Ok(extra), Some(neighbour)) = (test.needed, test.fit, test.neighbour) else {
             return None;
         };
         let distance = (extra.frequency.value - neighbour.frequency.value).abs();

@@ -525,3 +525,34 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
     assert!(render_png(&drawing).is_ok());
     assert!(curves("low.wav", &axis, &[(2, &silent)]).is_none());
 }
+
+#[test]
+fn regress_a_stronger_neighbour_does_not_stand_for_the_mode() {
+    // The second sensor hardly moves in the mode, and strongly in its neighbour 30 % above.
+    let seconds = 2.0;
+    let own = linear(seconds, (200.0, 0.008), (1.0, 0.3));
+    let other = linear(seconds, (260.0, 0.006), (1.0, 1.1));
+    let sum = |a: f64, b: f64| -> Vec<f64> {
+        let pairs = own.iter().zip(&other);
+        pairs.map(|(x, y)| a * x + b * y).collect()
+    };
+    let sensors = [sum(2.0, 0.3), sum(0.1, 5.0)];
+    let decay = Decay {
+        start: 0.0,
+        sample_rate: RATE,
+        responses: (sensors.iter().enumerate())
+            .map(|(index, samples)| with_noise(samples, 60.0, index as u64))
+            .collect(),
+    };
+    let modes = [(200.0, 0.008), (260.0, 0.006)].map(|(frequency, damping_ratio)| KnownMode {
+        frequency,
+        damping_ratio,
+    });
+    let curve = &follow_amplitude(&[decay], &modes)[0];
+    assert_eq!(curve.sensor, Some(0));
+    for point in &curve.points {
+        let expected = 2.0 * (-0.008 * TAU * 200.0 * point.time).exp();
+        // The noise is a thousandth of the first amplitude.
+        assert!((point.amplitude - expected).abs() < 0.01, "{point:?}");
+    }
+}

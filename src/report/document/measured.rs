@@ -8,7 +8,9 @@ use tapjoint_analysis::{
     AmplitudeChange, Analysis, Conditions, Frf, FrfResonance, ModeResult, RecordingResult,
     STRONG_PEAK, Warning,
 };
-use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
+use tapjoint_signal::modal::amplitude::{
+    AmplitudePoint, AmplitudeVerdict, FrequencyAtAmplitude, Trend,
+};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::quality::Check;
@@ -358,6 +360,8 @@ pub struct ModeSection {
     pub low: Option<f64>,
     /// Upper end of its interval (Hz).
     pub high: Option<f64>,
+    /// Amplitude at which the mode has this frequency; null where its decays were not followed.
+    pub at_amplitude: Option<FrequencyAtAmplitude>,
     /// Damping ratio.
     pub damping: Option<f64>,
     /// Standard deviation of the damping ratio.
@@ -410,7 +414,8 @@ pub struct FitSection {
     /// Upper end of the damping ratio's 95 % interval.
     pub damping_high: f64,
     /// Source of the frequency's interval: "residual" (the noise that the fit leaves), "taps" (their scatter, where it is
-    /// more than that noise explains) or "two-poles" (it holds two poles that explain the data better than one).
+    /// more than that noise explains), "two-poles" (it holds two poles that explain the data better than one) or "decays"
+    /// (it changes along the decays, and is known at one amplitude).
     pub uncertainty_from: UncertaintySource,
     /// Degrees of freedom behind the interval (1). Where the source is "taps" or "two-poles", take the standard deviation as
     /// that of a normal distribution.
@@ -493,6 +498,7 @@ impl ModeSection {
             std: reading.std.filter(|_| !is_unclear),
             low: (!is_unclear).then_some(reading.interval.0),
             high: (!is_unclear).then_some(reading.interval.1),
+            at_amplitude: reading.at_amplitude.clone(),
             damping: reading.damping_ratio,
             damping_std: reading.damping_std,
             fit: fit.map(|fit| FitSection::of(fit, change)),
@@ -516,8 +522,8 @@ impl FitSection {
         FitSection {
             damping_low: mode.damping_ratio.low,
             damping_high: mode.damping_ratio.high,
-            uncertainty_from: mode.frequency.source,
-            freedom: mode.frequency.freedom,
+            uncertainty_from: fit.frequency().source,
+            freedom: fit.frequency().freedom,
             scatter_probability: mode.frequency.scatter_probability,
             residual_correlation: mode.residual_correlation,
             band: [mode.band.0, mode.band.1],

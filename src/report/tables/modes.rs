@@ -233,7 +233,9 @@ fn note(document: &Document, modes: &[&ModeSection], described: bool) -> String 
 const INTERVAL_NOTE: &str = "Interval from: the noise that the fit leaves (residual), or the scatter of the taps \
                              where that is more than the noise explains (taps). Two poles: two poles \
                              of one shape explain the data better than one, and the interval holds \
-                             both. They are two modes, or one mode whose frequency changes.";
+                             both. They are two modes, or one mode whose frequency changes. \
+                             Decays: the frequency changes along them, and the interval is that \
+                             at the amplitude that `at_amplitude` states.";
 const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
                          and 1/T, as an analyser shows it; none where that line is of another peak.";
 const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \
@@ -288,6 +290,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         UncertaintySource::Residual => "residual",
         UncertaintySource::TapScatter => "taps",
         UncertaintySource::TwoPoles => "two poles",
+        UncertaintySource::Decays => "decays",
     });
     // The damping ratio (%) with its standard deviation.
     let std = mode.damping_std.map(|std| 100.0 * std);

@@ -15,8 +15,8 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::Subspace;
-use super::amplitude::AmplitudeCurve;
-use super::fit::{ModalConstant, ModeFit};
+use super::amplitude::{AmplitudeCurve, FrequencyAtAmplitude};
+use super::fit::{FittedValue, ModalConstant, ModeFit, UncertaintySource};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::{Lines, Window};
 
@@ -40,6 +40,8 @@ pub struct ModeReading {
     pub between: Option<Interpolation>,
     /// Standard deviation of the best frequency (Hz).
     pub std: Option<f64>,
+    /// Amplitude at which the mode has this frequency; `None` where the decays were not followed.
+    pub at_amplitude: Option<FrequencyAtAmplitude>,
     /// Damping ratio.
     pub damping_ratio: Option<f64>,
     /// Its standard deviation.
@@ -97,6 +99,7 @@ impl ModeReading {
             line_bound: half_line,
             between: None,
             std: None,
+            at_amplitude: None,
             damping_ratio: None,
             damping_std: None,
             prominence_db: None,
@@ -112,6 +115,13 @@ impl ModeReading {
     /// Takes the frequency that was read as `wanted`, or the next best that there is: by the fit, between
     /// the lines, on the line. The damping is that of the fit, or of the reading between the lines.
     pub fn select_estimate(&mut self, wanted: ReadBy) {
+        self.at_amplitude = None;
+        if let Some(fit) = self.fit.as_deref().filter(|_| wanted == ReadBy::Fit) {
+            self.at_amplitude = fit.at_amplitude();
+            let found = fit.frequency();
+            (self.frequency, self.source) = (found.value, ReadBy::Fit);
+            (self.std, self.interval) = (Some(found.std), (found.low, found.high));
+        }
         let fit = self.fit.as_deref().map(|fit| &fit.mode);
         (self.damping_ratio, self.damping_std) = match (fit, self.between) {
             (Some(fit), _) => (Some(fit.damping_ratio.value), Some(fit.damping_ratio.std)),
@@ -121,10 +131,7 @@ impl ModeReading {
             ),
             (None, None) => (None, None),
         };
-        if let Some(fit) = fit.filter(|_| wanted == ReadBy::Fit) {
-            let found = fit.frequency;
-            (self.frequency, self.source) = (found.value, ReadBy::Fit);
-            (self.std, self.interval) = (Some(found.std), (found.low, found.high));
+        if fit.is_some() && wanted == ReadBy::Fit {
             return;
         }
         let (frequency, bound, std) = match self.between.filter(|_| wanted != ReadBy::Line) {
@@ -181,6 +188,24 @@ impl FittedReading {
             constants: Vec::new(),
             amplitude: None,
         }
+    }
+
+    /// Returns the frequency: that of the fit, or of a mode that changes with its amplitude that at one amplitude.
+    ///
+    /// Two poles of one shape may be two modes. Only taps of different strength show that it is one that changes.
+    pub fn frequency(&self) -> FittedValue {
+        let fitted = self.mode.frequency;
+        let drift = self.amplitude.as_ref().and_then(|curve| curve.drift);
+        let drift = drift
+            .filter(|drift| drift.by_amplitude || fitted.source != UncertaintySource::TwoPoles);
+        drift.map_or(fitted, |drift| drift.frequency)
+    }
+
+    /// Returns the amplitude at which the mode has that frequency; `None` where the decays were not followed.
+    pub fn at_amplitude(&self) -> Option<FrequencyAtAmplitude> {
+        let curve = self.amplitude.as_ref()?;
+        let (value, sensor) = curve.reference.zip(curve.sensor)?;
+        Some(FrequencyAtAmplitude { value, sensor })
     }
 }
 

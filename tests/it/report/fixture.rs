@@ -186,6 +186,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         std: Some(0.03 * lines.half_line()),
         low: Some(frequency - 0.06 * lines.half_line()),
         high: Some(frequency + 0.06 * lines.half_line()),
+        at_amplitude: None,
         fit: None,
         damping: Some(0.0031),
         damping_std: Some(0.00012),

@@ -4,11 +4,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use tapjoint_numerics::bessel_i0;
 use tapjoint_numerics::stats::median;
 
 use super::{Decay, FILTER, KnownMode, LONGEST_FILTER};
+use crate::modal::Subspace;
 use crate::spectral::kaiser_beta;
 
 /// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
@@ -19,6 +21,8 @@ const PASS: f64 = 0.3;
 const PARTS: f64 = 4.0;
 /// Decay times that are followed: 104 dB.
 const REACH: f64 = 12.0;
+/// Least remainder of a neighbour beside those before it, relative: nearer ones are one.
+const DISTINCT: f64 = 1e-5;
 /// Least damping ratio: no structure with a joint has less.
 const LEAST_DAMPING: f64 = 1e-6;
 /// Neighbours are kept this far beyond the stop edge.
@@ -43,6 +47,8 @@ pub(super) struct Band {
     pub step: f64,
     /// Length of the filter (s).
     pub filter: f64,
+    /// Length of the decay (s).
+    pub length: f64,
     /// Noise density at the band's middle over the mean density of the values.
     pub noise_ratio: f64,
     /// Filter taps and their rate (Hz), for the gain at a pole.
@@ -76,10 +82,24 @@ impl Band {
         ((self.scale / self.step) as usize).max(6)
     }
 
-    /// Sum of squares of a sensor's early values.
-    fn energy(&self, sensor: usize) -> f64 {
-        let values = self.sensors[sensor].iter().take(self.early());
-        values.map(Complex64::norm_sqr).sum()
+    /// Returns the early values of every sensor (columns) without what the neighbours in the band can make of them.
+    ///
+    /// The mode is the same function of time at every sensor. What is left of it keeps the sensors' ratios, and a
+    /// stronger neighbour does not stand for the mode.
+    fn early_values(&self) -> DMatrix<Complex64> {
+        let count = self.sensors.iter().map(Vec::len).min().unwrap_or(0);
+        let rows = self.early().min(count);
+        let values = DMatrix::from_fn(rows, self.sensors.len(), |n, sensor| {
+            self.sensors[sensor][n]
+        });
+        let neighbours = DMatrix::from_fn(rows, self.neighbours.len(), |n, place| {
+            (self.neighbours[place] * (n as f64 * self.step)).exp()
+        });
+        // Fewer values than unknowns tell nothing apart.
+        match rows > 2 * self.neighbours.len() {
+            true => Subspace::new(&neighbours, DISTINCT).complement(values),
+            false => values,
+        }
     }
 }
 
@@ -122,6 +142,7 @@ pub(super) fn extract_band(
         first: decay.start + (taps.len() - 1) as f64 / 2.0 / rate,
         step: stride as f64 / rate,
         filter: taps.len() as f64 / rate,
+        length: samples as f64 / rate,
         // White noise of variance s^2 leaves the filter with s^2 sum h^2; white noise that is as dense
         // as it is in the pass band would have s^2 |H(0)|^2/stride, and H(0) = 1.
         noise_ratio: 1.0 / (stride as f64 * squares),
@@ -225,11 +246,18 @@ const FLOOR: f64 = 1e-20;
 /// Returns the sensor with the largest amplitude at the start of the decays; `None` without any.
 pub(super) fn strongest(bands: &[Band]) -> Option<usize> {
     let count = bands.iter().map(|band| band.sensors.len()).min()?;
-    (0..count)
-        .map(|sensor| (sensor, bands.iter().map(|b| b.energy(sensor)).sum::<f64>()))
-        .filter(|(_, energy)| *energy > 0.0)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(sensor, _)| sensor)
+    let mut energies = vec![0.0; count];
+    for band in bands {
+        for (energy, values) in energies.iter_mut().zip(band.early_values().column_iter()) {
+            *energy += values.norm_squared();
+        }
+    }
+    let audible = energies
+        .iter()
+        .enumerate()
+        .filter(|(_, energy)| **energy > 0.0);
+    let strongest = audible.max_by(|a, b| a.1.total_cmp(b.1));
+    strongest.map(|(sensor, _)| sensor)
 }
 
 /// Returns the sensors' weighted sum, scaled so that it has the amplitude of the sensor `reference`.
@@ -238,15 +266,15 @@ pub(super) fn strongest(bands: &[Band]) -> Option<usize> {
 /// conj(c)/v over sum |c|^2/v. They are fixed over the decay, so that an exponential stays one.
 pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
     let main = band.sensors.get(reference)?;
-    let main_energy = band.energy(reference);
+    let early = band.early_values();
+    let main_energy = early.column(reference).norm_squared();
     if main.len() < 6 || main_energy.is_nan() || main_energy <= 0.0 {
         return None;
     }
     let mut sum = vec![Complex64::ZERO; main.len()];
     let mut total = 0.0;
-    for values in &band.sensors {
-        let products = main.iter().zip(values).take(band.early());
-        let ratio = products.map(|(m, y)| m.conj() * y).sum::<Complex64>() / main_energy;
+    for (values, early_values) in band.sensors.iter().zip(early.column_iter()) {
+        let ratio = early.column(reference).dotc(&early_values) / main_energy;
         let noise = noise_variance(values, band);
         if noise.is_nan() || noise <= 0.0 {
             continue;

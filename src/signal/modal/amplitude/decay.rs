@@ -18,6 +18,8 @@ use super::{AIM, AmplitudePoint, AmplitudeVerdict, Companion, END, LONGEST, SHOR
 
 /// Numbers of exponents tried for the mode: one is a pole that does not change.
 const DEGREES: [usize; 5] = [1, 2, 3, 5, 7];
+/// Exponents of a mode whose frequency and damping change linearly with the amplitude.
+const LINEAR_DRIFT: usize = 3;
 /// Rate of the drift's terms (decays of the mode): its powers hold those of the square root of the
 /// amplitude.
 const RATE: f64 = 0.5;
@@ -54,6 +56,20 @@ pub(super) struct DecayModel {
     exponentials: Exponentials,
     /// Noise variance of the values.
     noise: f64,
+    /// The models with what the best one found beside the mode, for every number of exponents from its own on.
+    ways: Vec<Candidate>,
+    /// How much better a pole that drifts explains the decay than one that does not.
+    pub evidence: Evidence,
+}
+
+/// Fall of the sum of squares between two models of a decay, in variances of its noise, and the unknowns that it took:
+/// chi-squared where noise alone makes it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Evidence {
+    pub fall: f64,
+    pub unknowns: f64,
+    /// Degrees of freedom that the better model leaves.
+    pub freedom: f64,
 }
 
 struct Candidate {
@@ -121,11 +137,15 @@ impl DecayModel {
             // What a model of the whole decay misses is no noise.
             Some(best) => DecayModel {
                 noise: noise.min(best.fit.squares / whole.series.len() as f64),
+                ways: whole.with_more_exponents(&best),
+                evidence: whole.evidence(&best.fit.model),
                 exponentials: best.fit.model,
             },
             None => DecayModel {
                 exponentials: start,
                 noise,
+                ways: Vec::new(),
+                evidence: Evidence::default(),
             },
         }
     }
@@ -224,6 +244,41 @@ impl WholeDecay<'_> {
         criterion
             .is_finite()
             .then_some(Candidate { fit, criterion })
+    }
+
+    /// Fits the model again with every number of exponents from its own on, three at least: a change linear in the
+    /// amplitude may be too small for the criterion, and yet not for the interval.
+    fn with_more_exponents(&self, best: &Candidate) -> Vec<Candidate> {
+        let own = best.fit.model.exponents.len().max(LINEAR_DRIFT);
+        let mut all: Vec<Candidate> = Vec::new();
+        for degree in DEGREES.into_iter().filter(|degree| *degree >= own) {
+            let start = all.last().unwrap_or(best);
+            let mut model = start.fit.model.clone();
+            model.exponents.resize(degree, Complex64::ZERO);
+            all.extend(self.fit(model));
+        }
+        all
+    }
+
+    /// Compares a pole that drifts linearly with the amplitude with one that does not, with the same lines beside it.
+    fn evidence(&self, best: &Exponentials) -> Evidence {
+        let mut model = best.clone();
+        model.exponents = vec![best.pole(self.band.scale)];
+        let Some(steady) = self.fit(model) else {
+            return Evidence::default();
+        };
+        let mut model = steady.fit.model.clone();
+        model.exponents.resize(LINEAR_DRIFT, Complex64::ZERO);
+        let Some(drifting) = self.fit(model) else {
+            return Evidence::default();
+        };
+        // Of complex noise each part has half the variance.
+        let noise = 0.5 * drifting.fit.variance(self.band);
+        Evidence {
+            fall: (steady.fit.squares - drifting.fit.squares) / noise,
+            unknowns: 2.0 * (LINEAR_DRIFT - 1) as f64,
+            freedom: 2.0 * self.series.len() as f64 - 2.0 * drifting.fit.right.len() as f64,
+        }
     }
 
     /// Fits the model with the strongest line of its residual beside it: one that decays like the mode, or
@@ -357,6 +412,125 @@ impl Exponentials {
     }
 }
 
+impl DecayModel {
+    /// Returns the amplitude at a time before or after the band's first value (unit of the sensor).
+    pub fn amplitude(&self, t: f64, band: &Band) -> f64 {
+        self.exponentials.log_amplitude(t, band).exp()
+    }
+
+    /// Returns the frequency (Hz) at an amplitude (unit of the sensor) and its standard uncertainty, as the mean over
+    /// the models; `None` where the decay does not reach that amplitude.
+    pub fn frequency_at(&self, amplitude: f64, band: &Band) -> Option<(f64, f64)> {
+        let akaike = |way: &Candidate| {
+            let values = 2.0 * way.fit.residuals.len() as f64;
+            let unknowns = 2.0 * way.fit.model.parameters().len() as f64;
+            way.criterion - unknowns * (values.ln() - 2.0)
+        };
+        let least = self.ways.iter().map(akaike).fold(f64::INFINITY, f64::min);
+        let mut readings = Vec::with_capacity(self.ways.len());
+        for way in &self.ways {
+            let weight = (-0.5 * (akaike(way) - least)).exp();
+            if weight > 0.01 {
+                let (frequency, std) = way.fit.frequency_at(amplitude, band)?;
+                readings.push((weight, frequency, std));
+            }
+        }
+        let total: f64 = readings.iter().map(|(weight, _, _)| weight).sum();
+        let mean = readings.iter().map(|(w, value, _)| w * value).sum::<f64>() / total;
+        let variances = readings
+            .iter()
+            .map(|(w, value, std)| w * (std * std + (value - mean).powi(2)));
+        let variance = variances.sum::<f64>() / total;
+        (mean.is_finite() && variance > 0.0).then(|| (mean, variance.sqrt()))
+    }
+}
+
+impl Exponentials {
+    /// Log of the mode's amplitude at a time, the filter's gain taken out.
+    fn log_amplitude(&self, t: f64, band: &Band) -> f64 {
+        let gain = band.gain(self.pole(t)).norm();
+        self.amplitude.norm().ln() + self.exponent(t).re - gain.ln()
+    }
+
+    /// Returns the time at which the mode's amplitude falls to one; `None` where it does not within the filter's first
+    /// half and `last`.
+    fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
+        const PARTS: usize = 200;
+        let first = -0.5 * band.filter;
+        let above = |t: f64| self.log_amplitude(t, band) > amplitude.ln();
+        let time = |part: usize| first + (last - first) * part as f64 / PARTS as f64;
+        let part = (0..=PARTS).find(|part| !above(time(*part)))?;
+        let (mut early, mut late) = (time(part.checked_sub(1)?), time(part));
+        for _ in 0..50 {
+            let middle = 0.5 * (early + late);
+            match above(middle) {
+                true => early = middle,
+                false => late = middle,
+            }
+        }
+        Some(late)
+    }
+
+    /// Derivative of the pole with time (1/s^2).
+    fn turn(&self, t: f64) -> Complex64 {
+        let step = 1e-3 / self.rate;
+        (self.pole(t + step) - self.pole(t - step)) / (2.0 * step)
+    }
+}
+
+impl Fit {
+    /// Variance of the noise about the mode's frequency.
+    ///
+    /// Residuals that agree with their neighbours (correlation r) are what the model misses. They leave (1 - r)/(1 + r)
+    /// of the values' information. By chance the standard deviation of r is 1/sqrt(2n) with n complex values.
+    fn variance(&self, band: &Band) -> f64 {
+        let count = self.residuals.len() as f64;
+        let freedom = (count - self.right.len() as f64).max(1.0);
+        let pairs = self.residuals.windows(2);
+        let products: f64 = pairs.map(|r| (r[0].conj() * r[1]).re).sum();
+        let agreement = products / self.squares.max(f64::MIN_POSITIVE);
+        let agreement = (agreement - CHANCE / (2.0 * count).sqrt()).clamp(0.0, 0.9);
+        self.squares / freedom * band.noise_ratio * (1.0 + agreement) / (1.0 - agreement)
+    }
+
+    /// Returns the frequency (Hz) where the mode's amplitude is the given one, and its standard uncertainty.
+    ///
+    /// With g the derivatives of the pole p to the parameters, h those of the logarithm of the mode and p' the pole's
+    /// own in time, the frequency |p| changes by Re(conj(p) dp)/|p|, and the time of the amplitude by -Re(h)/Re(p).
+    fn frequency_at(&self, amplitude: f64, band: &Band) -> Option<(f64, f64)> {
+        let model = &self.model;
+        let last = band.step * self.residuals.len() as f64;
+        let t = model.time_at(amplitude, last, band)?;
+        let own = model.pole(t);
+        let pole = Complex64::new(own.re, own.im + band.omega);
+        let modulus = pole.norm();
+        let turning = (pole.conj() * model.turn(t)).re / modulus / own.re;
+        let fall = (-model.rate * t).exp();
+        let v = 1.0 - fall;
+        let mut row = vec![Complex64::ZERO; self.right.len()];
+        row[0] = -Complex64::i() * turning / model.amplitude;
+        for place in 0..model.exponents.len() {
+            let (of_pole, of_log) = match place {
+                0 => (1.0, t),
+                _ => (
+                    place as f64 * v.powi(place as i32 - 1) * model.rate * fall,
+                    v.powi(place as i32),
+                ),
+            };
+            row[1 + place] = Complex64::i() * (pole.conj() / modulus * of_pole - turning * of_log);
+        }
+        let inverse = self.inverse()?;
+        let mut variance = Complex64::ZERO;
+        for (i, a) in row.iter().enumerate() {
+            for (k, b) in row.iter().enumerate() {
+                variance += a * inverse[(i, k)] * b.conj();
+            }
+        }
+        let std = (0.5 * self.variance(band) * variance.re.max(0.0)).sqrt();
+        Some((modulus / TAU, std / TAU))
+    }
+}
+
 /// A parameter known beforehand: index, value, and 1/variance (of both parts together).
 #[derive(Debug, Clone, Copy)]
 struct Prior {
@@ -365,6 +539,8 @@ struct Prior {
     weight: f64,
 }
 
+/// Standard deviations by which a correlation of residuals counts as chance.
+const CHANCE: f64 = 1.0;
 /// Most steps of a fit.
 const STEPS: usize = 25;
 /// Share of the sum of squares at which another step gains nothing.

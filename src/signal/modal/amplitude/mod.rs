@@ -24,6 +24,7 @@
 
 mod band;
 mod decay;
+mod stated;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -33,6 +34,8 @@ use tapjoint_numerics::stats::student;
 
 use super::from_one;
 use decay::DecayModel;
+use stated::WholeDecays;
+pub use stated::{Drift, FrequencyAtAmplitude};
 
 /// The ringing after one tap, force no longer acting.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +157,11 @@ pub struct AmplitudeCurve {
     pub companions: Vec<Companion>,
     /// Verdict on the curve.
     pub verdict: AmplitudeVerdict,
+    /// Amplitude at which a pole that does not change has the frequency of one that does (unit of the sensor); `None`
+    /// where no decay was followed.
+    pub reference: Option<f64>,
+    /// The frequency there, where the decays show that it changes.
+    pub drift: Option<Drift>,
 }
 
 /// Farthest that a point may lie from its mode's frequency (1, relative). Joints that slip move a frequency by a few
@@ -179,12 +187,15 @@ pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeC
             damping: None,
             companions: Vec::new(),
             verdict: AmplitudeVerdict::TooFewPoints,
+            reference: None,
+            drift: None,
         };
         let Some(sensor) = curve.sensor else {
             return curve;
         };
         curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
         let (mut doubts, mut followed) = (Vec::new(), 0);
+        let mut models = Vec::new();
         for band in &bands {
             let Some(series) = band::combine(band, sensor) else {
                 continue;
@@ -202,6 +213,14 @@ pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeC
             curve.points.extend(points);
             doubts.extend(model.doubt(band));
             followed += 1;
+            models.push((band, model));
+        }
+        if let Some(whole) = WholeDecays::new(&models) {
+            curve.reference = Some(whole.reference());
+            // Beside a mode so near, or where two poles that do not change explain the decays as well, nothing drifts.
+            if doubts.is_empty() {
+                curve.drift = whole.drift(&curve.points);
+            }
         }
         if curve.points.len() < LEAST_POINTS {
             return curve;

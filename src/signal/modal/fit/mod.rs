@@ -17,6 +17,7 @@ mod variable_projection;
 
 pub use group::Accepted;
 pub use modal_constant::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
+pub(super) use mode_fit::SCATTERS;
 pub use mode_fit::{
     ColumnAmplitude, ExtraMode, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
     scatter_about_mean, weighted_mean,

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, TapForce, Unfit, modal_constants,
+    PoleStart, TapForce, UncertaintySource, Unfit, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
@@ -105,7 +105,11 @@ impl Candidates<'_> {
             (accepted, fits) = self.settled(&mut starts, &mut added, &settings);
         }
         let mut misfits: Vec<&ModeFit> = fits.iter().flatten().collect();
-        misfits.retain(|fit| fit.residual_correlation > 0.0);
+        // Taps that scatter leave more than noise as well, and their interval rests on that already.
+        misfits.retain(|fit| {
+            let steady = fit.frequency.source == UncertaintySource::Residual;
+            fit.inflation > 1.0 || (steady && fit.residual_correlation > 0.0)
+        });
         misfits.sort_by(|a, b| {
             let inflations = b.inflation.total_cmp(&a.inflation);
             inflations.then(b.residual_correlation.total_cmp(&a.residual_correlation))

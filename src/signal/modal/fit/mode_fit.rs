@@ -28,10 +28,10 @@ pub(in crate::modal) const SCATTERS: f64 = 0.2;
 const SCATTERS_CLEARLY: f64 = 0.01;
 /// Factor on two intervals of 95 % that shall both hold their values in 95 %: each must in 97.5 %, 2.241/1.960.
 const BOTH: f64 = 1.143;
-/// Least share of the larger energy with which a pole counts. 0.005: an amplitude of 7 % at equal decay. Of the intervals of
-/// modes read as one 98.7 % hold both, and 0.4 % are beyond three standard deviations; at 0.02 it is 93.6 and 4 %
-/// (`examples/interval_coverage --cell close --modes 500`).
-const LEAST_ENERGY: f64 = 0.005;
+/// Least share of the larger energy with which a pole counts. 0.02: a seventh of the amplitude at equal decay. At 0.005 1 %
+/// more of the intervals of modes read as one hold both, but those of a mode whose taps scatter or that changes with its
+/// amplitude hold a pole that only mends the beginning of a decay.
+const LEAST_ENERGY: f64 = 0.02;
 /// A residual correlation beyond so many standard deviations is a misfit. 3: by chance one fit in 700.
 const CORRELATED: f64 = 3.0;
 /// Steps of the fit of one tap; it starts from the joint poles, or within a half width of its own.

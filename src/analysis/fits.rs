@@ -344,6 +344,9 @@ pub(super) fn is_clear(fit: &ModeFit) -> bool {
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
 }
 
+/// Reach of hum (half-power half widths of a mode, or half lines): the bands in which decays are followed are as wide.
+const BESIDE_HUM: f64 = 10.0;
+
 /// Decays of all taps, and what of them is fitted.
 pub(super) struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
@@ -415,7 +418,7 @@ impl FreeDecays {
             lines,
             data: &self.data,
             stabilisation: &stabilisation,
-            hum,
+            hum: hum.clone(),
         };
         candidates.fit(readings);
         let fitted: Vec<&mut FittedReading> = readings
@@ -430,7 +433,17 @@ impl FreeDecays {
             })
             .collect();
         let curves = follow_amplitude(&self.decays, &known);
-        for (fit, curve) in fitted.into_iter().zip(curves) {
+        for (fit, mut curve) in fitted.into_iter().zip(curves) {
+            // Beside hum the band of a mode does not show a change of its frequency: the line beats with it.
+            let mode = &fit.mode;
+            let width = mode.frequency.value * mode.damping_ratio.value;
+            let reach = BESIDE_HUM * width.max(lines.half_line());
+            if hum
+                .iter()
+                .any(|line| (line - mode.frequency.value).abs() < reach)
+            {
+                curve.drift = None;
+            }
             fit.amplitude = Some(curve);
             fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
         }

@@ -232,6 +232,8 @@ struct Case {
     samples: usize,
     /// Quiet samples before the first tap.
     lead: usize,
+    /// Frequency of the grid (Hz).
+    grid: f64,
     responses: usize,
     has_hammer: bool,
     /// Height of the noise below the peak of the responses (dB).
@@ -317,6 +319,11 @@ impl Case {
             scatter: match cell {
                 Cell::TwoTaps => log_uniform(random, 1e-5, 3e-3),
                 _ => 0.0,
+            },
+            grid: match cell {
+                // Large grids keep to 0.02 Hz mostly, and to 0.2 Hz always.
+                Cell::Hum => 50.0 + random.random_range(-0.1..0.1),
+                _ => 50.0,
             },
         }
     }
@@ -467,7 +474,7 @@ impl Case {
                 _ => 0.0,
             };
             for (n, (x, noise)) in response.iter_mut().zip(noise).enumerate() {
-                let turn = TAU * 50.0 * n as f64 / self.rate + phase;
+                let turn = TAU * self.grid * n as f64 / self.rate + phase;
                 *x += noise_std * noise + hum * (turn.sin() + 0.3 * (3.0 * turn).sin());
             }
             let rail = match self.cell {

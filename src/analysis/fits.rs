@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, TapForce, UncertaintySource, Unfit, modal_constants,
+    PoleStart, SteadyLine, TapForce, UncertaintySource, Unfit, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
@@ -72,8 +72,8 @@ pub(super) struct Candidates<'a> {
     pub data: &'a ModalData,
     /// Result of the polyreference fit.
     pub stabilisation: &'a Stabilisation,
-    /// Frequencies of mains hum (Hz).
-    pub hum: Vec<f64>,
+    /// Mains hum.
+    pub hum: Vec<SteadyLine>,
 }
 
 impl Candidates<'_> {
@@ -240,7 +240,15 @@ impl Candidates<'_> {
                 width < STEADY_WIDTH * line && (mode.frequency - reading.frequency).abs() <= line
             })
         });
-        narrow.last()?.take()
+        let nearest = narrow.min_by(|a, b| {
+            let distances = [a, b].map(|mode| {
+                mode.map_or(f64::INFINITY, |mode| {
+                    (mode.frequency - reading.frequency).abs()
+                })
+            });
+            distances[0].total_cmp(&distances[1])
+        });
+        nearest?.take()
     }
 
     /// Returns the reading of a fitted mode that makes no peak.
@@ -344,9 +352,6 @@ pub(super) fn is_clear(fit: &ModeFit) -> bool {
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
 }
 
-/// Reach of hum (half-power half widths of a mode, or half lines): the bands in which decays are followed are as wide.
-const BESIDE_HUM: f64 = 10.0;
-
 /// Decays of all taps, and what of them is fitted.
 pub(super) struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
@@ -401,24 +406,25 @@ impl FreeDecays {
     }
 
     /// Fits the decays, and puts into the readings the fits with what else the decays give: modal constants, and
-    /// frequency and damping against amplitude. `hum`: frequencies of mains hum (Hz).
+    /// frequency and damping against amplitude, beside the lines of `hum`.
     pub(super) fn fit(
         &self,
         readings: &mut Vec<ModeReading>,
         lines: &Lines,
         kinds: &[Option<ResponseForm>],
-        hum: Vec<f64>,
+        hum: Vec<SteadyLine>,
     ) -> Stabilisation {
         let functions = self.functions();
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
         let first = self.data.frequencies().first().copied().unwrap_or(0.0);
         let spacing = self.data.spacing();
         let stabilisation = stabilisation(first, spacing, &columns, BandPeaks::Together);
+        let steady: Vec<f64> = hum.iter().map(|line| line.frequency).collect();
         let candidates = Candidates {
             lines,
             data: &self.data,
             stabilisation: &stabilisation,
-            hum: hum.clone(),
+            hum,
         };
         candidates.fit(readings);
         let fitted: Vec<&mut FittedReading> = readings
@@ -432,18 +438,8 @@ impl FreeDecays {
                 damping_ratio: fit.mode.damping_ratio.value,
             })
             .collect();
-        let curves = follow_amplitude(&self.decays, &known);
-        for (fit, mut curve) in fitted.into_iter().zip(curves) {
-            // Beside hum the band of a mode does not show a change of its frequency: the line beats with it.
-            let mode = &fit.mode;
-            let width = mode.frequency.value * mode.damping_ratio.value;
-            let reach = BESIDE_HUM * width.max(lines.half_line());
-            if hum
-                .iter()
-                .any(|line| (line - mode.frequency.value).abs() < reach)
-            {
-                curve.drift = None;
-            }
+        let curves = follow_amplitude(&self.decays, &known, &steady);
+        for (fit, curve) in fitted.into_iter().zip(curves) {
             fit.amplitude = Some(curve);
             fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
         }

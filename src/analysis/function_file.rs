@@ -224,7 +224,7 @@ fn spectra_of_functions(
         reading.select_estimate(wanted);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
-    set_strengths(&mut readings, forms);
+    set_strengths(&mut readings, forms, false);
     MeasuredSpectra {
         averages: AveragedSpectra {
             h1: Some(values),

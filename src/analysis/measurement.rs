@@ -365,7 +365,7 @@ impl<'a> Stage<'a> {
         label_steady_lines(&mut readings, &quiet.grids, self.lines.duration, mains);
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         label_combinations(&mut readings);
-        set_strengths(&mut readings, &self.settings.kinds);
+        set_strengths(&mut readings, &self.settings.kinds, true);
         Ok(MeasuredSpectra {
             force_window: self.force_window(&readings, &averages, ungated.as_deref()),
             averages,

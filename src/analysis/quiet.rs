@@ -1,6 +1,7 @@
 //! The quiet stretch before the first tap: the noise that it predicts, and mains hum.
 
 use num_complex::Complex64;
+use tapjoint_signal::modal::fit::SteadyLine;
 use tapjoint_signal::modal::{
     GridFrequency, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, near_mains,
 };
@@ -111,8 +112,8 @@ impl PreTriggerNoise {
         amplitudes.is_steady(settings).then_some(harmonic)
     }
 
-    /// Returns the frequencies of mains hum near the readings (Hz): multiples of the grids that any response shows
-    /// before the first tap.
+    /// Returns the lines of mains hum near the readings: multiples of the grids that any response shows before the first
+    /// tap.
     ///
     /// Under the peak of a resonance hum makes no peak of its own, and has no label. A fit without it would be wrong.
     pub(super) fn hum_beside(
@@ -120,7 +121,7 @@ impl PreTriggerNoise {
         readings: &[ModeReading],
         lines: &Lines,
         settings: &MainsSettings,
-    ) -> Vec<f64> {
+    ) -> Vec<SteadyLine> {
         let (mut labelled, mut found) = (Vec::new(), Vec::new());
         for reading in readings {
             if let Some(PeakLabel::Mains(harmonic)) = reading.label {
@@ -128,9 +129,9 @@ impl PreTriggerNoise {
                 let own = grids.find_map(|grid| {
                     let number = (harmonic / grid.nominal).round();
                     let is_own = number * grid.nominal == harmonic;
-                    is_own.then(|| grid.multiple(number as usize))
+                    is_own.then(|| grid.line(number as usize))
                 });
-                labelled.push(own.unwrap_or(harmonic));
+                labelled.extend(own);
                 continue;
             }
             let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
@@ -140,22 +141,22 @@ impl PreTriggerNoise {
                 let reach = reach.min(0.5 * MOST_HARMONICS * mains);
                 let first = ((reading.frequency - reach) / mains).ceil().max(1.0) as usize;
                 let last = ((reading.frequency + reach) / mains).floor().max(0.0) as usize;
-                found.extend((first..=last).map(|number| grid.multiple(number)));
+                found.extend((first..=last).map(|number| grid.line(number)));
             }
         }
-        found.sort_by(f64::total_cmp);
-        found.dedup();
-        found.retain(|&harmonic| {
+        found.retain(|line: &SteadyLine| {
             self.responses.iter().any(|samples| {
                 let samples = &samples[samples.len().saturating_sub(MOST_QUIET)..];
-                let before = line_amplitude(samples, self.sample_rate, harmonic);
-                let noise = noise_beside(samples, self.sample_rate, harmonic);
+                let before = line_amplitude(samples, self.sample_rate, line.frequency);
+                let noise = noise_beside(samples, self.sample_rate, line.frequency);
                 (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)
             })
         });
         found.extend(labelled);
-        found.sort_by(f64::total_cmp);
-        found.dedup();
+        found.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        // Multiples of both grids lie at 300, 600 Hz and so on: one line.
+        let line = 2.0 * lines.half_line();
+        found.dedup_by(|a, b| a.frequency - b.frequency < line);
         found
     }
 

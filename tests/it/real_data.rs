@@ -234,7 +234,7 @@ fn val_the_bolted_beam_softens_with_amplitude() {
         frequency,
         damping_ratio: 0.0015,
     });
-    let curves = follow_amplitude(&[decay], &modes);
+    let curves = follow_amplitude(&[decay], &modes, &[]);
     let change = |mode: usize| {
         assert_eq!(curves[mode].verdict, AmplitudeVerdict::Changes);
         let early = at_time(&curves[mode], 0, 0.1).expect("the decay's start");

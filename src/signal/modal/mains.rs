@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64;
 
 use super::ModeReading;
-use super::fit::ModeFit;
+use super::fit::{ModeFit, SteadyLine};
 use crate::spectral::{line_amplitude, noise_beside};
 
 /// Frequencies of the grids of the world (Hz).
@@ -45,7 +45,7 @@ impl Default for MainsSettings {
 /// Multiples up to this one are looked for over the whole range of the grid; higher ones only beside a known place.
 /// Rectifiers hum at every second one, motors at the third.
 const SOUGHT: usize = 7;
-/// Highest multiple that improves the grid's frequency.
+/// Highest multiple that improves the grid's frequency, or is hum without a quiet stretch.
 const HIGHEST: usize = 20;
 /// Most samples that are searched: some seconds. Each multiple passes over all of them.
 const MOST_SAMPLES: usize = 1 << 16;
@@ -96,7 +96,10 @@ impl GridFrequency {
             }
             let (centre, reach) = match known {
                 Some((frequency, variance)) => (frequency, 4.0 * variance.sqrt()),
-                None if number <= SOUGHT => (nominal, settings.deviation),
+                None if number <= SOUGHT && !is_of_both(times * nominal) => {
+                    (nominal, settings.deviation)
+                }
+                None if number <= SOUGHT => continue,
                 None => break,
             };
             let Some(line) = strongest(&responses, sample_rate, times * centre, times * reach)
@@ -138,10 +141,23 @@ impl GridFrequency {
         (number >= 1.0 && near).then_some(number as usize)
     }
 
+    /// Returns a multiple as a steady line.
+    pub fn line(&self, number: usize) -> SteadyLine {
+        SteadyLine {
+            frequency: self.multiple(number),
+            bound: number as f64 * self.bound,
+        }
+    }
+
     /// Returns the frequency (Hz) of a multiple.
     pub fn multiple(&self, number: usize) -> f64 {
         number as f64 * self.frequency
     }
+}
+
+/// Returns true for a frequency (Hz) that is a multiple of both grids: it does not tell which of them hums.
+fn is_of_both(frequency: f64) -> bool {
+    GRIDS.iter().all(|grid| frequency % grid == 0.0)
 }
 
 /// The last samples under a Hann window whose mean is 1.
@@ -275,7 +291,8 @@ pub fn label_steady_lines(
         let Some((grid, number)) = near_mains(frequency, reading.std.unwrap_or(0.0), &whole) else {
             continue;
         };
-        if 2.0 * PI * frequency * ratio * duration > STEADY_DECAY {
+        // Far up the multiples of a grid whose frequency is not known are everywhere.
+        if number > HIGHEST || 2.0 * PI * frequency * ratio * duration > STEADY_DECAY {
             continue;
         }
         let fit = reading.fit.as_deref();
@@ -368,6 +385,10 @@ mod tests {
                 }
             }
         }
+        // 300 Hz is a multiple of both.
+        let fifty: &[(f64, f64)] = &[(1.0, 0.02), (6.0, 0.02)];
+        let found = GridFrequency::read(60.0, &[hum(49.95, fifty, 1.0, 1)], 2560.0, &settings);
+        assert!(!found.is_seen, "{found:?}");
         // Two periods of hum tell nothing, and neither do no samples.
         let short = hum(50.0, &[(1.0, 1.0)], 0.04, 1);
         for samples in [short, Vec::new()] {

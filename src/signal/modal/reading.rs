@@ -50,8 +50,8 @@ pub struct ModeReading {
     pub prominence_db: Option<f64>,
     /// Height above the noise (dB), where known.
     pub above_noise_db: Option<f64>,
-    /// Amplitude over that of the strongest mode at its frequency or above (1, see [`super::set_strengths`]); `None` without
-    /// a fit.
+    /// Amplitude over that which a mode of its frequency could have (1, see [`super::set_strengths`]). Of a pole that makes
+    /// no peak a tenth counts. `None` without a fit, and where nothing tells what a mode could have.
     pub strength: Option<f64>,
     /// Kind of a peak that is no mode of the structure.
     pub label: Option<PeakLabel>,

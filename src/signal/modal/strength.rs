@@ -16,45 +16,73 @@ const FALLEN: f64 = 0.03;
 /// A pole that makes no peak counts a tenth where others make peaks: poles that only mend the line of another have large
 /// amplitudes that cancel.
 const NO_PEAK: f64 = 0.1;
-/// A pole that makes no peak is weak below this strength: a hundredth of the amplitude that a mode could have. Simulated
-/// cantilevers with one to three sensors have 2 % of their modes there, and the peak of a mode is seen nearly always.
-const WEAK: f64 = 0.01 * NO_PEAK;
+/// A pole that makes no peak and has less than this part of the amplitude that a mode could have is too weak for one. 1 %
+/// of modes are weaker where amplitudes are uniform, and the peak of a mode is seen nearly always.
+const WEAK: f64 = 0.01;
 
-/// Sets the strengths of ascending readings of one recording, and labels poles that are too weak for a mode. `kinds` are
-/// the quantities of the sensors, by their number; one that is not known is an acceleration.
-pub fn set_strengths(readings: &mut [ModeReading], kinds: &[Option<ResponseForm>]) {
+/// Sets the strengths of ascending readings of one recording, and labels poles that are too weak for a mode.
+///
+/// `kinds` are the quantities of the sensors, by their number; one that is not known is an acceleration. `force_falls`:
+/// the readings are decays after taps, whose force falls with frequency. Where it was measured, modal constants do
+/// without it.
+pub fn set_strengths(
+    readings: &mut [ModeReading],
+    kinds: &[Option<ResponseForm>],
+    force_falls: bool,
+) {
     let mut fits = readings.iter().flat_map(|reading| reading.fit.as_deref());
     let of_constants = fits.any(|fit| !fit.constants.is_empty());
-    let may_be_mode = readings.iter().map(|reading| reading.label.is_none());
-    let may_be_mode: Vec<bool> = may_be_mode.collect();
-    let own = readings.iter().zip(&may_be_mode);
-    let any_peak = own
-        .clone()
-        .any(|(own, mode)| *mode && own.prominence_db.is_some());
     let mut amplitudes: Vec<Option<f64>> = Vec::with_capacity(readings.len());
-    for (reading, may_be_mode) in own {
+    for reading in readings.iter() {
         let squares = match (reading.fit.as_deref(), of_constants) {
+            _ if reading.label.is_some() => 0.0,
             (Some(fit), true) => fit.constants.iter().map(|one| one.value.powi(2)).sum(),
             (Some(_), false) => squares_of_velocities(reading, kinds),
             (None, _) => 0.0,
         };
-        let peakless = any_peak && reading.prominence_db.is_none();
-        let amplitude = squares.sqrt() * if peakless { NO_PEAK } else { 1.0 };
-        amplitudes.push((*may_be_mode && amplitude > 0.0).then_some(amplitude));
+        amplitudes.push((squares > 0.0).then(|| squares.sqrt()));
     }
-    // The force of a tap falls with frequency. A mode is compared with the strongest at its frequency or above.
-    let strongest = amplitudes.iter().flatten().copied().fold(0.0, f64::max);
-    let mut reference: f64 = FALLEN * strongest;
-    for (reading, amplitude) in readings.iter_mut().zip(amplitudes).rev() {
-        reference = reference.max(amplitude.unwrap_or(0.0));
-        reading.strength = amplitude.map(|amplitude| amplitude / reference);
-        if reading.prominence_db.is_none()
-            && reading.strength < Some(WEAK)
-            && reading.strength.is_some()
-        {
+    let of_peaks = readings.iter().zip(&amplitudes);
+    let any_peak = of_peaks
+        .clone()
+        .any(|(reading, own)| own.is_some() && reading.prominence_db.is_some());
+    let mut counted = Vec::with_capacity(readings.len());
+    for (reading, amplitude) in of_peaks {
+        let peakless = any_peak && reading.prominence_db.is_none();
+        let part = if peakless { NO_PEAK } else { 1.0 };
+        counted.push(amplitude.map(|amplitude| part * amplitude));
+    }
+    let references = references(&counted, force_falls && !of_constants);
+    let strongest = counted.iter().flatten().copied().fold(0.0, f64::max);
+    for (index, reading) in readings.iter_mut().enumerate() {
+        let (Some(raw), Some(own)) = (amplitudes[index], counted[index]) else {
+            reading.strength = None;
+            continue;
+        };
+        // How far the force had fallen at a peak without a stronger one above it is not known.
+        let is_own = own >= references[index] && own < strongest;
+        reading.strength = (!is_own).then(|| own / references[index]);
+        if reading.prominence_db.is_none() && raw < WEAK * references[index] {
             reading.label = Some(PeakLabel::Weak);
         }
     }
+}
+
+/// Amplitude that a mode at each reading's frequency could have: that of the strongest of all or, where the force falls
+/// with frequency, of the strongest at this frequency or above.
+fn references(amplitudes: &[Option<f64>], force_falls: bool) -> Vec<f64> {
+    let strongest = amplitudes.iter().flatten().copied().fold(0.0, f64::max);
+    let mut reference = if force_falls {
+        FALLEN * strongest
+    } else {
+        strongest
+    };
+    let mut references = vec![reference; amplitudes.len()];
+    for (index, amplitude) in amplitudes.iter().enumerate().rev() {
+        reference = reference.max(amplitude.unwrap_or(0.0));
+        references[index] = reference;
+    }
+    references
 }
 
 /// Sum over all columns of the squared amplitudes of velocity (any unit that all readings share).

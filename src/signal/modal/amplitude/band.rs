@@ -77,6 +77,11 @@ impl Band {
         Complex64::new(pole.re, self.omega + pole.im).norm() / TAU
     }
 
+    /// Distance from the middle (Hz) beyond which nothing passes.
+    pub fn stop_edge(&self) -> f64 {
+        KAISER_LENGTH / (1.0 - PASS) / self.filter
+    }
+
     /// Number of values in the first decay time, at least six.
     fn early(&self) -> usize {
         ((self.scale / self.step) as usize).max(6)

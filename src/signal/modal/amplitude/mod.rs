@@ -171,8 +171,13 @@ const FARTHEST: f64 = 0.1;
 /// Least points of a trend: two of its own, and two more for its uncertainty.
 const LEAST_POINTS: usize = 4;
 
-/// Follows frequency and damping against amplitude, for every mode.
-pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeCurve> {
+/// Follows frequency and damping against amplitude, for every mode. `steady_lines`: frequencies of hum (Hz); no change of
+/// the stated frequency is read in a band that holds one.
+pub fn follow_amplitude(
+    decays: &[Decay],
+    modes: &[KnownMode],
+    steady_lines: &[f64],
+) -> Vec<AmplitudeCurve> {
     let indices = (0..modes.len()).into_par_iter();
     let curves = indices.map(|index| {
         let taps = decays.iter().enumerate();
@@ -217,8 +222,13 @@ pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeC
         }
         if let Some(whole) = WholeDecays::new(&models) {
             curve.reference = Some(whole.reference());
-            // Beside a mode so near, or where two poles that do not change explain the decays as well, nothing drifts.
-            if doubts.is_empty() {
+            // Beside a mode so near, or where two poles that do not change explain the decays as well, nothing drifts. Hum
+            // beats with the mode, which looks like a change.
+            let frequency = modes[index].frequency;
+            let widest = bands.iter().map(band::Band::stop_edge).fold(0.0, f64::max);
+            let mut lines = steady_lines.iter();
+            let has_hum = lines.any(|line| (line - frequency).abs() < widest);
+            if doubts.is_empty() && !has_hum {
                 curve.drift = whole.drift(&curve.points);
             }
         }

@@ -70,21 +70,20 @@ impl<'a> WholeDecays<'a> {
 
     /// Returns the frequency at the reference amplitude; `None` where the decays do not show that it changes.
     ///
-    /// Every decay has a frequency there. Their mean is weighted by the uncertainties. If they scatter beyond noise, the
+    /// The decays that reach the amplitude have a frequency there. Their mean is weighted by the uncertainties. If they scatter beyond noise, the
     /// interval rests on the scatter, with Student's t. If they scatter so much that no law of the amplitude explains
     /// them, the interval holds all frequencies of the curve's `points` down to a tenth of the largest amplitude.
     pub fn drift(&self, points: &[AmplitudePoint]) -> Option<Drift> {
-        let (mut fall, mut unknowns, mut freedom) = (0.0, 0.0, 0.0);
+        let (mut fall, mut unknowns) = (0.0, 0.0);
         for (_, model) in self.models {
             fall += model.evidence.fall;
             unknowns += model.evidence.unknowns;
-            freedom += model.evidence.freedom;
         }
         if unknowns == 0.0 || chi_square_tail(fall, unknowns) > LEVEL {
             return None;
         }
         let reference = self.reference();
-        let (mut there, mut at_one_time) = (Vec::new(), Vec::new());
+        let (mut there, mut at_one_time, mut freedom) = (Vec::new(), Vec::new(), 0.0);
         for ((band, model), start) in self.models.iter().zip(&self.starts) {
             let own = part(-band.decay * band.length) * start;
             // A decay that does not reach the amplitude says nothing of it.
@@ -93,6 +92,7 @@ impl<'a> WholeDecays<'a> {
                 model.frequency_at(own, band),
             ) {
                 there.push(one);
+                freedom += model.evidence.freedom;
                 at_one_time.push(other);
             }
         }
@@ -117,6 +117,8 @@ impl<'a> WholeDecays<'a> {
                 .iter()
                 .filter(|p| p.amplitude >= LEAST_PART * largest);
             frequency.widen_to_all(counted.map(|point| point.frequency));
+            frequency.source = UncertaintySource::Decays;
+            frequency.freedom = freedom;
         }
         let by_amplitude = there.len() > 1
             && scatter_about_mean(&at_one_time) - scatter_about_mean(&there) > DECIDES;

@@ -13,15 +13,10 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use tapjoint_numerics::stats::chi_square_tail;
 
-use super::variable_projection::{
-    DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes, half_width,
-};
-use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
+use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, Slopes, half_width};
+use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit, steady};
 use crate::modal::Subspace;
 
-/// Distance of the two poles that stand for a steady line from its frequency (lines). 0.02: over the record such an error
-/// turns the line by a sixteenth of a turn, which a change in proportion to time still follows to 1 %.
-const OFF_STEADY: f64 = 0.02;
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
 /// by 3 % (computed from the information on the pole on all lines and on those of the band).
 const HALF_WIDTHS: f64 = 10.0;
@@ -135,12 +130,9 @@ impl<'a> BandData<'a> {
             }
         }
         let steady = accepted.settings.steady_lines.iter();
-        let hum = steady.map(|&frequency| frequency / data.spacing());
+        let hum = steady.map(|line| line.frequency / data.spacing());
         let hum = hum.filter(|position| reach.contains(position));
-        // Two poles beside each other span a steady line and its change, to first order, by an error of its frequency.
-        near.extend(hum.flat_map(|position| {
-            [-OFF_STEADY, OFF_STEADY].map(|off| Complex64::new(-STEADY, position + off))
-        }));
+        near.extend(hum.flat_map(steady::poles_of));
         Ok(BandData {
             data,
             lines,
@@ -174,7 +166,7 @@ impl<'a> BandData<'a> {
     }
 
     /// Returns the problem with `terms` terms of background, its columns in units of `noise`.
-    fn problem(&self, terms: usize, noise: &[f64]) -> PoleProblem {
+    pub fn problem(&self, terms: usize, noise: &[f64]) -> PoleProblem {
         let near = self.lines.model(&self.near);
         let split = near.ncols();
         let mut raw = near.resize_horizontally(split + 2 * terms, 0.0);
@@ -502,6 +494,8 @@ const STILL: f64 = 0.02;
 /// Number of first sweeps over functions that fit amplitudes only and keep poles of known damping. 2: the second sweep
 /// knows the amplitudes of all neighbours. Without them a pole would move to its neighbour.
 const HELD_SWEEPS: usize = 2;
+/// Number of times that steady lines are placed. 2: the first time the modes beside them are disturbed by the wrong place.
+const PLACED: usize = 2;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;
 
@@ -628,8 +622,20 @@ impl Accepted<'_> {
         alive.map(|(index, mode)| (index, mode.pole)).collect()
     }
 
-    /// Sweeps until the poles stay; returns the groups of the last sweep.
+    /// Sweeps until the poles stay, and again where steady lines move; returns the groups of the last sweep.
     pub(super) fn run(&mut self) -> Vec<Group> {
+        let mut fitted = self.sweeps();
+        for _ in 0..PLACED {
+            if !self.place_steady_lines(&fitted) {
+                break;
+            }
+            fitted = self.sweeps();
+        }
+        fitted
+    }
+
+    /// Sweeps until the poles stay; returns the groups of the last sweep.
+    fn sweeps(&mut self) -> Vec<Group> {
         let mut fitted = Vec::new();
         let is_function = matches!(self.data.basis(), Basis::FrequencyResponse { .. });
         // Poles that were fitted before know their neighbours.

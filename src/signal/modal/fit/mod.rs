@@ -13,6 +13,7 @@
 mod group;
 mod modal_constant;
 mod mode_fit;
+mod steady;
 mod variable_projection;
 
 pub use group::Accepted;
@@ -22,6 +23,7 @@ pub use mode_fit::{
     ColumnAmplitude, ExtraMode, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
     scatter_about_mean, weighted_mean,
 };
+pub use steady::SteadyLine;
 pub use tapjoint_numerics::least_squares::StopReason;
 
 use num_complex::Complex64;
@@ -42,8 +44,8 @@ pub struct FitSettings {
     /// Decay that an exponential window added to what is fitted (1/s). 0: free decays are fitted
     /// without a window.
     pub added_decay: f64,
-    /// Frequencies of steady lines, mains hum (Hz), to be fitted as such. None.
-    pub steady_lines: Vec<f64>,
+    /// Steady lines, mains hum, to be fitted as such. None.
+    pub steady_lines: Vec<SteadyLine>,
 }
 
 /// Reason why data cannot be fitted at all.

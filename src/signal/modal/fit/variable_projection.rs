@@ -35,7 +35,7 @@ pub(super) fn half_width(pole: Complex64) -> f64 {
     pole.re.hypot(0.5)
 }
 
-/// Least decay (lines) of a steady line: on its own line it is a million times its neighbours.
+/// Decay (lines) of a steady line: none, but not a pole on the axis, where its transform has no value.
 pub(super) const STEADY: f64 = 1e-6;
 
 /// Lines of one band.

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_signal::modal::fit::{
     Accepted, Basis, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData,
-    ModeFit, PoleStart, UncertaintySource, Unfit, fit_modes, modal_constants_of_frf,
+    ModeFit, PoleStart, SteadyLine, UncertaintySource, Unfit, fit_modes, modal_constants_of_frf,
 };
 use tapjoint_signal::recording::ResponseForm;
 
@@ -460,7 +460,10 @@ fn limit_hum_at_a_known_frequency_does_not_move_a_mode_beside_it() {
         .collect();
     let data = collect(&taps, 256.0, &[(20.0, 90.0)]);
     let settings = FitSettings {
-        steady_lines: vec![50.0],
+        steady_lines: vec![SteadyLine {
+            frequency: 50.0,
+            bound: 0.1,
+        }],
         ..FitSettings::default()
     };
     let fit = fit_modes(&data, &[start(mode, 0.1)], &settings)

@@ -45,6 +45,7 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
     Some(RecordingEvidence {
         file: recording.file.clone(),
         tap_position: recording.conditions.tap,
+        free_length: recording.conditions.free_length,
         fastened: fastened.collect(),
         taps: recording
             .measurement

@@ -1,11 +1,10 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::Analysis;
-use super::lengths::MovedLength;
 use super::results::{
-    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
-    MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
-    SensitivitySection, common_share,
+    AverageSection, Estimate, EstimateMethod, Identification, ModeResult, MonteCarloSection,
+    MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection, SensitivitySection,
+    measured_modes, scatter_of,
 };
 use super::structure::{
     StructureDetails, TestedStructure, estimator_of_lengths, frequencies_of, jointed,
@@ -15,7 +14,7 @@ use super::warnings::{Warning, of_estimate, of_prediction};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::ConsistentEstimator;
+use tapjoint_identify::consistent::{ConsistentEstimator, MovedClamp};
 use tapjoint_identify::perturbation::{
     SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly,
     sign_pattern_estimates, spans_of,
@@ -79,14 +78,21 @@ pub fn identify(
     modes: &[ModeResult],
     settings: &IdentifySettings,
 ) -> (Identification, Vec<Warning>) {
-    let measured = measured_modes(modes, settings.frequency_floor);
+    // One scatter for all lengths: the least repeated one must not weigh most.
+    let of_lengths = settings.lengths.iter().flat_map(|length| &length.modes);
+    let scatter = scatter_of(modes.iter().chain(of_lengths));
+    let floor = settings.frequency_floor;
+    let measured = measured_modes(modes, scatter, floor);
     let fit_modes = settings.fit_modes.unwrap_or(usize::MAX);
     let used: Vec<MeasuredMode> = measured.iter().copied().take(fit_modes).collect();
     let mut moved = Vec::with_capacity(settings.lengths.len());
     for length in &settings.lengths {
-        let mut own = measured_modes(&length.modes, settings.frequency_floor);
+        let mut own = measured_modes(&length.modes, scatter, floor);
         own.truncate(fit_modes);
-        moved.push(length.clamp(&own));
+        moved.push(MovedClamp {
+            structure: length.structure.clone(),
+            modes: own,
+        });
     }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
@@ -135,30 +141,6 @@ pub fn identify(
     }
     warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
-}
-
-/// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
-/// drifted, or the room's temperature or the mounting: no joint has them all, and how far they are apart is part
-/// of each one's uncertainty. All get the same share of their frequency: weighed by its own scatter, a mode that
-/// feels the joint most would count least. What no repetition shows, `floor` (1), is added to
-/// every one that was read here.
-pub(super) fn measured_modes(modes: &[ModeResult], floor: f64) -> Vec<MeasuredMode> {
-    let between: Vec<BetweenRecordings> = modes.iter().filter_map(|mode| mode.between).collect();
-    let scatter = common_share(&between);
-    let mut measured = Vec::with_capacity(modes.len());
-    for mode in modes {
-        let Some(number) = mode.mode else { continue };
-        let share = match mode.reading {
-            Some(_) => scatter.hypot(floor),
-            None => scatter,
-        };
-        measured.push(MeasuredMode {
-            mode: number,
-            frequency: mode.frequency,
-            std: mode.std.map(|std| std.hypot(share * mode.frequency)),
-        });
-    }
-    measured
 }
 
 /// Frequencies of the estimated beam and joint beside the measured ones, and the structure that has them;

@@ -4,39 +4,12 @@
 
 use super::modes::{modes_of_test, set_aside};
 use super::recording_result::RecordingResult;
-use super::results::ModeResult;
+use super::results::{ModeResult, MovedLength};
 use super::structure::{
-    StructureDetails, TestedStructure, jointed, masses_in, structure_details, tested_structure,
+    StructureDetails, TestedStructure, jointed, structure_details, tested_structure,
 };
 use super::warnings::Warning;
 use tapjoint_description::TestDescription;
-use tapjoint_identify::MeasuredMode;
-use tapjoint_identify::consistent::MovedClamp;
-
-/// The beam where its clamp was moved, and its modes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MovedLength {
-    /// Free length (m).
-    pub length: f64,
-    /// Files of its recordings.
-    pub recordings: Vec<String>,
-    /// The structure of this length.
-    pub structure: TestedStructure,
-    /// Its details, with the masses of its first recording.
-    pub details: StructureDetails,
-    /// Its modes, ascending.
-    pub modes: Vec<ModeResult>,
-}
-
-impl MovedLength {
-    /// Returns its part in an estimate, by the frequencies of these modes.
-    pub(super) fn clamp(&self, used: &[MeasuredMode]) -> MovedClamp {
-        MovedClamp {
-            structure: jointed(&self.structure, &self.details),
-            modes: used.to_vec(),
-        }
-    }
-}
 
 /// A free length (m) in words, to the micrometre.
 fn length_words(length: f64) -> String {
@@ -81,19 +54,16 @@ pub(super) fn numbered(
         let aside = set_aside(&own_test, &own);
         if let Some(length) = length {
             let structure = tested_structure(&own_test);
-            let details = StructureDetails {
-                masses: masses_in(&own_test, own_test.recordings.first()),
-                ..structure_details(&own_test, &structure.beam)
-            };
+            let details = structure_details(&own_test, &structure.beam);
             let (modes, doubts) = modes_of_test(&own_test, &mut own, &aside, &structure, &details);
             let doubts = doubts.into_iter();
             let doubts = doubts.map(|doubt| doubt.of_length(&length_words(length)));
             found.warnings.extend(doubts);
+            let used = own.iter().zip(&aside).filter(|(_, aside)| aside.is_none());
             found.lengths.push(MovedLength {
                 length,
-                recordings: own.iter().map(|recording| recording.file.clone()).collect(),
-                structure,
-                details,
+                recordings: used.map(|(recording, _)| recording.file.clone()).collect(),
+                structure: jointed(&structure, &details),
                 modes,
             });
         } else {

@@ -38,7 +38,6 @@ pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, fr
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
-pub use lengths::MovedLength;
 use lengths::numbered;
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
@@ -50,7 +49,7 @@ use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{
     AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
-    MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
+    MonteCarloSection, MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection,
     SensitivitySection,
 };
 pub use structure::{

@@ -1,9 +1,8 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
-use super::identification::measured_modes;
 use super::observed_mode::shape_of;
 use super::recording_result::RecordingResult;
-use super::results::{ModeResult, between};
+use super::results::{ModeResult, between, measured_modes, scatter_of};
 use super::structure::{
     NO_SPRING, StructureDetails, TestedStructure, estimator, fitted, frequencies_of, jointed,
     masses_in,
@@ -338,6 +337,7 @@ fn number_jointed(
     let placed = recordings
         .iter()
         .flat_map(|one| &one.conditions.sensor_positions);
+    let names: BTreeSet<&String> = placed.clone().map(|(name, _)| name).collect();
     let inverted: BTreeSet<String> = placed
         .filter(|(_, place)| pairing.chosen.inverted.contains(place))
         .map(|(name, _)| name.clone())
@@ -346,7 +346,7 @@ fn number_jointed(
         Warning::unpaired(unnumbered),
         Warning::missing_modes(&pairing.chosen.missing),
         Warning::ambiguous_pairing(&pairing, &peaks),
-        Warning::inverted_sensors(&Vec::from_iter(inverted)),
+        Warning::inverted_sensors(&Vec::from_iter(inverted), names.len()),
     ]
     .into_iter()
     .flatten()
@@ -454,7 +454,7 @@ fn frequencies(
     both: [&StructureDetails; 2],
 ) -> Option<[Vec<f64>; 2]> {
     // Only the weights depend on the floor, and of these the numbering does not.
-    let measured = measured_modes(modes, FREQUENCY_FLOOR);
+    let measured = measured_modes(modes, scatter_of(modes.iter()), FREQUENCY_FLOOR);
     let count = measured.last()?.mode;
     let there = both.map(|details| jointed(structure, details));
     let [before, after] = match estimator(structure, both[0], &measured) {

@@ -6,9 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_beam::{Beam, JointStiffness};
-use tapjoint_identify::consistent::ConsistentEstimate;
+use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure};
 use tapjoint_identify::observation::UNPAIRED;
-use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
+use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MeasuredMode, PredictedMode, Uncertain};
 use tapjoint_numerics::stats::chi_square_quantile;
 use tapjoint_signal::modal::ModeReading;
 
@@ -96,6 +96,19 @@ impl ModeResult {
     }
 }
 
+/// The beam where its clamp was moved, and its modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovedLength {
+    /// Free length (m).
+    pub length: f64,
+    /// Files of the recordings that give its modes.
+    pub recordings: Vec<String>,
+    /// The structure of this length, with the masses of its first recording.
+    pub structure: JointedStructure,
+    /// Its modes, ascending.
+    pub modes: Vec<ModeResult>,
+}
+
 /// One mode in the recordings of one configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BetweenRecordings {
@@ -122,6 +135,34 @@ pub(super) fn between(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
         own: own / count / (mean * mean),
         freedom,
     })
+}
+
+/// [`common_share`] of the modes with a scatter of their own.
+pub(super) fn scatter_of<'a>(modes: impl Iterator<Item = &'a ModeResult>) -> f64 {
+    let between: Vec<BetweenRecordings> = modes.filter_map(|mode| mode.between).collect();
+    common_share(&between)
+}
+
+/// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
+/// drifted, or the room's temperature or the mounting: no joint has them all, and how far they are apart is part
+/// of each one's uncertainty. All get the same share of their frequency, `scatter` (1): weighed by its own scatter, a
+/// mode that feels the joint most would count least. What no repetition shows, `floor` (1), is added to every one that
+/// was read here.
+pub(super) fn measured_modes(modes: &[ModeResult], scatter: f64, floor: f64) -> Vec<MeasuredMode> {
+    let mut measured = Vec::with_capacity(modes.len());
+    for mode in modes {
+        let Some(number) = mode.mode else { continue };
+        let share = match mode.reading {
+            Some(_) => scatter.hypot(floor),
+            None => scatter,
+        };
+        measured.push(MeasuredMode {
+            mode: number,
+            frequency: mode.frequency,
+            std: mode.std.map(|std| std.hypot(share * mode.frequency)),
+        });
+    }
+    measured
 }
 
 /// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.

@@ -64,14 +64,17 @@ impl TestDescription {
         lengths
     }
 
-    /// Returns the test with the recordings of one free length (m); `None` is that of the beam. The beam has this
-    /// length.
+    /// Returns the test with the recordings of one free length (m); `None` is that of the beam. This is the beam's own
+    /// length there.
     #[must_use]
     pub fn of_length(&self, length: Option<f64>) -> Self {
         let mut own = self.clone();
         own.beam.length = length.unwrap_or(self.beam.length);
         own.recordings
             .retain(|recording| recording.length == length);
+        for recording in &mut own.recordings {
+            recording.length = None;
+        }
         own
     }
 

@@ -239,9 +239,10 @@ impl fmt::Display for ChannelRef {
 }
 
 impl TestDescription {
-    /// Returns the position of a sensor (m) in the reference configuration, that of the first recording.
+    /// Returns the position of a sensor (m) in the reference configuration, that of the first recording with the beam's own
+    /// length.
     pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
-        let first = self.recordings.first();
+        let first = self.reference_recording();
         first.map_or(sensor.position, |recording| recording.place_of(sensor))
     }
 }

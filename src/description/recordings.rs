@@ -369,7 +369,10 @@ pub(super) fn read_recording(
         file: files.remove(0),
         more_files: files,
         line: named.line,
-        length: length.filter(|length| *length != described),
+        // To the micrometre, so that 35 cm and 0.35 m are one length.
+        length: length
+            .map(|length| (1e6 * length).round() / 1e6)
+            .filter(|length| (length - described).abs() > 1e-6),
         tap: table.within("tap", Dimension::Length, &position)?,
         level: table.within("level", Dimension::Ratio, &LEVEL)?,
         band: table.optional("band", read_band)?,

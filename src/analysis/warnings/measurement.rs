@@ -245,15 +245,23 @@ impl Warning {
     }
 
     /// The warning about sensors whose signs are those of the model only if they are inverted.
-    pub(crate) fn inverted_sensors(names: &[String]) -> Option<Self> {
-        let subject = match names {
+    /// `count` is the number of all sensors.
+    pub(crate) fn inverted_sensors(names: &[String], count: usize) -> Option<Self> {
+        let what = match names {
             [] => return None,
-            [one] => format!("sensor {one} moves"),
-            several => format!("sensors {} move", several.join(", ")),
+            all if all.len() == count => format!(
+                "half of the sensors {} move against the direction of the others",
+                all.join(", ")
+            ),
+            [one] => format!("sensor {one} moves against the direction of the others"),
+            several => format!(
+                "sensors {} move against the direction of the others",
+                several.join(", ")
+            ),
         };
         let text = format!(
-            "{subject} against the direction of the others in the modes' shapes: mounted the other way, or an inverted \
-             channel; the modes were numbered with the sign reversed; reverse the sign of its `scale` or `sensitivity`"
+            "{what} in the modes' shapes: mounted the other way, or an inverted channel; the modes were numbered with the \
+             sign reversed; turn the sensor, or reverse the sign of its `scale` or `sensitivity`"
         );
         Some(Warning::new("inverted-sensor", text))
     }

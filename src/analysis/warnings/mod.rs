@@ -152,7 +152,7 @@ pub const WARNING_CODES: [(&str, &str); 69] = [
     ),
     (
         "inverted-sensor",
-        "a sensor moves against the model's direction in all modes",
+        "a sensor seems to be mounted the other way",
     ),
     (
         "numbered-in-order",

@@ -432,7 +432,7 @@ impl ConsistentEstimator {
     /// Returns the pair regression's estimate, where it applies and is a joint.
     fn pairs_guess(&self, problem: &Problem<'_>) -> Option<Point> {
         let structure = self.models[0].structure();
-        let halves = structure.lap.position.is_none() && structure.lap.right.is_none();
+        let halves = structure.has_equal_halves();
         let model = match (structure.assembly, &self.settings.fit[..]) {
             (Assembly::Lap, [Parameter::Kt, Parameter::Kr]) if halves => PairsModel::Lap,
             (Assembly::Cantilever, [Parameter::Kt, Parameter::Kr]) => PairsModel::TwoParameter,

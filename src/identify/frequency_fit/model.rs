@@ -61,6 +61,11 @@ impl JointedStructure {
         }
     }
 
+    /// Returns false for a lap joint that is not in the middle, or whose halves differ.
+    pub fn has_equal_halves(&self) -> bool {
+        self.lap.position.is_none() && self.lap.right.is_none()
+    }
+
     /// Returns the structure on a joint, or free of it.
     pub fn specimen(&self, joint: Option<Joint>) -> Specimen {
         Specimen {

@@ -145,7 +145,7 @@ impl<'a> JointSearch<'a> {
     /// Returns the shapes of all modes looked at; none for unequal halves, of which there is no closed form.
     pub fn shapes(&self, place: Place) -> Vec<ModeShape> {
         let structure = self.model.structure();
-        if structure.lap.position.is_some() || structure.lap.right.is_some() {
+        if !structure.has_equal_halves() {
             return Vec::new();
         }
         let (beam, joint) = (&structure.beam, joint_at(&self.point(place)));

@@ -36,8 +36,9 @@ pub struct MeasuredPeak {
     pub std: Option<f64>,
     /// Values of its shape at the sensors; empty where places or amplitudes are unknown.
     pub shape: Vec<ShapeAt>,
-    /// Amplitude over that which a mode of its frequency could have (1): modal constant or velocity, over the strongest at
-    /// its frequency or above. `None` where unknown.
+    /// Amplitude over that which a mode of its frequency could have (1): modal constant over the strongest one, or velocity
+    /// over the strongest at its frequency or above, at least 3 % of the strongest. A pole that makes no peak counts a
+    /// tenth. `None` where unknown.
     pub strength: Option<f64>,
 }
 
@@ -99,7 +100,7 @@ pub struct Numbering {
     /// Modes below the highest numbered one that no peak is, and whether each could have been seen.
     pub missing: Vec<MissingMode>,
     /// Places (m) of sensors whose signs are those of the model only if they are inverted: mounted against the direction
-    /// of the others, or with an inverted channel.
+    /// of the others, or with an inverted channel. Where half of them are inverted against the others, all places.
     pub inverted: Vec<f64>,
     /// Probability of the best over its own (1 for the best).
     pub odds: f64,
@@ -160,7 +161,7 @@ pub fn pair_modes(
         .collect();
     numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     // The plain numbering is taken where nothing beats it clearly. Numberings are comparable where the data do not
-    // tell them apart: which of two close modes is missing is not decided by the wish that none were.
+    // tell them apart. The price of missing modes must not decide which of two close modes is missing.
     let best = numberings.first();
     let (least, by_data) = best.map_or((0.0, 0.0), |best| (best.cost, best.by_data));
     let limit = settings.odds.ln();
@@ -231,7 +232,8 @@ fn score(
         !search.peaks.iter().enumerate().any(|(other, peak)| {
             let is_near = (peak.frequency / search.peaks[own].frequency).ln().abs() <= NEAR;
             let is_left_over = is_near && assignment[other].is_none();
-            let is_stronger = peak.strength > search.peaks[own].strength;
+            let both = peak.strength.zip(search.peaks[own].strength);
+            let is_stronger = both.is_some_and(|(other, own)| other > own);
             is_left_over && is_stronger && !peak.shape.is_empty() && !is_clear(&peak.shape)
         })
     });

@@ -76,43 +76,41 @@ impl View {
 
     /// Returns the negative logarithm of the shapes' probability over that of shapes in any direction.
     pub fn cost(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> f64 {
-        let mut total = 0.0;
-        for polarities in self.polarities(search, pairs) {
-            let least = least_cost(&polarities);
-            let sum: f64 = polarities.iter().map(|one| (least - one.cost).exp()).sum();
-            total += least - sum.ln();
-        }
-        total
+        let polarities = self.polarities(search, pairs);
+        let least = least_cost(&polarities);
+        let sum: f64 = polarities.iter().map(|one| (least - one.cost).exp()).sum();
+        least - sum.ln()
     }
 
-    /// Returns the places (m) of the sensors that are inverted against the others, where the shapes leave no doubt.
+    /// Returns the places (m) of the sensors that are inverted against the others, where the shapes leave no doubt. Where
+    /// half of the sensors are inverted against the other half, all places are returned.
     pub fn inverted(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> Vec<f64> {
-        let mut places = Vec::new();
-        for polarities in self.polarities(search, pairs) {
-            let least = least_cost(&polarities);
-            let mut near = polarities
-                .iter()
-                .filter(|one| one.cost < least + BEYOND_DOUBT);
-            if let (Some(only), None) = (near.next(), near.next()) {
-                places.extend(&only.inverted);
-            }
+        let polarities = self.polarities(search, pairs);
+        let least = least_cost(&polarities);
+        let mut near = polarities
+            .iter()
+            .filter(|one| one.cost < least + BEYOND_DOUBT);
+        let (Some(only), None) = (near.next(), near.next()) else {
+            return Vec::new();
+        };
+        let places = Polarity::places(search.peaks);
+        match 2 * only.inverted.len() == places.len() {
+            true => places,
+            false => only.inverted.clone(),
         }
-        places
     }
 
-    /// Returns what the shapes of each group say of the polarities of its sensors.
-    fn polarities(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> Vec<Vec<Polarity>> {
+    /// Returns what the shapes of all groups say of the polarities of the sensors.
+    fn polarities(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> Vec<Polarity> {
         let seen = search.peaks.iter().flat_map(|peak| &peak.shape);
         let groups: BTreeSet<usize> = seen.map(|at| at.group).collect();
-        let mut all = Vec::with_capacity(groups.len());
-        for group in groups {
-            let mut polarities = Polarity::all(search.peaks, group);
-            for polarity in &mut polarities {
+        let mut polarities = Polarity::all(search.peaks);
+        for polarity in &mut polarities {
+            for &group in &groups {
                 polarity.cost += self.group_cost(search, pairs, group, polarity);
             }
-            all.push(polarities);
         }
-        all
+        polarities
     }
 
     /// Returns the part of one group, whose sensors have this polarity.
@@ -160,7 +158,7 @@ const BEYOND_DOUBT: f64 = 7.0;
 /// Up to so many sensors all of their polarities are tried (32), beyond it those of one inverted sensor at most.
 const FEW_SENSORS: usize = 6;
 
-/// Which sensors of a group are inverted against the others.
+/// Which sensors are inverted against the others, in all recordings.
 #[derive(Debug, Clone)]
 struct Polarity {
     /// Places of the inverted sensors (m).
@@ -175,15 +173,20 @@ fn least_cost(polarities: &[Polarity]) -> f64 {
 }
 
 impl Polarity {
-    /// Returns all polarities of a group's sensors with their prior; the sign of all together is another matter.
-    fn all(peaks: &[MeasuredPeak], group: usize) -> Vec<Self> {
+    /// Returns the places (m) at which sensors were, each once.
+    fn places(peaks: &[MeasuredPeak]) -> Vec<f64> {
         let mut places: Vec<f64> = Vec::new();
-        let seen = peaks.iter().flat_map(|peak| &peak.shape);
-        for at in seen.filter(|at| at.group == group) {
+        for at in peaks.iter().flat_map(|peak| &peak.shape) {
             if !places.contains(&at.sensor) {
                 places.push(at.sensor);
             }
         }
+        places
+    }
+
+    /// Returns all polarities with their prior. The common sign of all sensors is treated in [`View::group_cost`].
+    fn all(peaks: &[MeasuredPeak]) -> Vec<Self> {
+        let places = Self::places(peaks);
         let mut sets = vec![Vec::new()];
         if places.len() > FEW_SENSORS {
             sets.extend(places.iter().map(|&place| vec![place]));

@@ -13,21 +13,23 @@ const ANYWHERE: f64 = 1.6;
 /// The share of peaks that are no modes has a beta distribution with these parameters: one in five on average. A test of
 /// a bar has none, a bolted structure more of them than modes.
 const OTHERS: [f64; 2] = [0.5, 2.0];
-/// Logarithm of the odds of a mode over another peak that the search on the grid takes: one in twenty is none, and half.
+/// Logarithm of the odds of a mode over another peak on the grid: few others, one in twenty, and many, half. The closer look
+/// has the share of the assignment itself.
 pub(super) const GRID_ODDS: [f64; 2] = [3.0, 0.0];
 /// Range of the strengths of other peaks (e-folds of amplitude): four decades, in which all are equally likely.
 const RANGE: f64 = 4.0 * std::f64::consts::LN_10;
-/// Share of modes that are weaker than their shapes make them: 2 %. Simulated cantilevers have 1.3 % below a hundredth
-/// of the strongest beside the 1 % of a uniform distribution.
-const WEAK: f64 = 0.02;
+/// Share of modes that may be weaker than uniform amplitudes make them: 2 %. Two modes in a hundred may be seen worse than
+/// their shapes say, by a soft tip or a loose sensor. A strength of zero then has a price, and no infinite one.
+const UNEXPECTED: f64 = 0.02;
+
 /// What the strengths of the peaks say of assignments.
 pub(super) struct Strengths<'a>(pub &'a [MeasuredPeak]);
 
 impl Strengths<'_> {
-    /// Returns the price of leaving this peak over, but for the share of others among all peaks: ln of the density of a
-    /// mode's strength over that of another peak's, and of the places where it may lie.
+    /// Returns the logarithm of the odds that the peak is a mode, by its strength and by the places where others may lie.
+    /// [`Self::cost`] adds the share of others.
     pub fn leaving(&self, peak: usize) -> f64 {
-        let likelihood = |relative: f64| ((1.0 - WEAK) * RANGE * relative + WEAK).ln();
+        let likelihood = |relative: f64| ((1.0 - UNEXPECTED) * RANGE * relative + UNEXPECTED).ln();
         ANYWHERE + self.0[peak].strength.map_or(0.0, likelihood)
     }
 

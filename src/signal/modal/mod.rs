@@ -32,7 +32,7 @@ pub use reading::{
     NoInterpolation, PeakLabel, ReadBy, interpolate_parabola, interpolate_pole, merge_modes,
     read_peaks,
 };
-pub use strength::set_strengths;
+pub use strength::{set_strengths, strengths_of};
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{ComplexField, DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};

@@ -52,20 +52,30 @@ pub fn set_strengths(
         let part = if peakless { NO_PEAK } else { 1.0 };
         counted.push(amplitude.map(|amplitude| part * amplitude));
     }
-    let references = references(&counted, force_falls && !of_constants);
-    let strongest = counted.iter().flatten().copied().fold(0.0, f64::max);
+    let force_falls = force_falls && !of_constants;
+    let strengths = strengths_of(&counted, force_falls);
+    let references = references(&counted, force_falls);
     for (index, reading) in readings.iter_mut().enumerate() {
-        let (Some(raw), Some(own)) = (amplitudes[index], counted[index]) else {
-            reading.strength = None;
-            continue;
-        };
-        // How far the force had fallen at a peak without a stronger one above it is not known.
-        let is_own = own >= references[index] && own < strongest;
-        reading.strength = (!is_own).then(|| own / references[index]);
-        if reading.prominence_db.is_none() && raw < WEAK * references[index] {
+        reading.strength = strengths[index];
+        let is_weak = amplitudes[index].is_some_and(|own| own < WEAK * references[index]);
+        if is_weak && reading.prominence_db.is_none() {
             reading.label = Some(PeakLabel::Weak);
         }
     }
+}
+
+/// Returns the strengths of modes with these amplitudes (any unit), ascending in frequency; `None` of one without an
+/// amplitude, and where the force falls by an unknown part: at a mode that is the strongest from its frequency on, and
+/// not the strongest of all.
+pub fn strengths_of(amplitudes: &[Option<f64>], force_falls: bool) -> Vec<Option<f64>> {
+    let strongest = amplitudes.iter().flatten().copied().fold(0.0, f64::max);
+    let references = references(amplitudes, force_falls);
+    let mut strengths = Vec::with_capacity(amplitudes.len());
+    for (own, reference) in amplitudes.iter().zip(&references) {
+        let known = own.filter(|own| own < reference || *own == strongest);
+        strengths.push(known.map(|own| own / reference));
+    }
+    strengths
 }
 
 /// Amplitude that a mode at each reading's frequency could have: that of the strongest of all or, where the force falls

@@ -137,6 +137,8 @@ pub struct RecordingEvidence {
     pub file: String,
     /// Position of the hammer (m); `None` where it is not given.
     pub tap_position: Option<f64>,
+    /// Free length of the beam (m), where the clamp was moved for this recording. Places count from the moved clamp.
+    pub free_length: Option<f64>,
     /// Position (m) and mass (kg) of each mass fastened to the beam for this recording.
     pub fastened: Vec<(f64, f64)>,
     /// All taps, accepted and rejected, in order of time.

@@ -48,12 +48,16 @@ fn or_missing(
     verdicts
 }
 
-/// Every two recordings, in the order of the test.
+/// Every two recordings of one free length, in the order of the test.
 fn pairs(
     recordings: &[RecordingEvidence],
 ) -> impl Iterator<Item = (&RecordingEvidence, &RecordingEvidence)> {
     let firsts = recordings.iter().enumerate();
-    firsts.flat_map(|(index, first)| recordings[index + 1..].iter().map(move |one| (first, one)))
+    firsts.flat_map(|(index, first)| {
+        let later = recordings[index + 1..].iter();
+        let later = later.filter(|one| one.free_length == first.free_length);
+        later.map(move |one| (first, one))
+    })
 }
 
 /// Returns `true` for two known positions (m) that count as the same place.
@@ -160,8 +164,10 @@ pub(super) fn check_mass_loading(recordings: &[RecordingEvidence]) -> Vec<Qualit
         let mut seen = vec![first];
         for second in later {
             let is_known = seen.iter().any(|one| same_sensors(one, second));
-            // A mass that is fastened moves frequencies by itself.
-            if second.fastened == first.fastened && !is_known {
+            // A mass that is fastened moves frequencies by itself, and so does a moved clamp.
+            let is_alike =
+                second.fastened == first.fastened && second.free_length == first.free_length;
+            if is_alike && !is_known {
                 seen.push(second);
                 let (check, change) = (Check::MassLoading, "with the sensors elsewhere");
                 verdicts.extend(shifts(check, first, second, change, &[]));

@@ -67,7 +67,7 @@ impl StudiedTest {
         joint: JointStiffness,
         bands: &[(f64, f64)],
     ) -> Self {
-        let first = test.recordings.first();
+        let first = test.reference_recording();
         let end = structure.beam.length;
         let placed = test
             .sensors
@@ -80,6 +80,7 @@ impl StudiedTest {
         let described = test
             .recordings
             .iter()
+            .filter(|recording| recording.length.is_none())
             .filter_map(|recording| recording.band);
         let measured = test.measured.as_ref();
         StudiedTest {

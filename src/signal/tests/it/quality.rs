@@ -83,6 +83,7 @@ fn good() -> RecordingEvidence {
     RecordingEvidence {
         file: "a.wav".to_owned(),
         tap_position: Some(0.1),
+        free_length: None,
         fastened: Vec::new(),
         taps: [40.0, 44.0, 38.0, 41.0, 42.0].map(tap).to_vec(),
         lines: lines(),

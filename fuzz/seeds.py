@@ -382,6 +382,7 @@ mass = "10 g"
 [[recording]]
 file = "high.uff"
 form = "accelerance"
+length = "0.3 m"
 sensor = "A"
 [analysis]
 window = "exponential"

@@ -18,9 +18,10 @@ use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::Lines;
 
-/// Most modes that only the polyreference fit proposes and that are tested.
+/// Most modes that only the polyreference fit proposes and that are tested. 40: each costs a fit of its neighbours. Real
+/// recordings have proposed up to a dozen.
 const MOST_EXTRA: usize = 40;
-/// Most fits beside which a second pole is looked for: of those whose residuals agree from line to line, the most first.
+/// Most fits beside which a second pole is looked for, those with the largest misfit first. 8: each costs some ten fits.
 const MOST_MISFITS: usize = 8;
 /// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 pub(super) const APART: f64 = 3.0;

@@ -462,12 +462,14 @@ fn crowded_case(assembly: Assembly, seed: u64) -> Case {
 
 #[test]
 fn recover_numbers_among_many_other_peaks() {
-    const COUNT: u64 = 40;
+    // A numbering up to 20 times less probable is said, so one in twenty may be wrong without a word. With 400 tests
+    // each, 2.0 % (cantilever) and 3.3 % (lap) are, 1.0 % and 2.8 % are said to be uncertain.
+    const COUNT: usize = 60;
     for assembly in [Assembly::Cantilever, Assembly::Lap] {
         let (mut right, mut said, mut wrong) = (0, 0, 0);
         let (mut inverted, mut misnamed) = (0, 0);
         for seed in 0..COUNT {
-            let case = crowded_case(assembly, seed);
+            let case = crowded_case(assembly, seed as u64);
             let pairing = pair(&case);
             // Of the first four modes: the highest ones may be anything beside the peaks above them.
             let first = |numbers: &[Option<usize>]| -> Vec<Option<usize>> {
@@ -499,11 +501,11 @@ fn recover_numbers_among_many_other_peaks() {
             "{assembly:?}: {right} right, {said} said to be uncertain, {wrong} wrong; inverted sensor named {inverted}, another {misnamed}"
         );
         assert!(
-            inverted >= 30 && misnamed == 0,
+            inverted >= 54 && misnamed == 0,
             "{assembly:?}: {inverted} named, {misnamed} others"
         );
         assert!(
-            right >= 30 && wrong <= 2,
+            right >= 54 && wrong <= 3,
             "{assembly:?}: {right} right, {said} said, {wrong} wrong"
         );
     }

@@ -175,10 +175,16 @@ pub fn parameters(document: &Document) -> Option<Table> {
         number("95 % high", ""),
     ];
     let caption = format!("Estimated parameters, method: {}", estimate.method.name());
+    let mut modes = format!("From modes {}", listed(&estimate.modes_used));
+    for length in document.lengths.iter().flatten() {
+        let numbers: Vec<usize> = length.prediction.iter().map(|row| row.mode).collect();
+        if !numbers.is_empty() {
+            let free = trimmed(length.length, 6);
+            modes.push_str(&format!(", and {} at {free} m", listed(&numbers)));
+        }
+    }
     let note = format!(
-        "From modes {}. Std and limits are in the value's unit; \u{2013} means unknown or \
-         unbounded.{scaled_note}",
-        listed(&estimate.modes_used)
+        "{modes}. Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{scaled_note}"
     );
     let table = Table::with_heads(caption, heads, rows, note);
     Some(match (misses, stated) {
@@ -360,12 +366,14 @@ pub fn perturbation(document: &Document) -> Option<Table> {
         }
         cells
     });
-    Some(Table::of(
-        "All frequencies changed by the same percentage",
-        rows,
-        "Change: against the estimate by the same method. \u{2013}: the changed frequencies leave \
-         no estimate.",
-    ))
+    let mut note = "Change: against the estimate by the same method. \u{2013}: the changed frequencies leave no \
+                    estimate."
+        .to_owned();
+    if document.lengths.is_some() {
+        note.push_str(" Those of the beam's other free lengths are not changed.");
+    }
+    let caption = "All frequencies changed by the same percentage";
+    Some(Table::of(caption, rows, &note))
 }
 
 /// Average errors under changed frequencies, as the paper's tables state them; `None` where not

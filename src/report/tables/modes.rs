@@ -80,28 +80,39 @@ pub fn modes(document: &Document) -> Option<Table> {
 /// gives the list.
 pub fn modes_from(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let (mut from, mut aside, mut moved) = (Vec::new(), Vec::new(), Vec::new());
+    let lengths = document.lengths.as_deref().unwrap_or_default();
+    let (mut from, mut aside) = (Vec::new(), Vec::new());
+    let (mut moved, mut unused) = (Vec::new(), Vec::new());
     for recording in recordings {
-        match &recording.aside {
-            Some(how) if recording.conditions.free_length.is_some() => {
-                moved.push(format!("{} ({how})", recording.file));
+        let file = &recording.file;
+        let others = match (&recording.aside, recording.conditions.free_length) {
+            (None, _) => {
+                from.push(file.clone());
+                continue;
             }
-            Some(how) => aside.push(format!("{} ({how})", recording.file)),
-            None => from.push(recording.file.clone()),
-        }
+            (Some(_), None) => &mut aside,
+            (Some(_), _) if lengths.iter().any(|one| one.recordings.contains(file)) => &mut moved,
+            (Some(_), _) => &mut unused,
+        };
+        let how = recording.aside.as_deref().unwrap_or_default();
+        others.push(format!("{file} ({how})"));
     }
     // A file may be read in several bands.
     from.dedup();
-    aside.dedup();
-    moved.dedup();
     let mut parts = vec![format!("From {}", from.join(", "))];
-    for (others, target) in [
-        (aside, "the diagnosis alone"),
-        (moved, "the estimate by modes of their own"),
+    for (mut others, one, several) in [
+        (aside, "enters the diagnosis alone", "enter the diagnosis alone"),
+        (
+            moved,
+            "enters the estimate by modes of its own",
+            "enter the estimate by modes of their own",
+        ),
+        (unused, "is not used", "are not used"),
     ] {
-        let enter = if others.len() == 1 { "enters" } else { "enter" };
+        others.dedup();
+        let what = if others.len() == 1 { one } else { several };
         if !others.is_empty() {
-            parts.push(format!("{} {enter} {target}", others.join(", ")));
+            parts.push(format!("{} {what}", others.join(", ")));
         }
     }
     (parts.len() > 1).then(|| parts.join("; ") + ".")
@@ -133,8 +144,8 @@ pub fn lengths(document: &Document) -> Option<Table> {
             ]
         })
     });
-    let note = "The same joint holds the beam where the clamp was moved: all lengths enter one estimate. The diagnosis \
-                takes the recordings of the beam's own length alone.";
+    let note = "The same joint holds the beam at each length, and all lengths enter one estimate. The diagnosis takes the \
+                recordings of the beam's own length alone.";
     let rows: Vec<_> = rows.collect();
     (!rows.is_empty()).then(|| Table::of("Modes where the clamp was moved", rows, note))
 }

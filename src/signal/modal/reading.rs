@@ -190,7 +190,7 @@ impl FittedReading {
         }
     }
 
-    /// Returns the frequency: that of the fit, or of a mode that changes with its amplitude that at one amplitude.
+    /// Returns the frequency: that of the fit. A mode that changes with its amplitude has the frequency at one amplitude.
     ///
     /// Two poles of one shape may be two modes. Only taps of different strength show that it is one that changes.
     pub fn frequency(&self) -> FittedValue {

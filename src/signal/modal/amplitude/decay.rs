@@ -246,8 +246,8 @@ impl WholeDecay<'_> {
             .then_some(Candidate { fit, criterion })
     }
 
-    /// Fits the model again with every number of exponents from its own on, three at least: a change linear in the
-    /// amplitude may be too small for the criterion, and yet not for the interval.
+    /// Fits the model again with its own number of exponents and with every larger one, from three on. The criterion may
+    /// not see a change linear in the amplitude that the interval must hold.
     fn with_more_exponents(&self, best: &Candidate) -> Vec<Candidate> {
         let own = best.fit.model.exponents.len().max(LINEAR_DRIFT);
         let mut all: Vec<Candidate> = Vec::new();

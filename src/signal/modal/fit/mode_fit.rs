@@ -20,8 +20,7 @@ use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
 /// The taps scatter beyond noise if the scatter of all modes together is less probable than this. 0.2: a few taps
 /// seldom show a scatter that is as large as the noise, and intervals from the noise alone are then too short. The
-/// cell `two-taps` of `examples/interval_coverage` counts 93 % at this level and 86 % at a hundredth. The price: one
-/// recording in five without scatter has intervals that are too long.
+/// price: one recording in five without scatter has intervals that are too long. Of two taps no such test is made.
 pub(in crate::modal) const SCATTERS: f64 = 0.2;
 /// If the scatter of one mode is less probable than this, its value is the mean of its taps. Otherwise the joint fit is
 /// more precise.

@@ -7,7 +7,7 @@
 #
 # Targets: wav flac csv universal matlab responses description truths reports identify chain.
 # An execution must end within 2 s and 300 MB without a panic. The bytes of one that fails are written to
-# fuzz/artifacts, beside the log of each target, and the script exits with 1. The corpus grows in fuzz/corpus.
+# fuzz/artifacts, beside the log of each target, and the script exits with 1. Once repaired they are kept in fuzz/found. The corpus grows in fuzz/corpus.
 # Coverage is given after 4/5 of the executions and at the end: where both are equal, more time finds nothing new.
 # Needs a C++ compiler and Python 3 beside Rust.
 set -euo pipefail
@@ -50,7 +50,8 @@ for target in "${targets[@]}"; do
     mkdir -p "fuzz/corpus/$target"
     log="fuzz/artifacts/$target.log"
     words=()
-    [ ! -f "fuzz/$target.dict" ] || words=("-dict=fuzz/$target.dict")
+    [ ! -d "fuzz/found/$target" ] || words+=("fuzz/found/$target")
+    [ ! -f "fuzz/$target.dict" ] || words+=("-dict=fuzz/$target.dict")
     # Small inputs run fast; a header of a universal file has 800 bytes, the chain needs samples.
     case "$target" in
         identify) longest=64 ;;

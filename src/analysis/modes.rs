@@ -8,12 +8,12 @@ use super::structure::{
     masses_in,
 };
 use super::warnings::Warning;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
 use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
-use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, ShapeAt};
+use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, ShapeAt, SizeAt};
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
@@ -347,10 +347,32 @@ fn number_jointed(
         Warning::missing_modes(&pairing.chosen.missing),
         Warning::ambiguous_pairing(&pairing, &peaks),
         Warning::inverted_sensors(&Vec::from_iter(inverted), names.len()),
+        Warning::doubtful_scales(&sizes_of_sensors(&pairing.chosen.sizes, recordings)),
     ]
     .into_iter()
     .flatten()
     .collect()
+}
+
+/// The sizes at the places of each sensor, by its name.
+fn sizes_of_sensors(
+    sizes: &[SizeAt],
+    recordings: &[&RecordingResult],
+) -> BTreeMap<String, Vec<SizeAt>> {
+    let mut of_sensors: BTreeMap<String, Vec<SizeAt>> = BTreeMap::new();
+    for size in sizes {
+        let mut at_place: BTreeSet<&String> = BTreeSet::new();
+        for recording in recordings {
+            let positions = recording.conditions.sensor_positions.iter();
+            let here = positions.filter(|(_, place)| **place == size.sensor);
+            at_place.extend(here.map(|(name, _)| name));
+        }
+        // Of two sensors at one place neither is known to have this size.
+        if let (Some(name), 1) = (at_place.first(), at_place.len()) {
+            of_sensors.entry((*name).clone()).or_default().push(*size);
+        }
+    }
+    of_sensors
 }
 
 /// A peak with its shape and strength.

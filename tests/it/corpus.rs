@@ -97,3 +97,22 @@ fn regress_seeds_of_the_fuzz_targets_whole_and_damaged() {
         }
     }
 }
+#[test]
+fn regress_faults_that_were_found_stay_repaired() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/found");
+    let mut count = 0;
+    for target in std::fs::read_dir(&folder).unwrap() {
+        let target = target.unwrap();
+        for file in std::fs::read_dir(target.path()).unwrap() {
+            let path = file.unwrap().path();
+            let shown = Shown(format!("found: {}", path.display()));
+            targets::run(
+                target.file_name().to_str().unwrap(),
+                &std::fs::read(path).unwrap(),
+            );
+            drop(shown);
+            count += 1;
+        }
+    }
+    assert!(count > 0);
+}

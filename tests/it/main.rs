@@ -41,6 +41,7 @@ mod real_data;
 mod recording_uff;
 mod report;
 mod resolution;
+mod scales;
 mod several_files;
 mod shared;
 mod simulate;

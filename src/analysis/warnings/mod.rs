@@ -4,6 +4,7 @@
 
 mod estimate;
 mod measurement;
+mod scales;
 
 pub(super) use estimate::{neglected_effects, of_estimate, of_prediction};
 pub(super) use measurement::{of_amplitude, of_quality, of_recording};
@@ -11,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 69] = [
+pub const WARNING_CODES: [(&str, &str); 70] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -149,6 +150,10 @@ pub const WARNING_CODES: [(&str, &str); 69] = [
     (
         "ambiguous-pairing",
         "another numbering of the modes is nearly as probable",
+    ),
+    (
+        "doubtful-scale",
+        "by the model the scale of a sensor or of the hammer cannot be right",
     ),
     (
         "inverted-sensor",

@@ -11,17 +11,20 @@
 //!    that a single joint fits perfectly.
 //! 3. *Shape* (`shapes`): measured shapes and signs against those of that joint; whether a mode left out
 //!    could have been seen at all.
+//!    The sizes of modal constants do not decide, and show a wrong scale (`scale`).
 //! 4. *Strength* (`strength`): a strong peak left over costs more than a weak one.
 //! 5. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
 //!    Where the plain one (peaks numbered in ascending order) is among them it stays.
 
 mod joint;
+mod scale;
 mod shapes;
 mod strength;
 
 use super::frequency_fit::{FrequencyModel, JointedStructure, Parameter};
 use joint::{JointSearch, Place};
 use rayon::prelude::*;
+pub use scale::SizeAt;
 use shapes::{View, is_clear};
 use std::collections::BTreeMap;
 use strength::{GRID_ODDS, Strengths};
@@ -102,6 +105,9 @@ pub struct Numbering {
     /// Places (m) of sensors whose signs are those of the model only if they are inverted: mounted against the direction
     /// of the others, or with an inverted channel. Where half of them are inverted against the others, all places.
     pub inverted: Vec<f64>,
+    /// How large the modal constants of each sensor are beside the model's, where hammer and sensor are calibrated and at
+    /// least three modes away from their nodes say so.
+    pub sizes: Vec<SizeAt>,
     /// Probability of the best over its own (1 for the best).
     pub odds: f64,
 }
@@ -177,6 +183,7 @@ pub fn pair_modes(
             numbers: Vec::new(),
             missing: Vec::new(),
             inverted: Vec::new(),
+            sizes: Vec::new(),
             odds: 1.0,
         }
     } else {
@@ -245,6 +252,7 @@ fn score(
             numbers: assignment.clone(),
             missing,
             inverted: view.inverted(search, &shaped),
+            sizes: view.sizes(search, &shaped),
             odds: 1.0,
         },
     }

@@ -1,6 +1,7 @@
 //! Measured shapes against those of a joint, and where a mode cannot be seen.
 
 use super::joint::{JointFit, JointSearch};
+use super::scale::{SizeAt, sizes_at};
 use super::{MeasuredPeak, MissingCause, MissingMode, ShapeAt};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -98,6 +99,11 @@ impl View {
             true => places,
             false => only.inverted.clone(),
         }
+    }
+
+    /// Returns how large the sensors' modal constants are beside those of the model.
+    pub fn sizes(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> Vec<SizeAt> {
+        sizes_at(search.peaks, &self.shapes, pairs)
     }
 
     /// Returns what the shapes of all groups say of the polarities of the sensors.

@@ -101,7 +101,11 @@ pub fn modes_from(document: &Document) -> Option<String> {
     from.dedup();
     let mut parts = vec![format!("From {}", from.join(", "))];
     for (mut others, one, several) in [
-        (aside, "enters the diagnosis alone", "enter the diagnosis alone"),
+        (
+            aside,
+            "enters the diagnosis alone",
+            "enter the diagnosis alone",
+        ),
         (
             moved,
             "enters the estimate by modes of its own",

@@ -46,13 +46,14 @@ pub(super) struct WholeDecays<'a> {
 }
 
 impl<'a> WholeDecays<'a> {
-    /// Takes the models; `None` without any.
+    /// Takes the models; `None` without one that has an amplitude.
     pub fn new(models: &'a [(&'a Band, DecayModel)]) -> Option<Self> {
         let starts = models
             .iter()
             .map(|(band, model)| model.amplitude(-0.5 * band.filter, band));
         let starts: Vec<f64> = starts.collect();
-        let usable = !starts.is_empty() && starts.iter().all(|start| start.is_finite());
+        let are_finite = starts.iter().all(|start| start.is_finite());
+        let usable = are_finite && starts.iter().any(|start| *start > 0.0);
         usable.then_some(WholeDecays { models, starts })
     }
 
@@ -60,12 +61,14 @@ impl<'a> WholeDecays<'a> {
     ///
     /// A tap counts by its power. Its part of the amplitude at the start is [`part`].
     pub fn reference(&self) -> f64 {
+        let largest = self.starts.iter().copied().fold(0.0, f64::max);
         let (mut power, mut sum) = (0.0, 0.0);
         for ((band, _), start) in self.models.iter().zip(&self.starts) {
-            power += start * start;
-            sum += part(-band.decay * band.length) * start.powi(3);
+            let relative: f64 = start / largest;
+            power += relative.powi(2);
+            sum += part(-band.decay * band.length) * relative.powi(3);
         }
-        sum / power
+        largest * sum / power
     }
 
     /// Returns the frequency at the reference amplitude; `None` where the decays do not show that it changes.

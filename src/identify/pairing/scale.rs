@@ -1,0 +1,64 @@
+//! Sizes of measured modal constants against those of the model: whether the scales of hammer and sensors can be right.
+
+use super::MeasuredPeak;
+use tapjoint_beam::ModeShape;
+use tapjoint_numerics::stats::median;
+
+/// Least number of modes that say how large a sensor's values are.
+const LEAST_MODES: usize = 3;
+/// A place near a node says nothing of the size: the model's value must be this part of the largest of all. 5 %: errors of
+/// places may change such a value by half, and the median holds that.
+const AWAY_FROM_NODES: f64 = 0.05;
+
+/// How large a sensor's modal constants are beside those of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizeAt {
+    /// Place of the sensor (m).
+    pub sensor: f64,
+    /// Measured over predicted modal constant (1): the median over the modes.
+    pub ratio: f64,
+    /// Half of the modes are within this factor of it (1, at least 1).
+    pub spread: f64,
+}
+
+/// Returns the sizes at all sensors whose values are modal constants. `pairs` are peaks with the numbers of their modes,
+/// `shapes` the model's, normalised to unit mass.
+pub(super) fn sizes_at(
+    peaks: &[MeasuredPeak],
+    shapes: &[ModeShape],
+    pairs: &[(usize, usize)],
+) -> Vec<SizeAt> {
+    // Place of the sensor, measured and predicted size of one mode.
+    let mut seen: Vec<(f64, f64, f64)> = Vec::new();
+    for &(peak, mode) in pairs {
+        let Some(shape) = shapes.get(mode - 1) else {
+            continue;
+        };
+        for at in &peaks[peak].shape {
+            if let Some(tap) = at.tap.filter(|_| at.value.abs() > 3.0 * at.std) {
+                let model = shape.displacement(at.sensor) * shape.displacement(tap);
+                seen.push((at.sensor, at.value.abs(), model.abs()));
+            }
+        }
+    }
+    let largest = seen.iter().map(|one| one.2).fold(0.0, f64::max);
+    seen.retain(|one| one.2 > AWAY_FROM_NODES * largest);
+    let mut sensors: Vec<f64> = seen.iter().map(|one| one.0).collect();
+    sensors.sort_by(f64::total_cmp);
+    sensors.dedup();
+    let mut sizes = Vec::with_capacity(sensors.len());
+    for sensor in sensors {
+        let own = seen.iter().filter(|one| one.0 == sensor);
+        let mut logs: Vec<f64> = own.map(|one| (one.1 / one.2).ln()).collect();
+        if logs.len() >= LEAST_MODES {
+            let middle = median(&mut logs);
+            let mut apart: Vec<f64> = logs.iter().map(|log| (log - middle).abs()).collect();
+            sizes.push(SizeAt {
+                sensor,
+                ratio: middle.exp(),
+                spread: median(&mut apart).exp(),
+            });
+        }
+    }
+    sizes
+}

@@ -619,6 +619,8 @@ impl Resonance {
 ///    drift, moves a frequency by that much.
 /// 2. They differ by up to 1.5 %, as after a joint's drift of 3 % where the mode lives in the joint. Each
 ///    recording's band must then reach to the other's reading, and no recording may show both.
+/// 3. They differ by up to 5 % in the same way, and no other resonance lies that near to either. Repeats after a clamp was
+///    opened and closed scatter by so much in the lowest mode.
 ///
 /// A mode stays before a peak that is none, and a fit before any other reading. Of two fits the one with the
 /// smaller standard deviation stays. Of two others it is the one with the smaller half line, and among equals the
@@ -663,12 +665,15 @@ pub fn merge_modes(recordings: &[BandReadings]) -> Vec<MergedMode> {
 
 /// Largest relative distance of two readings of a mode that drifted from one recording to another.
 const DRIFTED: f64 = 0.015;
+/// The same where no third resonance lies within this distance of either.
+const DRIFTED_ALONE: f64 = 0.05;
 
-/// Returns the two nearest resonances within [`DRIFTED`] that were seen in different recordings. Each must have been
-/// missed by a recording that shows the other and would have shown it too: of two bands that only meet, neither could.
+/// Returns the two nearest resonances within [`DRIFTED`], or alone within [`DRIFTED_ALONE`], that were seen in different
+/// recordings. Each must have been missed by a recording that shows the other and would have shown it too: of two bands
+/// that only meet, neither could.
 fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<(usize, usize)> {
     let mut nearest = None;
-    let mut least = DRIFTED;
+    let mut least = DRIFTED_ALONE;
     for (second, b) in merged.iter().enumerate() {
         for (first, a) in merged[..second].iter().enumerate() {
             let (one, other) = (&a.best.reading, &b.best.reading);
@@ -682,10 +687,25 @@ fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<
                 })
             });
             let nearer = distance < least || distance <= least && nearest.is_none();
-            if nearer && resonances && missed && !a.is_shown_with(b) {
+            let alone = distance <= DRIFTED || are_alone(first, second, merged);
+            if nearer && alone && resonances && missed && !a.is_shown_with(b) {
                 (nearest, least) = (Some((first, second)), distance);
             }
         }
     }
     nearest
+}
+
+/// Returns true where the recordings of two resonances show no third one within [`DRIFTED_ALONE`] of either.
+fn are_alone(first: usize, second: usize, merged: &[Resonance]) -> bool {
+    let (a, b) = (&merged[first], &merged[second]);
+    let mut thirds = merged.iter().enumerate();
+    !thirds.any(|(index, third)| {
+        let near = [a, b].iter().any(|one| {
+            let frequency = one.best.reading.frequency;
+            (third.best.reading.frequency - frequency).abs() < DRIFTED_ALONE * frequency
+        });
+        let is_seen = third.is_shown_with(a) || third.is_shown_with(b);
+        index != first && index != second && third.best.reading.label.is_none() && near && is_seen
+    })
 }

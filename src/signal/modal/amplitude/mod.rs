@@ -208,8 +208,7 @@ pub fn follow_amplitude(
             let model = DecayModel::fit(&series, band);
             let mut points = decay::follow_decay(&series, band, &model);
             let found = !points.is_empty();
-            points
-                .retain(|point| (point.frequency / modes[index].frequency - 1.0).abs() <= FARTHEST);
+            points.retain(|point| !is_far(point.frequency, modes[index].frequency));
             if found && points.is_empty() {
                 // The decay that was followed is not the mode's.
                 continue;
@@ -231,6 +230,11 @@ pub fn follow_amplitude(
             if doubts.is_empty() && !has_hum {
                 curve.drift = whole.drift(&curve.points);
             }
+            // A model that goes that far says nothing of the mode, nor of its amplitude.
+            let drift = curve.drift.as_ref();
+            if drift.is_some_and(|drift| is_far(drift.frequency.value, frequency)) {
+                (curve.drift, curve.reference) = (None, None);
+            }
         }
         if curve.points.len() < LEAST_POINTS {
             return curve;
@@ -249,6 +253,11 @@ pub fn follow_amplitude(
         curve
     });
     curves.collect()
+}
+
+/// Returns true where a frequency (Hz) is too far from that of its mode to be of it.
+fn is_far(frequency: f64, mode: f64) -> bool {
+    (frequency / mode - 1.0).abs() > FARTHEST
 }
 
 // ---- Frequency and damping against log amplitude: weighted polynomials with covariance.

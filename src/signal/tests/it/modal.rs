@@ -276,7 +276,12 @@ fn limit_a_mode_that_drifted_is_one_and_two_modes_are_two() {
     // Two that one recording shows side by side.
     assert_eq!(merge_modes(&[at(&[546.3, 548.3]), at(&[546.4])]).len(), 2);
     // Farther than a joint drifts.
-    assert_eq!(merge_modes(&[at(&[548.3]), at(&[538.3])]).len(), 2);
+    assert_eq!(merge_modes(&[at(&[548.3]), at(&[519.3])]).len(), 2);
+    // Three repeats of a clamp that was opened and closed.
+    let repeats = [15.15, 14.71, 14.58].map(|low| at(&[low, 97.0]));
+    assert_eq!(merge_modes(&repeats).len(), 2);
+    // A third peak beside them leaves open which is which.
+    assert_eq!(merge_modes(&[at(&[548.3, 530.0]), at(&[538.3])]).len(), 3);
     // On either side of the seam of two bands, where no recording could show both.
     let one = |band, frequency| within(band, vec![reading(frequency, 0.125)]);
     let (below, above) = (one((0.0, 200.0), 198.5), one((200.0, 1000.0), 201.0));

@@ -4,7 +4,7 @@ use super::Analysis;
 use super::results::{
     AverageSection, Estimate, EstimateMethod, Identification, ModeResult, MonteCarloSection,
     MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection, SensitivitySection,
-    measured_modes, scatter_of,
+    measured_modes, scatter_of, set_ups,
 };
 use super::structure::{
     StructureDetails, TestedStructure, estimator_of_lengths, frequencies_of, jointed,
@@ -97,7 +97,17 @@ pub fn identify(
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
         let found = estimator_of_lengths(structure, &settings.details, &used, &moved);
-        match found.and_then(|found| found.estimate().map(|estimate| (found, estimate))) {
+        let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+        let mut set_ups = set_ups(&numbered.take(fit_modes).collect::<Vec<_>>());
+        // The frequencies of other free lengths stay as they are.
+        let of_lengths = moved.iter().flat_map(|length| &length.modes);
+        let of_lengths: Vec<f64> = of_lengths.map(|mode| mode.frequency).collect();
+        set_ups.iter_mut().for_each(|own| own.extend(&of_lengths));
+        let estimated = found.and_then(|found| {
+            let estimate = found.estimate_with_set_ups(&set_ups)?;
+            Ok((found, estimate))
+        });
+        match estimated {
             Ok((found, estimate)) => {
                 estimator = Some(found);
                 consistent = Some(Box::new(estimate));

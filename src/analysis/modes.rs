@@ -123,13 +123,15 @@ pub fn modes_of_recordings(
     }
     for mode in modes.iter_mut().filter(|mode| mode.mode.is_some()) {
         let mut frequencies = Vec::new();
-        for recording in reference.iter().map(|&index| &recordings[index]) {
+        for &index in reference {
+            let recording = &recordings[index];
             let numbered = recording.readings().iter().zip(&recording.mode_numbers);
             let mut own = numbered.filter(|(_, number)| **number == mode.mode);
             if let Some((reading, _)) = own.next()
                 && let Some(std) = reading.std.filter(|std| *std > 0.0 && std.is_finite())
             {
                 frequencies.push((reading.frequency, std));
+                mode.repeats.insert(index, reading.frequency);
             }
         }
         mode.between = between(&frequencies);
@@ -173,6 +175,7 @@ pub fn modes_of_measured(
             half_line,
             std: known.then(|| variance.sqrt()),
             between: None,
+            repeats: BTreeMap::new(),
             reading: None,
             recording: None,
             lambda: Some(structure.beam.lambda_of(frequency)),

@@ -4,6 +4,7 @@
 use super::structure::TestedStructure;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure};
@@ -52,6 +53,8 @@ pub struct ModeResult {
     pub std: Option<f64>,
     /// Scatter between the recordings that were merged; `None` with one recording.
     pub between: Option<BetweenRecordings>,
+    /// Its frequency (Hz) in each recording that repeats it, by the recording's index; one or none where nothing was repeated.
+    pub repeats: BTreeMap<usize, f64>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.
@@ -69,6 +72,7 @@ impl ModeResult {
             half_line: Some(reading.half_line),
             std: reading.std,
             between: None,
+            repeats: BTreeMap::new(),
             recording: Some(recording.to_owned()),
             lambda: None,
             reading: Some(reading),
@@ -163,6 +167,30 @@ pub(super) fn measured_modes(modes: &[ModeResult], scatter: f64, floor: f64) -> 
         });
     }
     measured
+}
+
+/// The frequencies (Hz) of these modes in each set-up, one list for each recording that repeats any of them; none where the
+/// recordings agree within their readings' uncertainty. A mode that a recording does not repeat has its listed frequency.
+pub(super) fn set_ups(modes: &[&ModeResult]) -> Vec<Vec<f64>> {
+    let between: Vec<BetweenRecordings> = modes.iter().filter_map(|mode| mode.between).collect();
+    if !exceeds_noise(&between) {
+        return Vec::new();
+    }
+    let repeated = modes.iter().filter(|mode| mode.repeats.len() > 1);
+    let recordings: BTreeSet<usize> = repeated
+        .flat_map(|mode| mode.repeats.keys().copied())
+        .collect();
+    let mut set_ups = Vec::with_capacity(recordings.len());
+    for recording in recordings {
+        let own = modes.iter().map(|mode| {
+            mode.repeats
+                .get(&recording)
+                .copied()
+                .unwrap_or(mode.frequency)
+        });
+        set_ups.push(own.collect());
+    }
+    set_ups
 }
 
 /// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.

@@ -42,6 +42,7 @@ mod recording_uff;
 mod report;
 mod resolution;
 mod scales;
+mod set_ups;
 mod several_files;
 mod shared;
 mod simulate;

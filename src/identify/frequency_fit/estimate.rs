@@ -22,6 +22,8 @@ struct Finished<'a> {
     directions: Vec<Point>,
     covariance: Covariance,
     goodness: Goodness,
+    /// Estimates from the frequencies of each set-up alone.
+    set_ups: Vec<Point>,
 }
 
 impl ConsistentEstimator {
@@ -30,6 +32,18 @@ impl ConsistentEstimator {
     /// # Errors
     /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
     pub fn estimate(&self) -> Result<ConsistentEstimate, IdentifyError> {
+        self.estimate_with_set_ups(&[])
+    }
+
+    /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are the frequencies (Hz) of all modes
+    /// in each of them. Each is fitted alone. The joints' scatter about the estimate enters its intervals, by Student's t.
+    ///
+    /// # Errors
+    /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
+    pub fn estimate_with_set_ups(
+        &self,
+        set_ups: &[Vec<f64>],
+    ) -> Result<ConsistentEstimate, IdentifyError> {
         let frequencies = self.frequencies();
         let (renewed, minima) = self.solve(&frequencies);
         let problem = self.problem(renewed.as_ref().unwrap_or(&self.models), &frequencies);
@@ -40,6 +54,10 @@ impl ConsistentEstimator {
             estimator: self,
             covariance: Covariance::new(&best.state.jacobian, &directions),
             goodness: self.goodness(&problem, &best, directions.len()),
+            set_ups: set_ups
+                .iter()
+                .map(|own| self.fit_frequencies(own).point)
+                .collect(),
             problem,
             best,
             directions,
@@ -56,6 +74,7 @@ impl ConsistentEstimator {
             goodness: finished.goodness,
             modes: finished.modes(),
             other_minima: minima.map(|other| finished.other(&other)).collect(),
+            set_ups: set_ups.len(),
             stop: best.stop,
             identifiability: finished.identifiability(),
             joint: joint_at(&best.state.point),
@@ -100,6 +119,22 @@ impl Finished<'_> {
         }
     }
 
+    /// Covariance of two coordinates by their scatter between the set-ups about the estimate. Its root is the standard
+    /// deviation of the normal distribution with the same 95 % interval as Student's t. 0 without set-ups.
+    fn scatter(&self, first: &Point, second: &Point) -> f64 {
+        let freedom = self.set_ups.len().saturating_sub(1) as f64;
+        if freedom == 0.0 {
+            return 0.0;
+        }
+        let point = &self.best.state.point;
+        let mut sum = 0.0;
+        for set_up in &self.set_ups {
+            sum += (value_along(first, set_up) - value_along(first, point))
+                * (value_along(second, set_up) - value_along(second, point));
+        }
+        sum / freedom * (student::quantile(0.05, freedom) / NORMAL_95).powi(2)
+    }
+
     fn quantities(&self) -> Vec<EstimatedQuantity> {
         let parameters = self.estimator.free_parameters();
         let quantities = parameters.flat_map(|parameter| Quantity::of(parameter).iter());
@@ -123,13 +158,14 @@ impl Finished<'_> {
         let gradient = quantity.gradient();
         let now = value_along(&gradient, point);
         let unit = self.covariance.std(&gradient);
-        let std = unit.zip(slope).map(|(std, slope)| std * slope);
+        let scatter = self.scatter(&gradient, &gradient).sqrt();
         let scale = self.scale();
         // The interval with the misfit for uncertainty is that of the coordinate to first order. Student's
         // distribution accounts for the few frequencies, which give the misfit only roughly.
         let freedom = self.goodness.degrees_of_freedom as f64;
         let scaled = unit.zip(scale).map(|(unit, scale)| {
             let half = student::quantile(0.05, freedom) * unit * scale;
+            let half = half.hypot(NORMAL_95 * scatter);
             let ends = [now - half, now + half];
             ends.map(|coordinate| self.quantity_at(quantity, coordinate))
                 .into()
@@ -138,14 +174,20 @@ impl Finished<'_> {
             let profile = self
                 .measured()
                 .then(|| Profile::new(self, quantity, sign))?;
-            Some(self.quantity_at(quantity, profile.end()?))
+            let half = (profile.end()? - now).hypot(NORMAL_95 * scatter);
+            Some(self.quantity_at(quantity, now + sign * half))
         });
+        let both = unit.zip(slope);
         // Where one end of a profile is missing the other is all that is known.
         EstimatedQuantity {
             quantity,
             value,
-            std: std.filter(|_| self.measured()),
-            std_scaled: std.zip(scale).map(|(std, scale)| std * scale),
+            std: both
+                .filter(|_| self.measured())
+                .map(|(unit, slope)| unit.hypot(scatter) * slope),
+            std_scaled: both
+                .zip(scale)
+                .map(|((unit, slope), scale)| (unit * scale).hypot(scatter) * slope),
             low,
             high,
             scaled,
@@ -180,7 +222,9 @@ impl Finished<'_> {
         let unit = if c == 0.0 {
             None
         } else {
-            self.covariance.std(&gradient)
+            let scatter = self.scatter(&gradient, &gradient).sqrt();
+            let own = self.covariance.std(&gradient);
+            own.map(|own| own.hypot(scatter))
         };
         let one_sign = coupling
             .low
@@ -259,7 +303,10 @@ impl Finished<'_> {
         let gradients = both.map(Quantity::gradient);
         is_open.then(|| {
             gradients.map(|first| {
-                gradients.map(|second| factor * self.covariance.between(&first, &second))
+                gradients.map(|second| {
+                    let own = factor * self.covariance.between(&first, &second);
+                    own + self.scatter(&first, &second)
+                })
             })
         })
     }

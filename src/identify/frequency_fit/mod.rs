@@ -207,6 +207,8 @@ pub struct ConsistentEstimate {
     pub modes: Vec<FittedMode>,
     /// Other minima, the deepest first.
     pub other_minima: Vec<OtherMinimum>,
+    /// Number of set-ups whose joints scatter beyond noise. Standard deviations and intervals hold that scatter. 0 without.
+    pub set_ups: usize,
     /// Reason for which the search ended.
     pub stop: StopReason,
     /// Report on what these frequencies determine.

@@ -23,6 +23,9 @@ pub struct EstimateSection {
     pub method: EstimateMethod,
     /// Modes that entered.
     pub modes_used: Vec<usize>,
+    /// Recordings between which the joint differs beyond noise: standard deviations and intervals hold this scatter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub set_ups: Option<usize>,
     /// Why the estimate is doubtful, if it is.
     pub reason: Option<String>,
     /// Kx, non-dimensional.
@@ -249,6 +252,7 @@ fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
     EstimateSection {
         method: EstimateMethod::Consistent,
         modes_used: found.modes_used.clone(),
+        set_ups: Some(found.set_ups).filter(|count| *count > 0),
         reason: goodness.uncertainty_factor().map(|factor| {
             format!(
                 "the model misses the frequencies by {} % rms; uncertainties that would allow \

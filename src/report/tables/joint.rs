@@ -183,6 +183,11 @@ pub fn parameters(document: &Document) -> Option<Table> {
             modes.push_str(&format!(", and {} at {free} m", listed(&numbers)));
         }
     }
+    if let Some(count) = estimate.set_ups {
+        modes.push_str(&format!(
+            ". The joint differs between {count} recordings; std and limits hold this scatter"
+        ));
+    }
     let note = format!(
         "{modes}. Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{scaled_note}"
     );

@@ -52,6 +52,8 @@ pub struct ModeResult {
     pub std: Option<f64>,
     /// Scatter between the recordings that were merged; `None` with one recording.
     pub between: Option<BetweenRecordings>,
+    /// Damping ratio (1) that a file of modes states; `None` for a mode that was read here.
+    pub damping: Option<f64>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.
@@ -69,6 +71,7 @@ impl ModeResult {
             half_line: Some(reading.half_line),
             std: reading.std,
             between: None,
+            damping: None,
             recording: Some(recording.to_owned()),
             lambda: None,
             reading: Some(reading),

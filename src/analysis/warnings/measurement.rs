@@ -266,6 +266,25 @@ impl Warning {
         Some(Warning::new("inverted-sensor", text))
     }
 
+    /// The warning about a file of modes whose shapes are not used.
+    pub(crate) fn shapes_left_out(file: &str, reason: &str) -> Self {
+        let text = format!(
+            "the modes are numbered by their frequencies alone, without their shapes: {reason}"
+        );
+        Warning::about(file, "shapes-left-out", text)
+    }
+
+    /// The warning about modes of a file that move in another direction than the others.
+    pub(crate) fn other_direction(file: &str, frequencies: &[f64], most: &str) -> Option<Self> {
+        let words = frequencies.iter().map(|f| frequency_words(*f));
+        let list: Vec<String> = words.collect();
+        let text = format!(
+            "the modes at {} Hz move mostly in another direction than {most}, in which most modes move; they get no number of a bending mode; state modes = [...] in [measured] where they should have one",
+            list.join(", ")
+        );
+        (!list.is_empty()).then(|| Warning::about(file, "other-direction", text))
+    }
+
     /// The warning about the most probable other numbering, with the peaks that it numbers otherwise.
     pub(crate) fn ambiguous_pairing(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Self> {
         let other = pairing.others.first()?;

@@ -70,6 +70,7 @@ impl FrequencyArguments {
         };
         let count = measured.frequencies.len();
         measured.half_line = match half_lines.as_slice() {
+            // The number of modes of a file is not known before it is read.
             list if measured.file.is_some() => Some(list.to_vec()),
             [one] => Some(vec![*one; count]),
             list if list.len() == count => Some(list.to_vec()),

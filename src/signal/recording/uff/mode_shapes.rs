@@ -576,7 +576,9 @@ fn normal_mode(reals: &[f64]) -> Result<(f64, Option<f64>, Turn), String> {
     }
     // At resonance a hysteretic damping ratio acts as half of it does if viscous.
     let (viscous, hysteretic) = (field(2), 0.5 * field(3));
-    let damping = [viscous, hysteretic].into_iter().find(|ratio| *ratio > 0.0);
+    // From 1 on there is no oscillation: such a number is in per cent, or something else.
+    let mut stated = [viscous, hysteretic].into_iter();
+    let damping = stated.find(|ratio| *ratio > 0.0 && *ratio < 1.0);
     let turn = if frequency > 0.0 {
         Turn::Forward
     } else {

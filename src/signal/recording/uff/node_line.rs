@@ -212,7 +212,8 @@ fn real_shape(mode: &NodalMode, nodes: &[PlacedNode]) -> Vec<(usize, [f64; 3])> 
             values.push((place, *value));
         }
     }
-    if largest <= 0.0 {
+    // The inverse of less is infinite.
+    if largest < f64::MIN_POSITIVE {
         return Vec::new();
     }
     let parts = values.iter().flat_map(|(_, value)| value);

@@ -4,7 +4,7 @@ use super::warnings::Warning;
 use super::wiring::PipelineError;
 use std::path::Path;
 use tapjoint_beam::MEASURED_LIMIT;
-use tapjoint_description::{FirstNode, MeasuredFrequencies, ModeFile, TestDescription};
+use tapjoint_description::{Assembly, FirstNode, MeasuredFrequencies, ModeFile, TestDescription};
 use tapjoint_identify::pairing::ShapeAt;
 use tapjoint_signal::recording::{ModeShapes, NoLine, NodeLine, read_mode_shapes};
 
@@ -16,6 +16,9 @@ const SHAPE_STD: f64 = 0.03;
 const MOST_NODES: usize = 24;
 /// Nodes may lie beyond the beam's end by this share of its length (1), which is what tape measures leave.
 const BEYOND_END: f64 = 0.01;
+/// The ends of a line of nodes are taken for exchanged where the motion at the joint is more than so many times that at
+/// the free end (1). On a soft joint both ends may move alike.
+const OTHER_END: f64 = 3.0;
 
 /// Modes of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,6 +129,8 @@ fn place_shapes(
             let error = file.error(test_file, "first_node", format!("{error}; {remedy}"));
             return Err(PipelineError::Description(error.to_string()));
         }
+        // A free beam is numbered without shapes.
+        Err(_) if test.joint.kind == Assembly::Free => return Ok(()),
         Err(reason) => {
             modes
                 .warnings
@@ -138,6 +143,9 @@ fn place_shapes(
     let others: Vec<f64> = others.map(|&index| read.modes[index].frequency).collect();
     let doubt = Warning::other_direction(&name, &others, line.direction);
     modes.warnings.extend(doubt);
+    if test.joint.kind == Assembly::Free {
+        return Ok(());
+    }
     let Some(first) = file.first_node else {
         let [begin, .., end] = &line.nodes[..] else {
             return Ok(());
@@ -163,8 +171,28 @@ fn place_shapes(
             .push(Warning::shapes_left_out(&name, &reason));
         return Ok(());
     }
+    if let Some(free) = moves_at_joint(&line).filter(|_| test.joint.kind == Assembly::Cantilever) {
+        let reason = format!(
+            "node {}, which first_node places nearest to the joint, moves more than {OTHER_END} times as far as node {free} at the other end, in the lowest mode with a shape; is node {free} the one nearest to the joint?",
+            first.number
+        );
+        modes
+            .warnings
+            .push(Warning::shapes_left_out(&name, &reason));
+        return Ok(());
+    }
     take_shapes(modes, &line, first, length);
     Ok(())
+}
+
+/// Returns the last node of the line where the lowest mode moves far less there than at the first one: a cantilever's
+/// lowest mode grows from the joint on.
+fn moves_at_joint(line: &NodeLine) -> Option<i64> {
+    let last = line.nodes.len().checked_sub(1)?;
+    let lowest = line.shapes.iter().find(|shape| !shape.is_empty())?;
+    let [begin, end] = [0, last].map(|node| lowest.iter().find(|at| at.node == node));
+    let (begin, end) = (begin?.value.abs(), end?.value.abs());
+    (begin > OTHER_END * end).then_some(line.nodes[last].number)
 }
 
 /// Takes the shapes at nodes that are evenly spread over the line.

@@ -169,9 +169,14 @@ fn recover_the_mode_of_two_peaks_by_its_shape() {
         let analysis = run(&file, "cantilever", FIRST).unwrap();
         assert_eq!(numbers(&analysis), wanted, "{:?}", analysis.warnings);
         assert!(!codes(&analysis).contains(&"ambiguous-pairing"));
-        // From the other end of the line of nodes no shape is that of its mode, and the numbers are not certain.
+        // The free end as the joint: the lowest mode shows it, and without shapes the numbers are not certain.
         let mirrored = FIRST.replace("number = 1", "number = 6");
         let analysis = run(&file, "cantilever", &mirrored).unwrap();
+        let note = analysis.warnings[0].to_string();
+        assert!(
+            note.contains("is node 1 the one nearest to the joint?"),
+            "{note}"
+        );
         assert!(codes(&analysis).contains(&"ambiguous-pairing"));
     }
 }
@@ -229,6 +234,7 @@ fn limit_a_free_beam_is_numbered_by_its_frequencies() {
         "{:?}",
         analysis.warnings
     );
+    assert!(codes(&analysis).is_empty(), "{:?}", analysis.warnings);
 }
 
 #[test]

@@ -296,6 +296,37 @@ def universal_series():
     )
 
 
+def mode55(analysis, data_type, values, mode, reals, quantity=8):
+    """A dataset 55 of three nodes."""
+    parts = 2 if data_type in (5, 6) else 1
+    digits, per_line = (12, 4) if data_type in (4, 6) else (5, 6)
+    lines = ["mode", "NONE", "NONE", "NONE", "NONE"]
+    lines.append("".join(f"{field:10d}" for field in (1, analysis, 2, quantity, data_type, values)))
+    lines.append("".join(f"{field:10d}" for field in (2, len(reals), 1, mode)))
+    lines.append("".join(f"{real:13.5e}" for real in reals))
+    for node in (1, 2, 3):
+        shape = [0.25 * node * (k - mode) for k in range(parts * values)]
+        lines += [f"{node:10d}", *values58(shape, per_line, digits)]
+    return dataset(55, *lines)
+
+
+def universal_modes():
+    places = [(1, 0.03), (2, 0.13), (3, 0.38)]
+    short = dataset(15, *[f"{node:10d}{0:10d}{0:10d}{11:10d}{x:13.5e}{0:13.5e}{0:13.5e}" for node, x in places])
+    wide = dataset(
+        2411,
+        *[line for node, x in places for line in (f"{node:10d}{0:10d}{0:10d}{11:10d}", f"{1e3 * x:25.16e}{0:25.16e}{0:25.16e}".replace("e", "D"))],
+    )
+    units = dataset(164, f"{5:10d}mm (milli-newton)    {2:10d}", "".join(f"{x:25.17e}" for x in (1e3, 1e3, 1.0)), "273.15")
+    normal = [mode55(2, 2, 3, mode, (17.0 * mode**2, 0.0, 0.01, 0.0)) for mode in (1, 2)]
+    yield "modes", short + "".join(normal)
+    yield "modes-double", units + wide + mode55(2, 4, 6, 1, (17.0, 0.0, 0.0, 0.02))
+    yield "modes-complex", short + mode55(3, 5, 3, 1, (-1.0, 107.0, 1.0, 0.0, 0.0, 0.0)) + mode55(3, 5, 3, 2, (-1.0, -107.0, 1.0, 0.0, 0.0, 0.0))
+    yield "modes-complex-double", wide + units + mode55(7, 6, 6, 1, (-1.0, 107.0))
+    yield "modes-rigid", short + mode55(2, 2, 6, 1, (0.0, 0.0, 0.0, 0.0)) + mode55(2, 2, 3, 2, (17.0, 0.0, 0.0, 0.0), 2) + normal[0]
+    yield "modes-cut", (short + "".join(normal))[:-50]
+
+
 def binary58(function, ordinate, numbers, order, even=1, wide=False):
     """A dataset 58b; `wide` stores the uneven abscissa in double precision, against the standard."""
     code = "f" if ordinate in (2, 5) else "d"
@@ -512,7 +543,7 @@ def main():
         "flac": [*flacs()],
         "csv": [*texts(), *labview_files()],
         "matlab": [*matlab_files()],
-        "universal": [*as_bytes(universal_series()), *series],
+        "universal": [*as_bytes(universal_series()), *as_bytes(universal_modes()), *series],
         "responses": [*functions_as_text(), *as_bytes(universal_functions()), *complex_functions, both],
         "description": [*descriptions()],
         "truths": [*truths()],

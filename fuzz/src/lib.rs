@@ -13,7 +13,7 @@ use tapjoint::description::{ChannelRef, TestDescription};
 use tapjoint::pipeline::{IdentifySettings, ModeResult, run_recording, run_test, tested_structure};
 use tapjoint::recording::{
     Channel, ReadSettings, Recording, VariableRole, list_datasets, open_frequency_responses,
-    read_function,
+    read_function, read_mode_shapes,
 };
 use tapjoint::report::deck::{
     MOST_FREQUENCIES, deck_of, render_abaqus, render_nastran, source_in_report,
@@ -144,9 +144,10 @@ fn read_within(bytes: &[u8], most: u64) {
     }
 }
 
-/// Reads a universal file as a recording, and every function in it.
+/// Reads a universal file as a recording, every function in it, and its modes.
 fn universal(bytes: &[u8]) {
     recording(bytes);
+    modes(&file_of(bytes));
     let Ok(file) = list_datasets(&file_of(bytes)) else {
         return;
     };
@@ -165,6 +166,25 @@ fn universal(bytes: &[u8]) {
                     .is_none_or(|part| part.len() == values.real.len())
             );
         }
+    }
+}
+
+/// Reads the modes of a universal file, and its nodes along their line.
+fn modes(path: &Path) {
+    let Ok(found) = read_mode_shapes(path) else {
+        return;
+    };
+    assert!(!found.modes.is_empty());
+    for mode in &found.modes {
+        assert!(mode.frequency.is_finite() && mode.frequency > 0.0);
+        assert!(mode.damping.is_none_or(|ratio| ratio.is_finite()));
+        assert!(mode.shape.values().flatten().all(|value| value.is_finite()));
+    }
+    if let Ok(line) = found.along_line(None) {
+        assert!(line.nodes.iter().all(|node| node.distance.is_finite()));
+        assert_eq!(line.shapes.len(), found.modes.len());
+        let mut values = line.shapes.iter().flatten();
+        assert!(values.all(|at| at.value.abs() <= 1.0 && at.node < line.nodes.len()));
     }
 }
 

@@ -20,6 +20,7 @@ mod function_fits;
 mod identification;
 mod lengths;
 mod measurement;
+mod mode_file;
 mod modes;
 mod observations;
 mod observed_mode;
@@ -42,7 +43,8 @@ use lengths::numbered;
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };
-use modes::modes_of_bare;
+use mode_file::read_modes;
+use modes::{modes_of_bare, modes_of_file};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
 use recording_result::amplitude_changes;
@@ -92,9 +94,9 @@ pub struct Analysis {
     pub warnings: Vec<Warning>,
 }
 
-/// Runs a described test: its recordings, or the frequencies it gives.
+/// Runs a described test: its recordings, or the frequencies that it or its file of modes gives.
 ///
-/// `place` is the folder in which recordings are looked for and the description's own name, for
+/// `place` is the folder in which files are looked for and the description's own name, for
 /// messages. `settings.fit_modes` yields to the description's, `settings.details` are the
 /// description's.
 ///
@@ -116,7 +118,14 @@ pub fn run_test(
     }
     let mut found = numbered(test, &mut recordings, &structure, &details);
     if let Some(measured) = &test.measured {
-        found.modes = modes_of_measured(measured, &structure);
+        match &measured.file {
+            Some(file) => {
+                let read = read_modes(test, measured, file, place.0, place.1)?;
+                (found.modes, found.warnings) = modes_of_file(&read, &structure, &details);
+                warnings.extend(read.warnings);
+            }
+            None => found.modes = modes_of_measured(measured, &structure),
+        }
     }
     warnings.extend(found.warnings);
     warnings.extend(of_amplitude(amplitude_changes(&recordings)));

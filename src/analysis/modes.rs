@@ -1,5 +1,6 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
+use super::mode_file::ModesOfFile;
 use super::observed_mode::shape_of;
 use super::recording_result::RecordingResult;
 use super::results::{ModeResult, between, measured_modes, scatter_of};
@@ -112,12 +113,16 @@ pub fn modes_of_recordings(
             ..ModeResult::of(mode.reading, &seen[mode.recording].file)
         })
         .collect();
-    let warnings = match structure.assembly {
-        Assembly::Free => number_free(&mut modes, structure),
-        Assembly::Cantilever | Assembly::Lap => {
-            number_jointed(&mut modes, structure, details, &seen)
-        }
+    let bands = seen.iter().filter_map(|recording| recording.looked_at());
+    let placed = seen.iter();
+    let placed = placed.flat_map(|recording| &recording.conditions.sensor_positions);
+    let candidates = Candidates {
+        which: unlabelled(&modes),
+        shapes: Shapes::Recordings(&seen),
+        bands: bands.collect(),
+        sensors: placed.map(|(name, place)| (name.clone(), *place)).collect(),
     };
+    let warnings = number(&mut modes, &candidates, structure, details);
     for recording in recordings.iter_mut() {
         recording.mode_numbers = own_numbers(&modes, recording.readings());
     }
@@ -145,7 +150,8 @@ pub(super) fn modes_of_bare(recording: &mut RecordingResult) -> Vec<ModeResult> 
     let mut modes: Vec<ModeResult> = readings
         .map(|reading| ModeResult::of(reading, &recording.file))
         .collect();
-    number_in_order(&mut modes);
+    let all = unlabelled(&modes);
+    number_in_order(&mut modes, &all);
     recording.mode_numbers = modes.iter().map(|mode| mode.mode).collect();
     modes
 }
@@ -176,6 +182,7 @@ pub fn modes_of_measured(
             std: known.then(|| variance.sqrt()),
             between: None,
             repeats: BTreeMap::new(),
+            damping: None,
             reading: None,
             recording: None,
             lambda: Some(structure.beam.lambda_of(frequency)),
@@ -184,16 +191,77 @@ pub fn modes_of_measured(
     modes
 }
 
+/// The modes of a file, numbered as the description says, else by their frequencies and shapes.
+pub(super) fn modes_of_file(
+    file: &ModesOfFile,
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> (Vec<ModeResult>, Vec<Warning>) {
+    let mut modes = modes_of_measured(&file.measured, structure);
+    for (mode, damping) in modes.iter_mut().zip(&file.damping) {
+        mode.damping = *damping;
+    }
+    if !file.measured.modes.is_empty() {
+        return (modes, Vec::new());
+    }
+    let mut which = unlabelled(&modes);
+    which.retain(|index| !file.other_direction.contains(index));
+    let candidates = Candidates {
+        which,
+        shapes: Shapes::Elsewhere(&file.shapes),
+        bands: Vec::new(),
+        sensors: file.nodes.clone(),
+    };
+    let warnings = number(&mut modes, &candidates, structure, details);
+    (modes, warnings)
+}
+
+/// Peaks that may be modes of the model, and what is known of them beside their frequencies.
+struct Candidates<'a> {
+    /// Indices of the peaks.
+    which: Vec<usize>,
+    shapes: Shapes<'a>,
+    /// Bands (Hz) in which peaks were looked for; none: everywhere.
+    bands: Vec<(f64, f64)>,
+    /// Names and positions (m) of the sensors.
+    sensors: Vec<(String, f64)>,
+}
+
+/// Where the shapes of the peaks come from.
+enum Shapes<'a> {
+    Recordings(&'a [&'a RecordingResult]),
+    /// One list for each peak.
+    Elsewhere(&'a [Vec<ShapeAt>]),
+}
+
 /// Indices of the peaks that may be modes.
 fn unlabelled(modes: &[ModeResult]) -> Vec<usize> {
     let all = 0..modes.len();
     all.filter(|&index| modes[index].may_be_mode()).collect()
 }
 
+/// Numbers the peaks by the model of the structure.
+fn number(
+    modes: &mut [ModeResult],
+    candidates: &Candidates<'_>,
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> Vec<Warning> {
+    match structure.assembly {
+        Assembly::Free => number_free(modes, &candidates.which, structure),
+        Assembly::Cantilever | Assembly::Lap => {
+            number_jointed(modes, candidates, structure, details)
+        }
+    }
+}
+
 /// Numbers a free beam's modes by their nominal frequencies, where any is near one; else in ascending
 /// order.
-fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning> {
-    let free = unlabelled(modes);
+fn number_free(
+    modes: &mut [ModeResult],
+    free: &[usize],
+    structure: &TestedStructure,
+) -> Vec<Warning> {
     let mut peaks = Vec::with_capacity(free.len());
     for mode in free.iter().map(|&index| &modes[index]) {
         // Height over the noise, or prominence.
@@ -216,10 +284,10 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
     .unwrap_or_default();
     let numbers = pair_by_ratio(&peaks, &nominal, FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE);
     if numbers.iter().any(Option::is_some) {
-        let unnumbered = apply_numbers(modes, &free, &numbers);
+        let unnumbered = apply_numbers(modes, free, &numbers);
         return Vec::from_iter(Warning::unpaired_of_free_beam(unnumbered));
     }
-    number_in_order(modes);
+    number_in_order(modes, free);
     match free.is_empty() {
         true => Vec::new(),
         false => vec![Warning::numbered_in_order()],
@@ -234,10 +302,10 @@ fn apply_numbers(modes: &mut [ModeResult], which: &[usize], numbers: &[Option<us
     numbers.iter().filter(|number| number.is_none()).count()
 }
 
-fn number_in_order(modes: &mut [ModeResult]) {
-    let unlabelled = modes.iter_mut().filter(|mode| mode.may_be_mode());
-    for (number, mode) in (1..).zip(unlabelled) {
-        mode.mode = Some(number);
+/// Numbers the peaks with these indices in ascending order.
+fn number_in_order(modes: &mut [ModeResult], which: &[usize]) {
+    for (number, &index) in (1..).zip(which) {
+        modes[index].mode = Some(number);
     }
 }
 
@@ -299,14 +367,22 @@ const SAME_PEAK: f64 = 0.005;
 /// Numbers the peaks of a jointed structure; in ascending order where nothing better can be had.
 fn number_jointed(
     modes: &mut [ModeResult],
+    candidates: &Candidates<'_>,
     structure: &TestedStructure,
     details: &StructureDetails,
-    recordings: &[&RecordingResult],
 ) -> Vec<Warning> {
-    let free = unlabelled(modes);
+    let free = &candidates.which;
     let mut peaks = Vec::with_capacity(free.len());
-    for &index in &free {
-        peaks.push(measured_peak(index, modes, recordings));
+    for &index in free {
+        peaks.push(match candidates.shapes {
+            Shapes::Recordings(recordings) => measured_peak(index, modes, recordings),
+            Shapes::Elsewhere(shapes) => MeasuredPeak {
+                frequency: modes[index].frequency,
+                std: modes[index].std,
+                shape: shapes.get(index).cloned().unwrap_or_default(),
+                strength: None,
+            },
+        });
     }
     let fit = details.fit.as_deref().unwrap_or_default();
     let common_factor =
@@ -325,21 +401,16 @@ fn number_jointed(
             known.cross_compliance.map(|c| units.ktr / c),
         ],
         common_factor,
-        bands: recordings
-            .iter()
-            .filter_map(|one| one.looked_at())
-            .collect(),
+        bands: candidates.bands.clone(),
         ..PairingSettings::default()
     };
     let found = pair_modes(&jointed(structure, details), &peaks, &settings);
     let Some(pairing) = found.ok().filter(|_| !peaks.is_empty()) else {
-        number_in_order(modes);
+        number_in_order(modes, free);
         return Vec::new();
     };
-    let unnumbered = apply_numbers(modes, &free, &pairing.chosen.numbers);
-    let placed = recordings
-        .iter()
-        .flat_map(|one| &one.conditions.sensor_positions);
+    let unnumbered = apply_numbers(modes, free, &pairing.chosen.numbers);
+    let placed = candidates.sensors.iter();
     let names: BTreeSet<&String> = placed.clone().map(|(name, _)| name).collect();
     let inverted: BTreeSet<String> = placed
         .filter(|(_, place)| pairing.chosen.inverted.contains(place))
@@ -350,7 +421,10 @@ fn number_jointed(
         Warning::missing_modes(&pairing.chosen.missing),
         Warning::ambiguous_pairing(&pairing, &peaks),
         Warning::inverted_sensors(&Vec::from_iter(inverted), names.len()),
-        Warning::doubtful_scales(&sizes_of_sensors(&pairing.chosen.sizes, recordings)),
+        Warning::doubtful_scales(&sizes_of_sensors(
+            &pairing.chosen.sizes,
+            &candidates.sensors,
+        )),
     ]
     .into_iter()
     .flatten()
@@ -358,18 +432,11 @@ fn number_jointed(
 }
 
 /// The sizes at the places of each sensor, by its name.
-fn sizes_of_sensors(
-    sizes: &[SizeAt],
-    recordings: &[&RecordingResult],
-) -> BTreeMap<String, Vec<SizeAt>> {
+fn sizes_of_sensors(sizes: &[SizeAt], sensors: &[(String, f64)]) -> BTreeMap<String, Vec<SizeAt>> {
     let mut of_sensors: BTreeMap<String, Vec<SizeAt>> = BTreeMap::new();
     for size in sizes {
-        let mut at_place: BTreeSet<&String> = BTreeSet::new();
-        for recording in recordings {
-            let positions = recording.conditions.sensor_positions.iter();
-            let here = positions.filter(|(_, place)| **place == size.sensor);
-            at_place.extend(here.map(|(name, _)| name));
-        }
+        let here = sensors.iter().filter(|(_, place)| *place == size.sensor);
+        let at_place: BTreeSet<&String> = here.map(|(name, _)| name).collect();
         // Of two sensors at one place neither is known to have this size.
         if let (Some(name), 1) = (at_place.first(), at_place.len()) {
             of_sensors.entry((*name).clone()).or_default().push(*size);

@@ -55,6 +55,8 @@ pub struct ModeResult {
     pub between: Option<BetweenRecordings>,
     /// Its frequency (Hz) in each recording that repeats it, by the recording's index; one or none where nothing was repeated.
     pub repeats: BTreeMap<usize, f64>,
+    /// Damping ratio (1) that a file of modes states; `None` for a mode that was read here.
+    pub damping: Option<f64>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.
@@ -73,6 +75,7 @@ impl ModeResult {
             std: reading.std,
             between: None,
             repeats: BTreeMap::new(),
+            damping: None,
             recording: Some(recording.to_owned()),
             lambda: None,
             reading: Some(reading),

@@ -51,6 +51,7 @@ impl FrequencyArguments {
         if let Some(frequencies) = &self.frequencies {
             file.test.recordings.clear();
             file.test.measured = Some(MeasuredFrequencies {
+                file: None,
                 frequencies: frequencies.clone(),
                 modes: (1..=frequencies.len()).collect(),
                 half_line: None,
@@ -69,6 +70,8 @@ impl FrequencyArguments {
         };
         let count = measured.frequencies.len();
         measured.half_line = match half_lines.as_slice() {
+            // The number of modes of a file is not known before it is read.
+            list if measured.file.is_some() => Some(list.to_vec()),
             [one] => Some(vec![*one; count]),
             list if list.len() == count => Some(list.to_vec()),
             list => bail!(

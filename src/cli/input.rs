@@ -83,10 +83,10 @@ impl TestFile {
         self.folder.join(file)
     }
 
-    /// Makes sure that every recording can be opened, before any work.
+    /// Makes sure that every recording and the file of modes can be opened, before any work.
     ///
     /// # Errors
-    /// The first recording that cannot be opened, with its line in the description.
+    /// The first file that cannot be opened, with its line in the description.
     pub(super) fn check_recordings(&self) -> anyhow::Result<()> {
         for recording in &self.test.recordings {
             for file in recording.files() {
@@ -94,6 +94,17 @@ impl TestFile {
                 readable_file(&path)
                     .map_err(|cause| recording.file_error(&self.name, &path, &cause))?;
             }
+        }
+        let measured = self.test.measured.as_ref();
+        if let Some(file) = measured.and_then(|measured| measured.file.as_ref()) {
+            let path = self.path_of(&file.path);
+            readable_file(&path).map_err(|cause| {
+                let problem = format!(
+                    "{} cannot be read: {cause}; name a file that exists, seen from the folder of this description",
+                    path.display()
+                );
+                file.error(&self.name, "file", problem)
+            })?;
         }
         Ok(())
     }

@@ -183,8 +183,10 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
 fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let recordings = test.recordings.iter();
+    let modes = test.measured.iter().filter_map(|one| one.file.as_ref());
     recordings
         .flat_map(|recording| recording.files())
+        .chain(modes.map(|file| &file.path))
         .map(|file| folder.join(file))
         .collect()
 }

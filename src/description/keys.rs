@@ -55,8 +55,11 @@ pub(super) const RECORDING: KnownTable = KnownTable::new(
     "file files length tap level band block at mass sample_rate time_unit form values variables sensor overload torque temperature date",
 );
 pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "position mass");
-pub(super) const MEASURED: KnownTable =
-    KnownTable::new("[measured]", "frequencies modes half_line std scatter");
+pub(super) const MEASURED: KnownTable = KnownTable::new(
+    "[measured]",
+    "frequencies file first_node modes half_line std scatter",
+);
+pub(super) const FIRST_NODE: KnownTable = KnownTable::new("measured.first_node", "number position");
 pub(super) const ANALYSIS: KnownTable = KnownTable::new(
     "[analysis]",
     "window reading fit_modes weights sensor_mass fit",
@@ -69,9 +72,20 @@ pub(super) const EFFECT: KnownTable = KnownTable::new(
      factor offset",
 );
 
-const ALL: [&KnownTable; 12] = [
-    &TOP, &BEAM, &TOLERANCE, &RIGHT, &JOINT, &OVERLAP, &HAMMER, &SENSOR, &RECORDING, &FASTENED,
-    &MEASURED, &ANALYSIS,
+const ALL: [&KnownTable; 13] = [
+    &TOP,
+    &BEAM,
+    &TOLERANCE,
+    &RIGHT,
+    &JOINT,
+    &OVERLAP,
+    &HAMMER,
+    &SENSOR,
+    &RECORDING,
+    &FASTENED,
+    &MEASURED,
+    &FIRST_NODE,
+    &ANALYSIS,
 ];
 
 /// Other usual names of keys, which differ too much to be found by spelling.

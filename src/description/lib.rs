@@ -307,16 +307,38 @@ pub struct RecordingDescription {
 /// Natural frequencies read elsewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredFrequencies {
-    /// Natural frequencies (Hz), ascending.
+    /// File of modes that gives the frequencies; `None` where the description lists them.
+    pub file: Option<ModeFile>,
+    /// Natural frequencies (Hz), ascending; empty where a file gives them.
     pub frequencies: Vec<f64>,
-    /// Mode numbers of these frequencies, ascending.
+    /// Mode numbers of these frequencies, ascending; empty where those of a file are not stated.
     pub modes: Vec<usize>,
-    /// Half-line bounds (Hz), one for each frequency.
+    /// Half-line bounds (Hz), one for each frequency; of a file also one for all.
     pub half_line: Option<Vec<f64>>,
-    /// Standard deviations (Hz), one for each frequency.
+    /// Standard deviations (Hz), one for each frequency; of a file also one for all.
     pub std: Option<Vec<f64>>,
     /// Repeatability, relative: std^2 = half_line^2/3 + (scatter f)^2.
     pub scatter: Option<f64>,
+}
+
+/// A file of modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeFile {
+    /// File as written in the description, relative to it.
+    pub path: PathBuf,
+    /// Line of the description that names the file.
+    pub line: usize,
+    /// The node that begins the line of nodes, where it is stated.
+    pub first_node: Option<FirstNode>,
+}
+
+/// The node of a file of modes that is nearest to the joint, or to the left end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstNode {
+    /// Number of the node in the file.
+    pub number: i64,
+    /// Its position along the beam (m).
+    pub position: f64,
 }
 
 /// Window over a block.

@@ -7,7 +7,7 @@ use super::recordings::{
 use super::structure::{read_beam, read_effect, read_joint};
 use super::{
     AnalysisDescription, Assembly, ChannelRef, FitParameter, JointDescription, JointModel,
-    RecordingDescription, SensorDescription, TestDescription, Weights, WindowKind, keys,
+    ModeFile, RecordingDescription, SensorDescription, TestDescription, Weights, WindowKind, keys,
 };
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -57,7 +57,7 @@ impl TestDescription {
         check_lengths(&recording_tables, &recordings)?;
         check_places(&sensor_tables, &sensors, &recordings)?;
         let measured = top.optional("measured", |entry| {
-            let measured = read_measured(&entry.table(&keys::MEASURED)?)?;
+            let measured = read_measured(&entry.table(&keys::MEASURED)?, beam.length)?;
             match recordings.first() {
                 None => Ok(measured),
                 Some(first) => Err(entry.error(format!(
@@ -99,7 +99,7 @@ impl TestDescription {
             return Ok(());
         }
         let problem = "nothing to analyse: neither [[recording]] nor [measured] is given; add `[[recording]]` with \
-                       `file = \"taps.wav\"`, or `[measured]` with `frequencies = [17, 118]`";
+                       `file = \"taps.wav\"`, or `[measured]` with `frequencies = [17, 118]` or `file = \"modes.unv\"`";
         Err(Source::new(file_name, "").error(1, "", problem))
     }
 }
@@ -275,6 +275,14 @@ impl RecordingDescription {
             path.display()
         );
         Source::new(description, "").error(self.line, "recording.file", problem)
+    }
+}
+
+impl ModeFile {
+    /// Returns the error of a key of `[measured]` that does not fit the file, or of a file that cannot be opened. It
+    /// points to the line of the description that names the file.
+    pub fn error(&self, description: &str, key: &str, problem: String) -> DescriptionError {
+        Source::new(description, "").error(self.line, format!("measured.{key}"), problem)
     }
 }
 

@@ -6,9 +6,10 @@ use super::reader::{
 };
 use super::structure::{along, read_free_length};
 use super::{
-    Assembly, BeamDescription, ChannelPlace, ChannelRef, FunctionForm, HammerDescription,
-    MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm, Scale, SensorDescription,
-    SensorKind, ValueColumns, VariableRole, Variables, keys,
+    Assembly, BeamDescription, ChannelPlace, ChannelRef, FirstNode, FunctionForm,
+    HammerDescription, MeasuredFrequencies, ModeFile, PointMass, RecordingDescription,
+    ResponseForm, Scale, SensorDescription, SensorKind, ValueColumns, VariableRole, Variables,
+    keys,
 };
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -611,28 +612,22 @@ const MODE: Limits = Limits::between(
     MEASURED_LIMIT as f64,
     "modes count from 1; rigid-body modes do not count",
 );
+const NODE: Limits = Limits::between(0.0, 1e9, "the number of a node in the file");
 /// Repeated tests scatter less than this.
 const LARGE_SCATTER: f64 = 0.1;
 
-/// Reads `[measured]`.
-pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, DescriptionError> {
-    let wanted = "a list of frequencies (Hz)";
-    let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
-    let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
-    if items.is_empty() {
-        let remedy = "list the natural frequencies in Hz, lowest first";
-        return Err(entry.wrong_count(0, "at least 1", remedy));
-    }
-    if items.len() > MEASURED_LIMIT {
-        let remedy = "leave the highest out: a joint needs two to four";
-        return Err(entry.wrong_count(items.len(), &format!("1 to {MEASURED_LIMIT}"), remedy));
-    }
-    let frequencies = items
-        .iter()
-        .map(|item| item.within(Dimension::Frequency, &FREQUENCY))
-        .collect::<Result<Vec<_>, _>>()?;
-    check_ascending(&items, &frequencies)?;
-    let count = frequencies.len();
+/// Reads `[measured]`, of a beam of this length (m).
+pub(super) fn read_measured(
+    table: &Table<'_>,
+    length: f64,
+) -> Result<MeasuredFrequencies, DescriptionError> {
+    let file = read_mode_file(table, length)?;
+    let frequencies = match &file {
+        Some(_) => Vec::new(),
+        None => read_frequencies(table)?,
+    };
+    // The caller compares the lists with a file.
+    let count = file.is_none().then_some(frequencies.len());
     if let (Some(entry), Some(_)) = (table.get("std"), table.get("half_line")) {
         return Err(entry.error(
             "`half_line` and `std` both state the reading's uncertainty; keep the one you know; a repeatability \
@@ -659,22 +654,78 @@ pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, De
         entry.unusual(large, "", "0.0001 to 0.03", question);
     }
     Ok(MeasuredFrequencies {
+        file,
+        modes: modes.unwrap_or_else(|| (1..=frequencies.len()).collect()),
         frequencies,
-        modes: modes.unwrap_or_else(|| (1..=count).collect()),
         half_line,
         std,
         scatter,
     })
 }
 
+fn read_frequencies(table: &Table<'_>) -> Result<Vec<f64>, DescriptionError> {
+    let wanted = "a list of frequencies (Hz), or `file = \"modes.unv\"`,";
+    let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
+    let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
+    if items.is_empty() {
+        let remedy = "list the natural frequencies in Hz, lowest first";
+        return Err(entry.wrong_count(0, "at least 1", remedy));
+    }
+    if items.len() > MEASURED_LIMIT {
+        let remedy = "leave the highest out: a joint needs two to four";
+        return Err(entry.wrong_count(items.len(), &format!("1 to {MEASURED_LIMIT}"), remedy));
+    }
+    let frequencies = items
+        .iter()
+        .map(|item| item.within(Dimension::Frequency, &FREQUENCY))
+        .collect::<Result<Vec<_>, _>>()?;
+    check_ascending(&items, &frequencies)?;
+    Ok(frequencies)
+}
+
+/// Reads the file of modes and its first node.
+fn read_mode_file(table: &Table<'_>, length: f64) -> Result<Option<ModeFile>, DescriptionError> {
+    let Some(entry) = table.get("file") else {
+        return match table.get("first_node") {
+            Some(node) => Err(node.error(
+                "a node belongs to a file of modes; add `file = \"modes.unv\"`, or remove it",
+            )),
+            None => Ok(None),
+        };
+    };
+    if let Some(frequencies) = table.get("frequencies") {
+        return Err(entry.error(format!(
+            "frequencies come from `file` or from `frequencies` (line {}), not from both; remove one of them",
+            frequencies.line
+        )));
+    }
+    let first_node = table.optional("first_node", |entry| {
+        let table = entry.table(&keys::FIRST_NODE)?;
+        let number = table.need("number", "its number in the file", "number = 1")?;
+        let position = table.need("position", "its place on the beam (m)", "position = 0.03")?;
+        Ok(FirstNode {
+            number: number.count(&NODE)? as i64,
+            position: position.within(Dimension::Length, &along(length))?,
+        })
+    })?;
+    Ok(Some(ModeFile {
+        path: PathBuf::from(entry.text("the name of a universal file such as \"modes.unv\"")?),
+        line: entry.line,
+        first_node,
+    }))
+}
+
 /// Reads one number for all frequencies, or a list with one for each.
 fn read_bounds(
     entry: &Entry<'_>,
     limits: &Limits,
-    count: usize,
+    count: Option<usize>,
 ) -> Result<Vec<f64>, DescriptionError> {
     if !entry.is_list() {
-        return Ok(vec![entry.within(Dimension::Frequency, limits)?; count]);
+        return Ok(vec![
+            entry.within(Dimension::Frequency, limits)?;
+            count.unwrap_or(1)
+        ]);
     }
     one_for_each(entry, "a number or a list of numbers (Hz)", count)?
         .iter()
@@ -682,13 +733,20 @@ fn read_bounds(
         .collect()
 }
 
-/// Returns the items of a list that has one for each of the `frequencies`.
+/// Returns the items of a list that has one for each of the `frequencies`; `None` of a file's, which are not known here.
 fn one_for_each<'t>(
     entry: &Entry<'t>,
     wanted: &str,
-    frequencies: usize,
+    frequencies: Option<usize>,
 ) -> Result<Vec<Entry<'t>>, DescriptionError> {
     let items = entry.list(wanted)?;
+    let Some(frequencies) = frequencies else {
+        let remedy = "give one for each mode of the file, lowest first";
+        return match items.len() {
+            1..=MEASURED_LIMIT => Ok(items),
+            count => Err(entry.wrong_count(count, &format!("1 to {MEASURED_LIMIT}"), remedy)),
+        };
+    };
     if items.len() == frequencies {
         return Ok(items);
     }

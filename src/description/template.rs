@@ -94,6 +94,8 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 #   Or, instead of all [[recording]] tables, natural frequencies that were measured elsewhere:
 # [measured]
 # frequencies = [17, 118, 335.625, 628.75, 994.5]   # Hz, ascending
+#                              # instead of frequencies: file = "modes.unv", a universal file with datasets 55, numbered by the model;
+#                              # its shapes count with first_node = { number = 1, position = "30 mm" }, the node nearest to @ORIGIN@
 # modes = [1, 2, 3, 4, 5]      # default 1..n; gaps allowed
 # half_line = 0.125            # Hz, half the line spacing, one number or a list; or std = ..., one standard deviation in Hz
 # scatter = "0.3 %"            # repeatability, default: none; std^2 = half_line^2/3 + (scatter f)^2

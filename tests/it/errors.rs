@@ -291,6 +291,35 @@ fn regress_frequencies_that_cannot_be() {
 }
 
 #[test]
+fn regress_files_of_modes_that_cannot_be() {
+    let base = MEASURED
+        .replace("frequencies = [17, 118, 335.5]", "file = \"modes.unv\"")
+        .replace(
+            "scatter",
+            "first_node = { number = 3, position = \"30 mm\" }\nscatter",
+        );
+    check(
+        "files_of_modes_that_cannot_be",
+        &base,
+        &[
+            ("file =", "frequencies = [17]\nfile ="),
+            ("file = \"modes.unv\"", "frequencies = [17, 118, 335.5]"),
+            ("file = \"modes.unv\"", ""),
+            ("\"modes.unv\"", "\" \""),
+            ("\"modes.unv\"", "55"),
+            ("[1, 2, 4]", "[1, 4, 2]"),
+            ("[0.1, 0.1, 0.5]", "[]"),
+            ("{ number = 3, position = \"30 mm\" }", "3"),
+            ("number = 3, ", ""),
+            (", position = \"30 mm\"", ""),
+            ("number = 3", "number = -3"),
+            ("number = 3", "node = 3"),
+            ("30 mm", "300 cm"),
+        ],
+    );
+}
+
+#[test]
 fn regress_text_that_is_no_toml_names_its_line() {
     for (text, line) in [
         ("[beam", 1),

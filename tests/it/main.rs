@@ -30,6 +30,7 @@ mod joint_law;
 mod laboratory;
 mod mains;
 mod modal_fit;
+mod mode_file;
 mod moved_clamp;
 mod observations;
 mod pairing;

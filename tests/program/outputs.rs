@@ -63,6 +63,12 @@ const TABLE: &[Row] = &[
         &[],
         &[folder("--out", "report.html", None)],
     ),
+    row(
+        &["identify", "modes.toml"],
+        &["modes.toml", "modes.unv"],
+        &[],
+        &[],
+    ),
     row(&["init", "taps.wav"], &["taps.wav"], &[], &[]),
     row(
         &["inspect", "truth.csv", "taps.wav"],
@@ -204,6 +210,11 @@ impl Row {
     }
 }
 
+/// A test whose modes are those of a file.
+const MODES: &str = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850\n\
+                     [joint]\nkind = \"cantilever\"\n[measured]\nfile = \"modes.unv\"\n";
+const BY_PYUFF: &str = include_str!("../../src/signal/tests/it/recording_uff/pyuff-normal.unv");
+
 /// A folder with all inputs of the table: a virtual test of a lap joint, the cantilever, a folder of tests.
 fn inputs() -> tempfile::TempDir {
     let (folder, samples) = (tempfile::tempdir().unwrap(), samples());
@@ -232,6 +243,8 @@ fn inputs() -> tempfile::TempDir {
     for name in ["test.toml", "taps.wav"] {
         copy(&place.join(name), &format!("tests/a/{name}"));
     }
+    fs::write(place.join("modes.toml"), MODES).unwrap();
+    fs::write(place.join("modes.unv"), BY_PYUFF).unwrap();
     let truth = r#"[{"name": "a", "effects": [], "params": {}}]"#;
     fs::write(place.join("truths.json"), truth).unwrap();
     let rows: Vec<String> = (0..2000)

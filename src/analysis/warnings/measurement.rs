@@ -244,26 +244,15 @@ impl Warning {
         (!list.is_empty()).then(|| Warning::new("missing-mode", text))
     }
 
-    /// The warning about sensors whose signs are those of the model only if they are inverted.
-    /// `count` is the number of all sensors.
-    pub(crate) fn inverted_sensors(names: &[String], count: usize) -> Option<Self> {
-        let what = match names {
-            [] => return None,
-            all if all.len() == count => format!(
-                "half of the sensors {} move against the direction of the others",
-                all.join(", ")
-            ),
-            [one] => format!("sensor {one} moves against the direction of the others"),
-            several => format!(
-                "sensors {} move against the direction of the others",
-                several.join(", ")
-            ),
-        };
+    /// The warning about modes of a file that move in another direction than the others.
+    pub(crate) fn other_direction(file: &str, frequencies: &[f64], most: &str) -> Option<Self> {
+        let words = frequencies.iter().map(|f| frequency_words(*f));
+        let list: Vec<String> = words.collect();
         let text = format!(
-            "{what} in the modes' shapes: mounted the other way, or an inverted channel; the modes were numbered with the \
-             sign reversed; turn the sensor, or reverse the sign of its `scale` or `sensitivity`"
+            "the modes at {} Hz move mostly in another direction than {most}, in which most modes move; they get no number of a bending mode; state modes = [...] in [measured] where they should have one",
+            list.join(", ")
         );
-        Some(Warning::new("inverted-sensor", text))
+        (!list.is_empty()).then(|| Warning::about(file, "other-direction", text))
     }
 
     /// The warning about the most probable other numbering, with the peaks that it numbers otherwise.

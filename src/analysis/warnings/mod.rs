@@ -4,7 +4,7 @@
 
 mod estimate;
 mod measurement;
-mod scales;
+mod sensors;
 
 pub(super) use estimate::{neglected_effects, of_estimate, of_prediction};
 pub(super) use measurement::{of_amplitude, of_quality, of_recording};
@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 70] = [
+pub const WARNING_CODES: [(&str, &str); 72] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -62,6 +62,14 @@ pub const WARNING_CODES: [(&str, &str); 70] = [
         "functions of a MATLAB file are taken to reach to half the sample rate",
     ),
     ("coherence-left-out", "a coherence is left out"),
+    (
+        "shapes-left-out",
+        "the shapes of a file of modes are not used",
+    ),
+    (
+        "other-direction",
+        "modes of a file move in another direction than the others",
+    ),
     (
         "unknown-unit",
         "the unit of a channel or function is not known",
@@ -242,8 +250,8 @@ impl Warning {
         }
     }
 
-    /// A doubt about a recording or its search for taps.
-    fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
+    /// A doubt about a recording, its search for taps, or a file of modes.
+    pub(super) fn about(file: &str, code: &'static str, sentence: impl fmt::Display) -> Self {
         Warning::new(code, format!("{file}: {sentence}"))
     }
 }

@@ -472,6 +472,7 @@ impl ModeSection {
             frequency: mode.frequency,
             half_line: mode.half_line,
             std: mode.std.filter(|_| !reading.is_unclear),
+            damping: mode.damping.or(reading.damping),
             lambda: mode.lambda,
             recording: mode.recording.clone(),
             label: mode.label(),

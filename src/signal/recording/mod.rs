@@ -46,8 +46,9 @@ pub use response_files::open_frequency_responses;
 pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
 pub use text::Separator;
 pub use uff::{
-    Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,
-    UffCoding, UniversalFile, list_datasets, read_function,
+    Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, ModeShapes, NoLine, NodalMode,
+    Node, NodeLine, Ordinate, PlacedNode, Point, Precision, ShapeAtNode, UffCoding, UniversalFile,
+    list_datasets, read_function, read_mode_shapes,
 };
 pub use units::{ResponseForm, TIME_UNITS, channel_unit};
 pub use write::{
@@ -276,12 +277,7 @@ impl Recording {
         if let Some(value) = settings.sample_rate {
             check_rate(&file, value)?;
         }
-        // Reading starts anew several times, which only a file allows; and a pipe without a writer would wait for ever.
-        let kind = std::fs::metadata(path).map(|found| found.file_type());
-        if kind.is_ok_and(|kind| !kind.is_file() && !kind.is_dir()) {
-            let problem = "is a pipe or a device; save its contents to a file and give that file";
-            return Err(RecordingError::new(&file, problem));
-        }
+        refuse_pipe(path, &file)?;
         match recognise(path, &file)? {
             FileType::Wav => wav::open_wav(path, file, settings),
             FileType::Flac => flac::open_flac(path, file, settings),
@@ -765,6 +761,17 @@ const UNREAD: &[(usize, &[u8], &str)] = &[
 
 /// Number of bytes that decide.
 const DECIDING_BYTES: usize = 4096;
+
+/// Refuses a pipe or a device. Reading starts anew several times, which only a file allows; and a pipe without a writer
+/// would wait for ever.
+fn refuse_pipe(path: &Path, file: &str) -> Result<(), RecordingError> {
+    let kind = std::fs::metadata(path).map(|found| found.file_type());
+    if kind.is_ok_and(|kind| !kind.is_file() && !kind.is_dir()) {
+        let problem = "is a pipe or a device; save its contents to a file and give that file";
+        return Err(RecordingError::new(file, problem));
+    }
+    Ok(())
+}
 
 /// Recognises the format of the file at `path`.
 fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {

@@ -83,6 +83,11 @@ impl UniversalFile {
         datasets.filter_map(|dataset| Some((dataset, dataset.function.as_ref()?)))
     }
 
+    /// Returns `true` where any dataset holds data at nodes.
+    pub(in crate::recording) fn has_data_at_nodes(&self) -> bool {
+        self.datasets.iter().any(|dataset| dataset.kind == 55)
+    }
+
     /// The doubt about a file that ends within a header.
     pub(in crate::recording) fn cut_header_doubt(&self) -> Option<RecordingWarning> {
         let dataset = self.cut_header?;
@@ -301,7 +306,7 @@ fn binary_place(
 }
 
 /// A file with a place in it; lines are read through a buffer, which a jump throws away.
-struct Scanner {
+pub(super) struct Scanner {
     file: File,
     /// The file's name in errors.
     name: String,
@@ -314,7 +319,7 @@ struct Scanner {
 }
 
 impl Scanner {
-    fn new(path: &Path, name: &str) -> Result<Self, RecordingError> {
+    pub(super) fn new(path: &Path, name: &str) -> Result<Self, RecordingError> {
         let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|source| unreadable(name, source))?;
         Ok(Self {
@@ -328,12 +333,12 @@ impl Scanner {
     }
 
     /// Place of the next line (bytes).
-    fn position(&self) -> u64 {
+    pub(super) fn position(&self) -> u64 {
         self.base + self.at as u64
     }
 
     /// Goes on at byte `place`.
-    fn jump(&mut self, place: u64) -> Result<(), RecordingError> {
+    pub(super) fn jump(&mut self, place: u64) -> Result<(), RecordingError> {
         self.buffer.clear();
         self.at = 0;
         let done = self.file.seek(SeekFrom::Start(place));
@@ -343,7 +348,7 @@ impl Scanner {
 
     /// The next line without its end, or the first [`MAX_LINE_BYTES`] of it; `None` at the end of
     /// the file.
-    fn line(&mut self) -> Result<Option<Vec<u8>>, RecordingError> {
+    pub(super) fn line(&mut self) -> Result<Option<Vec<u8>>, RecordingError> {
         loop {
             let rest = &self.buffer[self.at..];
             let end = memchr(b'\n', rest);

@@ -1,4 +1,4 @@
-//! Universal files: the functions (datasets 58 and 58b) of analysers and recorders.
+//! Universal files: the functions (datasets 58 and 58b) of analysers and recorders, and modes (dataset 55).
 //!
 //! A universal file is a row of datasets between lines of their own that hold `    -1`. A dataset 58
 //! has eleven header records in fixed columns and then its values, as text in fixed columns or, as
@@ -18,6 +18,8 @@
 //! for, from places remembered every 64 kB. No file has to fit into memory.
 
 mod list;
+mod mode_shapes;
+mod node_line;
 mod time_series;
 mod values;
 
@@ -26,6 +28,8 @@ use std::fmt;
 use super::text::{decode_text, parse_fortran, shown};
 
 pub use list::{Dataset, UniversalFile, list_datasets};
+pub use mode_shapes::{ModeShapes, NodalMode, Node, read_mode_shapes};
+pub use node_line::{NoLine, NodeLine, PlacedNode, ShapeAtNode};
 pub use values::{FunctionValues, read_function};
 
 pub(super) use list::Entry;
@@ -329,6 +333,9 @@ impl Function {
     }
 }
 
+/// Remedy for a file of modes where samples or functions are wanted.
+const MODES_REMEDY: &str = "its datasets 55 may hold modes, whose frequencies a test description reads: write file = \"modes.unv\" into its [measured]";
+
 /// Header records of a dataset 58.
 pub(super) const HEADER_LINES: usize = 11;
 
@@ -373,9 +380,7 @@ fn parse_header(
     lines: &[Vec<u8>; HEADER_LINES],
     coding: UffCoding,
 ) -> Result<Function, (usize, String)> {
-    let records = lines.each_ref().map(|line| Record {
-        characters: decode_text(line).trim_end().chars().collect(),
-    });
+    let records = lines.each_ref().map(|line| Record::of(line));
     let [
         id @ ..,
         degrees,
@@ -420,6 +425,12 @@ struct Record {
 }
 
 impl Record {
+    fn of(line: &[u8]) -> Self {
+        Record {
+            characters: decode_text(line).trim_end().chars().collect(),
+        }
+    }
+
     fn slice(&self, at: usize, width: usize) -> String {
         self.characters.iter().skip(at).take(width).collect()
     }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::list::{Entry, UniversalFile, describe, list_datasets};
 use super::values::{ValueReader, Values};
-use super::{Abscissa, Function, FunctionType, Ordinate, UffCoding};
+use super::{Abscissa, Function, FunctionType, MODES_REMEDY, Ordinate, UffCoding};
 use crate::recording::error::{
     RecordingError, RecordingWarning, channel_label, check_channel_count, short,
 };
@@ -458,8 +458,12 @@ impl<'a> FunctionGroup<'a> {
                 let name = describe(function);
                 format!("dataset {} ({name}): {problem}; {remedy}", dataset.number)
             } else if file.functions().next().is_none() {
+                let remedy = match file.has_data_at_nodes() {
+                    true => MODES_REMEDY,
+                    false => "export the time series or frequency response functions",
+                };
                 format!(
-                    "holds no function (dataset 58), only {}; allowed: dataset 58 or 58b; export the time series or frequency response functions",
+                    "holds no function (dataset 58), only {}; allowed: dataset 58 or 58b; {remedy}",
                     file.contents()
                 )
             } else {

@@ -2,6 +2,7 @@
 //! other programs where the folder of TAPJOINT_DATA has them.
 
 mod files;
+mod modes;
 mod responses;
 mod synthetic;
 

@@ -1,4 +1,5 @@
-//! Doubts about the scales of hammer and sensors: modal constants that no beam of this mass has.
+//! Doubts about sensors that the modes' shapes raise: mounted the other way, or with a scale that gives modal constants
+//! that no beam of this mass has.
 
 use super::Warning;
 use std::collections::BTreeMap;
@@ -21,6 +22,36 @@ const MISTAKES: [(f64, &str); 3] = [
 const NEAR_MISTAKE: f64 = 0.25;
 
 impl Warning {
+    /// The warning about sensors whose signs are those of the model only if they are inverted.
+    /// `count` is the number of all sensors.
+    pub(crate) fn inverted_sensors(names: &[String], count: usize) -> Option<Self> {
+        let what = match names {
+            [] => return None,
+            all if all.len() == count => format!(
+                "half of the sensors {} move against the direction of the others",
+                all.join(", ")
+            ),
+            [one] => format!("sensor {one} moves against the direction of the others"),
+            several => format!(
+                "sensors {} move against the direction of the others",
+                several.join(", ")
+            ),
+        };
+        let text = format!(
+            "{what} in the modes' shapes: mounted the other way, or an inverted channel; the modes were numbered with the \
+             sign reversed; turn the sensor, or reverse the sign of its `scale` or `sensitivity`"
+        );
+        Some(Warning::new("inverted-sensor", text))
+    }
+
+    /// The warning about a file of modes whose shapes are not used.
+    pub(crate) fn shapes_left_out(file: &str, reason: &str) -> Self {
+        let text = format!(
+            "the modes are numbered by their frequencies alone, without their shapes: {reason}"
+        );
+        Warning::about(file, "shapes-left-out", text)
+    }
+
     /// The warning about sensors whose modal constants the model cannot have. `sizes` are those at the places of each
     /// sensor.
     pub(crate) fn doubtful_scales(sizes: &BTreeMap<String, Vec<SizeAt>>) -> Option<Self> {

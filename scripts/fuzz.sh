@@ -7,7 +7,8 @@
 #
 # Targets: wav flac csv universal matlab responses description truths reports identify chain.
 # An execution must end within 2 s and 300 MB without a panic. The bytes of one that fails are written to
-# fuzz/artifacts, beside the log of each target, and the script exits with 1. Once repaired they are kept in fuzz/found. The corpus grows in fuzz/corpus.
+# fuzz/artifacts, beside the log of each target, and the script exits with 1. Once repaired they are kept in fuzz/found.
+# The corpus grows in fuzz/corpus.
 # Coverage is given after 4/5 of the executions and at the end: where both are equal, more time finds nothing new.
 # Needs a C++ compiler and Python 3 beside Rust.
 set -euo pipefail

@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use tapjoint_numerics::stats::chi_square_tail;
 
 use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, Slopes, half_width};
-use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit, steady};
+use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 use crate::modal::Subspace;
 
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
@@ -130,9 +130,8 @@ impl<'a> BandData<'a> {
             }
         }
         let steady = accepted.settings.steady_lines.iter();
-        let hum = steady.map(|line| line.frequency / data.spacing());
-        let hum = hum.filter(|position| reach.contains(position));
-        near.extend(hum.flat_map(steady::poles_of));
+        let hum = steady.filter(|line| reach.contains(&(line.frequency / data.spacing())));
+        near.extend(hum.flat_map(|line| line.poles(data.spacing())));
         Ok(BandData {
             data,
             lines,

@@ -23,11 +23,11 @@ pub use mode_fit::{
     ColumnAmplitude, ExtraMode, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
     scatter_about_mean, weighted_mean,
 };
-pub use steady::SteadyLine;
 pub use tapjoint_numerics::least_squares::StopReason;
 
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
+use variable_projection::STEADY;
 
 /// Start of the search for a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +46,27 @@ pub struct FitSettings {
     pub added_decay: f64,
     /// Steady lines, mains hum, to be fitted as such. None.
     pub steady_lines: Vec<SteadyLine>,
+}
+
+/// A line that does not decay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyLine {
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// Largest error of the frequency (Hz).
+    pub bound: f64,
+}
+
+/// Distance of the two poles that stand for a steady line from its frequency (lines). 0.02: between them lies what is left
+/// of the frequency's error once it was read from the data. An error of 0.08 lines leaves 1 % of the line.
+const OFF: f64 = 0.02;
+
+impl SteadyLine {
+    /// Returns its poles (lines) with lines `spacing` (Hz) apart. Two beside each other span the line and its change by an
+    /// error of the frequency, to first order.
+    fn poles(&self, spacing: f64) -> [Complex64; 2] {
+        [-OFF, OFF].map(|off| Complex64::new(-STEADY, self.frequency / spacing + off))
+    }
 }
 
 /// Reason why data cannot be fitted at all.

@@ -1,22 +1,11 @@
-//! Steady lines: hum that goes on through the decays, fitted beside the modes.
+//! Places of steady lines: hum that goes on through the decays, fitted beside the modes.
 
 use num_complex::Complex64;
 
+use super::SteadyLine;
 use super::group::{Accepted, BandData, Group, half_band};
 use super::variable_projection::STEADY;
 
-/// A line that does not decay.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SteadyLine {
-    /// Frequency (Hz).
-    pub frequency: f64,
-    /// Largest error of the frequency (Hz).
-    pub bound: f64,
-}
-
-/// Distance of the two poles that stand for a steady line from its frequency (lines). 0.02: between them lies what is left
-/// of the frequency's error once it was read from the data. An error of 0.08 lines leaves 1 % of the line.
-const OFF: f64 = 0.02;
 /// Distance of the places at which a line is looked for (resolutions). A quarter: the peak of a line is a resolution wide.
 const STEP: f64 = 0.25;
 /// Most places to either side of a line. 40: ten resolutions, beyond which nothing but the samples before the first tap
@@ -24,12 +13,6 @@ const STEP: f64 = 0.25;
 const MOST_STEPS: f64 = 40.0;
 /// Most steps of the search for modes and line together.
 const SEARCH_STEPS: usize = 20;
-
-/// Poles (lines) of a steady line at a position (lines). Two beside each other span the line and its change by an error of
-/// the frequency, to first order.
-pub(super) fn poles_of(position: f64) -> [Complex64; 2] {
-    [-OFF, OFF].map(|off| Complex64::new(-STEADY, position + off))
-}
 
 impl Accepted<'_> {
     /// Moves the steady lines beside fitted modes to where they explain the data best, within their bounds.

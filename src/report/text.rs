@@ -95,6 +95,9 @@ fn estimate(document: &Document) -> String {
     };
     let mut text = plain(tables::parameters(document));
     text.push_str(&strong_correlations(found));
+    if let Some(words) = tables::set_up_words(found) {
+        text.push_str(&wrapped(words.trim(), 0));
+    }
     if let Some(methods) = tables::methods(document) {
         text.push('\n');
         text.push_str(&render_table(&methods));

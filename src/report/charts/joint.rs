@@ -153,6 +153,8 @@ struct Cloud {
     estimate: Option<(f64, f64)>,
     /// The 95 % region by the covariance; empty where there is none.
     ellipse: Vec<(f64, f64)>,
+    /// True if the ellipse holds the scatter of the joint between recordings, which the random errors do not.
+    of_set_ups: bool,
 }
 
 /// The estimates under changed frequencies, a panel for each method; `None` where there are none.
@@ -242,6 +244,7 @@ impl Cloud {
                 let covariance = cloud.estimate.zip(estimate.log_covariance);
                 let region = covariance.map(|((kx, ky), covariance)| ellipse(kx, ky, covariance));
                 cloud.ellipse = region.unwrap_or_default();
+                cloud.of_set_ups = estimate.set_ups.is_some();
             }
         }
         cloud
@@ -272,7 +275,10 @@ impl Cloud {
             alike.labels.push(words);
         }
         let patterns = "every mode at an end of its bound";
-        let ellipse = "95 % ellipse (covariance)";
+        let ellipse = match self.of_set_ups {
+            true => "95 % ellipse (covariance, with the scatter of the joint)",
+            false => "95 % ellipse (covariance)",
+        };
         let (x, y) = (
             x.of("Kx = Kt L\u{b3}/(EI)", "1"),
             y.of("Ky = Kr L/(EI)", "1"),

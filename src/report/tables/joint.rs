@@ -183,13 +183,9 @@ pub fn parameters(document: &Document) -> Option<Table> {
             modes.push_str(&format!(", and {} at {free} m", listed(&numbers)));
         }
     }
-    if let Some(count) = estimate.set_ups {
-        modes.push_str(&format!(
-            ". The joint differs between {count} recordings; std and limits hold this scatter"
-        ));
-    }
+    let set_ups = set_up_words(estimate).unwrap_or_default();
     let note = format!(
-        "{modes}. Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{scaled_note}"
+        "{modes}.{set_ups} Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{scaled_note}"
     );
     let table = Table::with_heads(caption, heads, rows, note);
     Some(match (misses, stated) {
@@ -342,6 +338,14 @@ fn stiffness(value: Option<f64>) -> String {
 fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
     let (value, base) = value.zip(base)?;
     Some(100.0 * (value - base) / base)
+}
+
+/// Says that std and limits hold the scatter of the joint between recordings, after a blank; `None` where they do not.
+pub fn set_up_words(estimate: &EstimateSection) -> Option<String> {
+    let count = estimate.set_ups?;
+    Some(format!(
+        " The joint differs between {count} recordings. Std and limits hold that scatter."
+    ))
 }
 
 /// Non-dimensional stiffnesses.

@@ -687,8 +687,9 @@ fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<
                 })
             });
             let nearer = distance < least || distance <= least && nearest.is_none();
-            let alone = distance <= DRIFTED || are_alone(first, second, merged);
-            if nearer && alone && resonances && missed && !a.is_shown_with(b) {
+            let may_be_one = nearer && resonances && missed && !a.is_shown_with(b);
+            // Asked last: it compares with all others.
+            if may_be_one && (distance <= DRIFTED || are_alone(first, second, merged)) {
                 (nearest, least) = (Some((first, second)), distance);
             }
         }

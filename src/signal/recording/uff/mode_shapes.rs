@@ -100,8 +100,16 @@ pub fn read_mode_shapes(path: &Path) -> Result<ModeShapes, RecordingError> {
             warnings.push(RecordingWarning::new("truncated", message));
         }
         match dataset.kind {
-            15 => reader.nodes_in_one_line(dataset, &mut nodes)?,
-            2411 => reader.nodes_in_two_lines(dataset, &mut nodes)?,
+            15 | 2411 => {
+                let last = match dataset.kind {
+                    15 => reader.nodes_in_one_line(dataset, &mut nodes)?,
+                    _ => reader.nodes_in_two_lines(dataset, &mut nodes)?,
+                };
+                // The last number of a file that was cut may have lost digits.
+                if let Some(last) = last.filter(|_| dataset.place.cut) {
+                    nodes.remove(&last);
+                }
+            }
             DATA_AT_NODES => {
                 let Some(read) = reader.mode(dataset)? else {
                     continue;
@@ -273,12 +281,12 @@ impl ModeReader<'_> {
         Err(RecordingError::at_line(&self.file.name, line, problem))
     }
 
-    /// Reads nodes of dataset 15: Format(4I10,3E13.5).
+    /// Reads nodes of dataset 15, Format(4I10,3E13.5). Returns the number of the last one.
     fn nodes_in_one_line(
         &mut self,
         dataset: &Dataset,
         nodes: &mut BTreeMap<i64, Node>,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<Option<i64>, RecordingError> {
         self.scanner.jump(dataset.place.start)?;
         let mut last = None;
         while let Some(line) = self.line(dataset)? {
@@ -306,21 +314,15 @@ impl ModeReader<'_> {
             );
             last = Some(number);
         }
-        // The last number of a file that was cut may have lost digits.
-        if dataset.place.cut
-            && let Some(last) = last
-        {
-            nodes.remove(&last);
-        }
-        Ok(())
+        Ok(last)
     }
 
-    /// Reads nodes of dataset 2411: Format(4I10), then Format(1P3D25.16).
+    /// Reads nodes of dataset 2411, Format(4I10), then Format(1P3D25.16). Returns the number of the last one.
     fn nodes_in_two_lines(
         &mut self,
         dataset: &Dataset,
         nodes: &mut BTreeMap<i64, Node>,
-    ) -> Result<(), RecordingError> {
+    ) -> Result<Option<i64>, RecordingError> {
         self.scanner.jump(dataset.place.start)?;
         let mut last = None;
         while let Some(line) = self.line(dataset)? {
@@ -357,13 +359,7 @@ impl ModeReader<'_> {
             );
             last = Some(number);
         }
-        // The last number of a file that was cut may have lost digits.
-        if dataset.place.cut
-            && let Some(last) = last
-        {
-            nodes.remove(&last);
-        }
-        Ok(())
+        Ok(last)
     }
 
     /// Reads a dataset 55; `None` where it holds no mode, or ends within its header with the file.

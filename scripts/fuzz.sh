@@ -53,7 +53,7 @@ for target in "${targets[@]}"; do
     words=()
     [ ! -d "fuzz/found/$target" ] || words+=("fuzz/found/$target")
     [ ! -f "fuzz/$target.dict" ] || words+=("-dict=fuzz/$target.dict")
-    # Traced comparisons slow linear algebra down: what the release build does in 0.9 s took the target of the chain 7.3 s.
+    # Traced comparisons slow linear algebra down several times. The chain consists of it.
     seconds=2
     [ "$target" != chain ] || seconds=10
     # Small inputs run fast; a header of a universal file has 800 bytes, the chain needs samples.

@@ -7,14 +7,14 @@ use super::results::{
     measured_modes, scatter_of, set_ups,
 };
 use super::structure::{
-    StructureDetails, TestedStructure, estimator_of_lengths, frequencies_of, jointed,
+    StructureDetails, TestedStructure, estimator_of_lengths, fitted, frequencies_of, jointed,
     predicted_specimen,
 };
 use super::warnings::{Warning, of_estimate, of_prediction};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::{ConsistentEstimator, MovedClamp};
+use tapjoint_identify::consistent::{ConsistentEstimator, MovedClamp, PointFit};
 use tapjoint_identify::perturbation::{
     SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly,
     sign_pattern_estimates, spans_of,
@@ -82,8 +82,19 @@ pub fn identify(
     let of_lengths = settings.lengths.iter().flat_map(|length| &length.modes);
     let scatter = scatter_of(modes.iter().chain(of_lengths));
     let floor = settings.frequency_floor;
-    let measured = measured_modes(modes, scatter, floor);
+    let mut measured = measured_modes(modes, scatter, floor);
     let fit_modes = settings.fit_modes.unwrap_or(usize::MAX);
+    let set_ups = match settings.method {
+        EstimateMethod::Consistent => fitted_set_ups(structure, modes, settings),
+        _ => Vec::new(),
+    };
+    if !set_ups.is_empty() {
+        // The joint between the set-ups: each mode's best reading may be of another one.
+        let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+        for (own, mode) in measured.iter_mut().zip(numbered) {
+            own.frequency = mode.mean_of_repeats().unwrap_or(own.frequency);
+        }
+    }
     let used: Vec<MeasuredMode> = measured.iter().copied().take(fit_modes).collect();
     let mut moved = Vec::with_capacity(settings.lengths.len());
     for length in &settings.lengths {
@@ -97,12 +108,6 @@ pub fn identify(
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
         let found = estimator_of_lengths(structure, &settings.details, &used, &moved);
-        let numbered = modes.iter().filter(|mode| mode.mode.is_some());
-        let mut set_ups = set_ups(&numbered.take(fit_modes).collect::<Vec<_>>());
-        // The frequencies of other free lengths stay as they are.
-        let of_lengths = moved.iter().flat_map(|length| &length.modes);
-        let of_lengths: Vec<f64> = of_lengths.map(|mode| mode.frequency).collect();
-        set_ups.iter_mut().for_each(|own| own.extend(&of_lengths));
         let estimated = found.and_then(|found| {
             let estimate = found.estimate_with_set_ups(&set_ups)?;
             Ok((found, estimate))
@@ -151,6 +156,34 @@ pub fn identify(
     }
     warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
+}
+
+/// Fits each set-up alone, by its own modes of the described length; none where fewer than two set-ups that differ can be
+/// fitted.
+fn fitted_set_ups(
+    structure: &TestedStructure,
+    modes: &[ModeResult],
+    settings: &IdentifySettings,
+) -> Vec<PointFit> {
+    let numbers = modes.iter().filter_map(|mode| mode.mode);
+    let numbers: Vec<usize> = numbers
+        .take(settings.fit_modes.unwrap_or(usize::MAX))
+        .collect();
+    let unknowns = fitted(structure, &settings.details).len();
+    let mut fits = Vec::new();
+    for mut own in set_ups(modes, settings.frequency_floor) {
+        own.retain(|mode| numbers.contains(&mode.mode));
+        if own.len() < unknowns {
+            continue;
+        }
+        if let Ok(estimator) = estimator_of_lengths(structure, &settings.details, &own, &[]) {
+            let fit = estimator.fit();
+            if fit.misfit.is_finite() {
+                fits.push(fit);
+            }
+        }
+    }
+    if fits.len() < 2 { Vec::new() } else { fits }
 }
 
 /// Frequencies of the estimated beam and joint beside the measured ones, and the structure that has them;

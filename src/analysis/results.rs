@@ -53,7 +53,7 @@ pub struct ModeResult {
     pub std: Option<f64>,
     /// Scatter between the recordings that were merged; `None` with one recording.
     pub between: Option<BetweenRecordings>,
-    /// Its frequency (Hz) in each recording that repeats it, by the recording's index; one or none where nothing was repeated.
+    /// Its frequency (Hz) in each set-up, by the index of the set-up's first recording. Bands of one file are one set-up.
     pub repeats: BTreeMap<usize, f64>,
     /// Damping ratio (1) that a file of modes states; `None` for a mode that was read here.
     pub damping: Option<f64>,
@@ -91,6 +91,12 @@ impl ModeResult {
     /// Returns true for a resonance that got no number.
     pub(super) fn is_unpaired(&self) -> bool {
         self.mode.is_none() && self.may_be_mode()
+    }
+
+    /// Its mean frequency (Hz) over the set-ups; `None` in fewer than two.
+    pub(super) fn mean_of_repeats(&self) -> Option<f64> {
+        let count = self.repeats.len();
+        (count > 1).then(|| self.repeats.values().sum::<f64>() / count as f64)
     }
 
     /// Words for a peak that is no mode: "mains 50 Hz", "unpaired"; `None` for a mode.
@@ -172,26 +178,24 @@ pub(super) fn measured_modes(modes: &[ModeResult], scatter: f64, floor: f64) -> 
     measured
 }
 
-/// The frequencies (Hz) of these modes in each set-up, one list for each recording that repeats any of them; none where the
-/// recordings agree within their readings' uncertainty. A mode that a recording does not repeat has its listed frequency.
-pub(super) fn set_ups(modes: &[&ModeResult]) -> Vec<Vec<f64>> {
+/// The modes of each set-up alone, ascending, each with its own frequency; none where the set-ups agree within their
+/// readings' uncertainty. `floor` (1) is added to every uncertainty.
+pub(super) fn set_ups(modes: &[ModeResult], floor: f64) -> Vec<Vec<MeasuredMode>> {
     let between: Vec<BetweenRecordings> = modes.iter().filter_map(|mode| mode.between).collect();
     if !exceeds_noise(&between) {
         return Vec::new();
     }
-    let repeated = modes.iter().filter(|mode| mode.repeats.len() > 1);
-    let recordings: BTreeSet<usize> = repeated
-        .flat_map(|mode| mode.repeats.keys().copied())
-        .collect();
-    let mut set_ups = Vec::with_capacity(recordings.len());
-    for recording in recordings {
-        let own = modes.iter().map(|mode| {
-            mode.repeats
-                .get(&recording)
-                .copied()
-                .unwrap_or(mode.frequency)
+    let all = modes.iter().flat_map(|mode| mode.repeats.keys().copied());
+    let mut set_ups = Vec::new();
+    for set_up in BTreeSet::from_iter(all) {
+        let own = modes
+            .iter()
+            .filter(|mode| mode.repeats.contains_key(&set_up));
+        let own = own.map(|mode| ModeResult {
+            frequency: mode.repeats[&set_up],
+            ..mode.clone()
         });
-        set_ups.push(own.collect());
+        set_ups.push(measured_modes(&own.collect::<Vec<_>>(), 0.0, floor));
     }
     set_ups
 }

@@ -462,8 +462,7 @@ fn crowded_case(assembly: Assembly, seed: u64) -> Case {
 
 #[test]
 fn recover_numbers_among_many_other_peaks() {
-    // A numbering up to 20 times less probable is said, so one in twenty may be wrong without a word. With 400 tests
-    // each, 2.0 % (cantilever) and 3.3 % (lap) are, 1.0 % and 2.8 % are said to be uncertain.
+    // A numbering up to 20 times less probable is said, so one in twenty, 3 of 60, may be wrong without a word.
     const COUNT: usize = 60;
     for assembly in [Assembly::Cantilever, Assembly::Lap] {
         let (mut right, mut said, mut wrong) = (0, 0, 0);

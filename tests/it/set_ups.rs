@@ -52,15 +52,23 @@ fn share_held(set_ups: usize, tails: f64) -> f64 {
             .iter()
             .map(|kr| read(&model, *kr, &mut random))
             .collect();
-        let listed = (1..).zip(&all[0]).map(|(mode, &frequency)| MeasuredMode {
-            mode,
-            frequency,
-            std: Some(STD * frequency),
-        });
         let settings = ConsistentSettings::two_parameter();
-        let estimator =
-            ConsistentEstimator::new(&structure, &listed.collect::<Vec<_>>(), &settings).unwrap();
-        let estimate = estimator.estimate_with_set_ups(&all).unwrap();
+        let estimator = |frequencies: &[f64]| {
+            let mut modes = Vec::new();
+            for (mode, &frequency) in (1..).zip(frequencies) {
+                let std = Some(STD * frequency);
+                modes.push(MeasuredMode {
+                    mode,
+                    frequency,
+                    std,
+                });
+            }
+            ConsistentEstimator::new(&structure, &modes, &settings).unwrap()
+        };
+        let fits: Vec<_> = all.iter().map(|own| estimator(own).fit()).collect();
+        let mean = |mode: usize| all.iter().map(|own| own[mode]).sum::<f64>() / set_ups as f64;
+        let means: Vec<f64> = (0..5).map(mean).collect();
+        let estimate = estimator(&means).estimate_with_set_ups(&fits).unwrap();
         let kr = estimate.quantity(Quantity::Kr).unwrap();
         kr.low.unwrap() <= further && further <= kr.high.unwrap()
     });
@@ -69,11 +77,18 @@ fn share_held(set_ups: usize, tails: f64) -> f64 {
 
 #[test]
 fn recover_the_joint_of_a_further_set_up() {
-    for (set_ups, tails) in [(2, 100.0), (3, 100.0), (5, 100.0), (3, 4.0), (5, 4.0)] {
+    // 95 % of normal joints, and two standard deviations of 300 draws (1.3 %) below or above it. Of joints with heavy tails
+    // the further one is an outlier more often than the few set-ups show.
+    for (set_ups, tails, least) in [
+        (2, 100.0, 0.92),
+        (3, 100.0, 0.92),
+        (5, 100.0, 0.92),
+        (3, 4.0, 0.89),
+        (5, 4.0, 0.89),
+    ] {
         let held = share_held(set_ups, tails);
         eprintln!("{set_ups} set-ups, tails of {tails}: {held:.3}");
-        // 95 %, and two standard deviations of 300 draws below it. Two set-ups share the listed one, which lengthens.
-        assert!((0.92..=0.99).contains(&held), "{set_ups}, {tails}: {held}");
+        assert!((least..=0.98).contains(&held), "{set_ups}, {tails}: {held}");
     }
 }
 
@@ -110,6 +125,12 @@ fn recover_a_joint_that_differs_from_recording_to_recording() {
         }
         test.push_str(&tail.replace("taps.wav", &format!("r{number}/taps.wav")));
     }
+    // The first file once more, in another band: no set-up of its own.
+    let first = test.find("[[recording]]").unwrap();
+    let second = first + 1 + test[first + 1..].find("[[recording]]").unwrap();
+    let low = test[first..second].replace("1200", "400");
+    assert!(low.contains("400"), "{low}");
+    test.push_str(&low);
     fs::write(folder.path().join("test.toml"), test).unwrap();
     let report = tapjoint(folder.path(), "diagnose test.toml --quiet --json -");
     let numbers = report["modes"]
@@ -119,10 +140,15 @@ fn recover_a_joint_that_differs_from_recording_to_recording() {
         .filter_map(|mode| mode["mode"].as_u64());
     assert!(numbers.eq(1..=5), "{}", report["modes"]);
     let warnings = report["warnings"].to_string();
-    assert!(!warnings.contains("unpaired"), "{warnings}");
+    assert!(
+        !warnings.contains("unpaired") && warnings.contains("moved-mode"),
+        "{warnings}"
+    );
     let estimate = &report["estimate"];
     assert_eq!(estimate["set_ups"], 3);
     let kr = &estimate["kr"];
-    let [low, high] = ["low", "high"].map(|end| kr[end].as_f64().unwrap());
+    let [low, value, high] = ["low", "value", "high"].map(|end| kr[end].as_f64().unwrap());
     assert!(low < 672.0 && high > 800.0, "{kr}");
+    // Between the set-ups, near their mean.
+    assert!((value / 722.0 - 1.0).abs() < 0.02, "{kr}");
 }

@@ -1,6 +1,7 @@
 //! Doubts about an estimate, its prediction, and what it leaves out of the described test.
 
 use super::Warning;
+use super::measurement::frequency_words;
 use crate::results::{
     BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult, exceeds_noise,
 };
@@ -13,6 +14,9 @@ use tapjoint_identify::consistent::{
 };
 use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
 use tapjoint_numerics::stats::times;
+
+/// A mode that moves by more than this share (1) is reported: what drift and sensors usually do is less.
+const MOVED: f64 = 0.015;
 
 impl Warning {
     /// A doubt about the pair regression alone.
@@ -29,6 +33,20 @@ impl Warning {
             of_pairs,
             ..Warning::new("neglected", sentence)
         }
+    }
+
+    /// A mode whose frequencies in the recordings are far apart.
+    pub(crate) fn moved_mode(mode: &ModeResult) -> Option<Self> {
+        let number = mode.mode?;
+        let low = mode.repeats.values().copied().reduce(f64::min)?;
+        let high = mode.repeats.values().copied().reduce(f64::max)?;
+        let text = format!(
+            "mode {number} lies at {} to {} Hz in the recordings, and is taken for one mode that moved; compare the shapes, \
+             or analyse the recordings one by one, if these may be two modes",
+            frequency_words(low),
+            frequency_words(high)
+        );
+        (high - low > MOVED * high).then(|| Warning::new("moved-mode", text))
     }
 
     /// The estimated joint has no prediction.

@@ -300,7 +300,7 @@ const MOST_PEAKS: usize = 5;
 const ABOUT_PEAK: f64 = 0.1;
 
 /// Returns a frequency in words: "27.13", "544.2", "1032".
-fn frequency_words(frequency: f64) -> String {
+pub(super) fn frequency_words(frequency: f64) -> String {
     let decimals = match frequency {
         f if f < 100.0 => 2,
         f if f < 1000.0 => 1,

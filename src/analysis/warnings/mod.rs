@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 72] = [
+pub const WARNING_CODES: [(&str, &str); 73] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -159,6 +159,7 @@ pub const WARNING_CODES: [(&str, &str); 72] = [
         "ambiguous-pairing",
         "another numbering of the modes is nearly as probable",
     ),
+    ("moved-mode", "a mode is far apart in the recordings"),
     (
         "doubtful-scale",
         "by the model the scale of a sensor or of the hammer cannot be right",

@@ -1,6 +1,6 @@
 //! The whole estimate: the fit, its uncertainty, its test, and what it cannot tell.
 
-use super::estimator::ConsistentEstimator;
+use super::estimator::{ConsistentEstimator, PointFit};
 use super::model::{Parameter, Point, beam_at, log_nondimensional};
 use super::problem::{
     Covariance, Evaluation, LOG_STIFFNESS, MISFIT, Minimum, NOTHING_KNOWN, Problem, along, dot,
@@ -22,8 +22,8 @@ struct Finished<'a> {
     directions: Vec<Point>,
     covariance: Covariance,
     goodness: Goodness,
-    /// Estimates from the frequencies of each set-up alone.
-    set_ups: Vec<Point>,
+    /// Fits of each set-up alone.
+    set_ups: &'a [PointFit],
 }
 
 impl ConsistentEstimator {
@@ -35,14 +35,15 @@ impl ConsistentEstimator {
         self.estimate_with_set_ups(&[])
     }
 
-    /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are the frequencies (Hz) of all modes
-    /// in each of them. Each is fitted alone. The joints' scatter about the estimate enters its intervals, by Student's t.
+    /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are fits of each of them alone, with the
+    /// same parameters; the modes of this estimator have their mean frequencies. Intervals hold the joint of a further
+    /// set-up, by Student's t.
     ///
     /// # Errors
     /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
     pub fn estimate_with_set_ups(
         &self,
-        set_ups: &[Vec<f64>],
+        set_ups: &[PointFit],
     ) -> Result<ConsistentEstimate, IdentifyError> {
         let frequencies = self.frequencies();
         let (renewed, minima) = self.solve(&frequencies);
@@ -54,10 +55,7 @@ impl ConsistentEstimator {
             estimator: self,
             covariance: Covariance::new(&best.state.jacobian, &directions),
             goodness: self.goodness(&problem, &best, directions.len()),
-            set_ups: set_ups
-                .iter()
-                .map(|own| self.fit_frequencies(own).point)
-                .collect(),
+            set_ups,
             problem,
             best,
             directions,
@@ -119,20 +117,40 @@ impl Finished<'_> {
         }
     }
 
-    /// Covariance of two coordinates by their scatter between the set-ups about the estimate. Its root is the standard
-    /// deviation of the normal distribution with the same 95 % interval as Student's t. 0 without set-ups.
+    /// Covariance of two coordinates between a further set-up and the estimate, by the scatter of n set-ups: their variance
+    /// times 1 + 1/n. Its root is the standard deviation of the normal distribution with the same 95 % interval as
+    /// Student's t with n - 1 degrees of freedom. 0 without set-ups.
     fn scatter(&self, first: &Point, second: &Point) -> f64 {
-        let freedom = self.set_ups.len().saturating_sub(1) as f64;
-        if freedom == 0.0 {
+        let count = self.set_ups.len() as f64;
+        let freedom = count - 1.0;
+        if freedom < 1.0 {
             return 0.0;
         }
-        let point = &self.best.state.point;
-        let mut sum = 0.0;
-        for set_up in &self.set_ups {
-            sum += (value_along(first, set_up) - value_along(first, point))
-                * (value_along(second, set_up) - value_along(second, point));
+        let set_ups = self.set_ups.iter();
+        let sum: f64 = set_ups
+            .map(|set_up| self.deviation(first, set_up) * self.deviation(second, set_up))
+            .sum();
+        let as_normal = student::quantile(0.05, freedom) / NORMAL_95;
+        sum / freedom * (1.0 + 1.0 / count) * as_normal.powi(2)
+    }
+
+    /// How far a coordinate of a set-up is from the estimate; 0 where the set-up's own uncertainty explains it. A stiffness
+    /// that its frequencies hardly feel, as near a rigid joint, may lie anywhere.
+    fn deviation(&self, gradient: &Point, set_up: &PointFit) -> f64 {
+        let moved =
+            value_along(gradient, &set_up.point) - value_along(gradient, &self.best.state.point);
+        let mut variance = 0.0;
+        for (parameter, std) in self.estimator.settings.fit.iter().zip(&set_up.stds) {
+            let part = gradient[parameter.index()];
+            if part != 0.0 && self.measured() {
+                variance += (part * std.unwrap_or(f64::INFINITY)).powi(2);
+            }
         }
-        sum / freedom * (student::quantile(0.05, freedom) / NORMAL_95).powi(2)
+        if moved * moved > 4.0 * variance {
+            moved
+        } else {
+            0.0
+        }
     }
 
     fn quantities(&self) -> Vec<EstimatedQuantity> {
@@ -219,13 +237,9 @@ impl Finished<'_> {
         // d ln tanh z/dz = (1 - c^2)/c.
         let c = coupling.value.unwrap_or(0.0);
         gradient[Parameter::Coupling.index()] = -(1.0 - c * c) / c;
-        let unit = if c == 0.0 {
-            None
-        } else {
-            let scatter = self.scatter(&gradient, &gradient).sqrt();
-            let own = self.covariance.std(&gradient);
-            own.map(|own| own.hypot(scatter))
-        };
+        let own = self.covariance.std(&gradient).filter(|_| c != 0.0);
+        let scatter = self.scatter(&gradient, &gradient).sqrt();
+        let unit = own.map(|own| own.hypot(scatter));
         let one_sign = coupling
             .low
             .zip(coupling.high)
@@ -239,7 +253,9 @@ impl Finished<'_> {
             quantity,
             value,
             std: std.filter(|_| self.measured()),
-            std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
+            std_scaled: value
+                .zip(own.zip(self.scale()))
+                .map(|(value, (own, scale))| value.abs() * (own * scale).hypot(scatter)),
             low,
             high,
             scaled: None,

@@ -207,7 +207,7 @@ pub struct ConsistentEstimate {
     pub modes: Vec<FittedMode>,
     /// Other minima, the deepest first.
     pub other_minima: Vec<OtherMinimum>,
-    /// Number of set-ups whose joints scatter beyond noise. Standard deviations and intervals hold that scatter. 0 without.
+    /// Number of set-ups that differ beyond noise. Standard deviations and intervals are for a further one. 0 without.
     pub set_ups: usize,
     /// Reason for which the search ended.
     pub stop: StopReason,

@@ -1,6 +1,7 @@
 //! Sizes of measured modal constants against those of the model: whether the scales of hammer and sensors can be right.
 
 use super::MeasuredPeak;
+use std::collections::BTreeMap;
 use tapjoint_beam::ModeShape;
 use tapjoint_numerics::stats::median;
 
@@ -28,28 +29,36 @@ pub(super) fn sizes_at(
     shapes: &[ModeShape],
     pairs: &[(usize, usize)],
 ) -> Vec<SizeAt> {
-    // Place of the sensor, measured and predicted size of one mode.
-    let mut seen: Vec<(f64, f64, f64)> = Vec::new();
+    let mut seen: Vec<Seen> = Vec::new();
     for &(peak, mode) in pairs {
         let Some(shape) = shapes.get(mode - 1) else {
             continue;
         };
         for at in &peaks[peak].shape {
             if let Some(tap) = at.tap.filter(|_| at.value.abs() > 3.0 * at.std) {
-                let model = shape.displacement(at.sensor) * shape.displacement(tap);
-                seen.push((at.sensor, at.value.abs(), model.abs()));
+                let predicted = (shape.displacement(at.sensor) * shape.displacement(tap)).abs();
+                seen.push(Seen {
+                    sensor: at.sensor,
+                    mode,
+                    predicted,
+                    log: (at.value.abs() / predicted).ln(),
+                });
             }
         }
     }
-    let largest = seen.iter().map(|one| one.2).fold(0.0, f64::max);
-    seen.retain(|one| one.2 > AWAY_FROM_NODES * largest);
-    let mut sensors: Vec<f64> = seen.iter().map(|one| one.0).collect();
+    let largest = seen.iter().map(|one| one.predicted).fold(0.0, f64::max);
+    seen.retain(|one| one.predicted > AWAY_FROM_NODES * largest);
+    let mut sensors: Vec<f64> = seen.iter().map(|one| one.sensor).collect();
     sensors.sort_by(f64::total_cmp);
     sensors.dedup();
     let mut sizes = Vec::with_capacity(sensors.len());
     for sensor in sensors {
-        let own = seen.iter().filter(|one| one.0 == sensor);
-        let mut logs: Vec<f64> = own.map(|one| (one.1 / one.2).ln()).collect();
+        // One value for each mode, whatever the number of taps that saw it.
+        let mut of_modes: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for one in seen.iter().filter(|one| one.sensor == sensor) {
+            of_modes.entry(one.mode).or_default().push(one.log);
+        }
+        let mut logs: Vec<f64> = of_modes.values_mut().map(|own| median(own)).collect();
         if logs.len() >= LEAST_MODES {
             let middle = median(&mut logs);
             let mut apart: Vec<f64> = logs.iter().map(|log| (log - middle).abs()).collect();
@@ -61,4 +70,16 @@ pub(super) fn sizes_at(
         }
     }
     sizes
+}
+
+/// A modal constant beside that of the model.
+struct Seen {
+    /// Place of the sensor (m).
+    sensor: f64,
+    /// Number of the mode.
+    mode: usize,
+    /// Size of the model's (1/kg).
+    predicted: f64,
+    /// Logarithm of measured over predicted size.
+    log: f64,
 }

@@ -23,7 +23,7 @@ pub struct EstimateSection {
     pub method: EstimateMethod,
     /// Modes that entered.
     pub modes_used: Vec<usize>,
-    /// Recordings between which the joint differs beyond noise: standard deviations and intervals hold this scatter.
+    /// Set-ups that differ beyond noise: the estimate is that of their mean, intervals hold a further one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub set_ups: Option<usize>,
     /// Why the estimate is doubtful, if it is.

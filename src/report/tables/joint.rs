@@ -340,11 +340,11 @@ fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
     Some(100.0 * (value - base) / base)
 }
 
-/// Says that std and limits hold the scatter of the joint between recordings, after a blank; `None` where they do not.
+/// Says that std and limits hold the scatter between set-ups, after a blank; `None` where they do not.
 pub fn set_up_words(estimate: &EstimateSection) -> Option<String> {
     let count = estimate.set_ups?;
     Some(format!(
-        " The joint differs between {count} recordings. Std and limits hold that scatter."
+        " {count} set-ups differ beyond noise. Value: of their mean frequencies. Std and limits: for a further set-up."
     ))
 }
 
@@ -444,6 +444,10 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
         note.push_str(
             " The consistent estimate draws the beam's properties that have a tolerance as well.",
         );
+    }
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    if estimate.is_some_and(|estimate| estimate.set_ups.is_some()) {
+        note.push_str(" The scatter between set-ups is left out.");
     }
     let caption = "Random errors of the frequencies (Monte Carlo)";
     Some(Table::of(caption, rows, note).without_empty_columns())

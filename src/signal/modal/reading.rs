@@ -563,6 +563,8 @@ pub fn interpolate_parabola(lines: &Lines, level_db: &[f64], peak: usize) -> Opt
 pub struct BandReadings {
     /// Lower and upper end of the band (Hz).
     pub band: (f64, f64),
+    /// Place of the taps (m), where it is known.
+    pub tap: Option<f64>,
     /// The resonances.
     pub readings: Vec<ModeReading>,
 }
@@ -613,14 +615,14 @@ impl Resonance {
 
 /// Merges the readings of several recordings, ascending in frequency.
 ///
-/// Two readings are one resonance in either of two cases; readings of one recording are never merged.
+/// Two readings are one resonance in one of three cases; readings of one recording are never merged.
 ///
 /// 1. They differ by less than their half lines together plus 0.3 %. As a rule re-mounting a sensor, or a joint's
 ///    drift, moves a frequency by that much.
 /// 2. They differ by up to 1.5 %, as after a joint's drift of 3 % where the mode lives in the joint. Each
 ///    recording's band must then reach to the other's reading, and no recording may show both.
-/// 3. They differ by up to 5 % in the same way, and no other resonance lies that near to either. Repeats after a clamp was
-///    opened and closed scatter by so much in the lowest mode.
+/// 3. They differ by up to 5 % in the same way, at one place of the taps, and no other resonance lies that near to either.
+///    Repeats after a clamp was opened and closed scatter by so much in the lowest mode. Taps elsewhere may miss a mode.
 ///
 /// A mode stays before a peak that is none, and a fit before any other reading. Of two fits the one with the
 /// smaller standard deviation stays. Of two others it is the one with the smaller half line, and among equals the
@@ -689,7 +691,7 @@ fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<
             let nearer = distance < least || distance <= least && nearest.is_none();
             let may_be_one = nearer && resonances && missed && !a.is_shown_with(b);
             // Asked last: it compares with all others.
-            if may_be_one && (distance <= DRIFTED || are_alone(first, second, merged)) {
+            if may_be_one && (distance <= DRIFTED || are_alone(first, second, merged, recordings)) {
                 (nearest, least) = (Some((first, second)), distance);
             }
         }
@@ -697,9 +699,20 @@ fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<
     nearest
 }
 
-/// Returns true where the recordings of two resonances show no third one within [`DRIFTED_ALONE`] of either.
-fn are_alone(first: usize, second: usize, merged: &[Resonance]) -> bool {
+/// Returns true where the recordings of two resonances have one place of the taps, and show no third resonance within
+/// [`DRIFTED_ALONE`] of either.
+fn are_alone(
+    first: usize,
+    second: usize,
+    merged: &[Resonance],
+    recordings: &[BandReadings],
+) -> bool {
     let (a, b) = (&merged[first], &merged[second]);
+    let tap = recordings[a.best.recording].tap;
+    let mut shown_by = a.shown_by.iter().chain(&b.shown_by);
+    if shown_by.any(|&recording| recordings[recording].tap != tap) {
+        return false;
+    }
     let mut thirds = merged.iter().enumerate();
     !thirds.any(|(index, third)| {
         let near = [a, b].iter().any(|one| {

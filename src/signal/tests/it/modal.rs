@@ -247,7 +247,11 @@ fn reading(frequency: f64, half_line: f64) -> ModeReading {
 
 /// Readings of one recording in a band (Hz).
 fn within(band: (f64, f64), readings: Vec<ModeReading>) -> BandReadings {
-    BandReadings { band, readings }
+    BandReadings {
+        band,
+        tap: None,
+        readings,
+    }
 }
 
 #[test]
@@ -280,6 +284,19 @@ fn limit_a_mode_that_drifted_is_one_and_two_modes_are_two() {
     // Three repeats of a clamp that was opened and closed.
     let repeats = [15.15, 14.71, 14.58].map(|low| at(&[low, 97.0]));
     assert_eq!(merge_modes(&repeats).len(), 2);
+    // Taps elsewhere may miss one of two modes.
+    let tapped = |tap, low| BandReadings {
+        tap: Some(tap),
+        ..at(&[low, 97.0])
+    };
+    assert_eq!(
+        merge_modes(&[tapped(0.1, 15.15), tapped(0.1, 14.6)]).len(),
+        2
+    );
+    assert_eq!(
+        merge_modes(&[tapped(0.1, 15.15), tapped(0.2, 14.6)]).len(),
+        3
+    );
     // A third peak beside them leaves open which is which.
     assert_eq!(merge_modes(&[at(&[548.3, 530.0]), at(&[538.3])]).len(), 3);
     // On either side of the seam of two bands, where no recording could show both.

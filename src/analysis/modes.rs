@@ -148,7 +148,7 @@ pub fn modes_of_recordings(
         }
         mode.between = between(&frequencies);
     }
-    warnings.extend(modes.iter().filter_map(Warning::moved_mode));
+    warnings.extend(Warning::moved_modes(&modes));
     (modes, warnings)
 }
 

@@ -35,18 +35,27 @@ impl Warning {
         }
     }
 
-    /// A mode whose frequencies in the recordings are far apart.
-    pub(crate) fn moved_mode(mode: &ModeResult) -> Option<Self> {
-        let number = mode.mode?;
-        let low = mode.repeats.values().copied().reduce(f64::min)?;
-        let high = mode.repeats.values().copied().reduce(f64::max)?;
+    /// Modes whose frequencies in the recordings are far apart.
+    pub(crate) fn moved_modes(modes: &[ModeResult]) -> Option<Self> {
+        let mut moved = Vec::new();
+        for mode in modes {
+            let (low, high) = mode
+                .repeats
+                .values()
+                .fold((f64::INFINITY, 0.0), |ends, own| {
+                    (own.min(ends.0), own.max(ends.1))
+                });
+            if let Some(number) = mode.mode.filter(|_| high - low > MOVED * high) {
+                let (low, high) = (frequency_words(low), frequency_words(high));
+                moved.push(format!("mode {number} ({low} to {high} Hz)"));
+            }
+        }
         let text = format!(
-            "mode {number} lies at {} to {} Hz in the recordings, and is taken for one mode that moved; compare the shapes, \
-             or analyse the recordings one by one, if these may be two modes",
-            frequency_words(low),
-            frequency_words(high)
+            "frequencies differ between the recordings, and are taken for one mode each: {}; where these may be two modes, \
+             compare the shapes, or analyse the recordings one by one",
+            moved.join(", ")
         );
-        (high - low > MOVED * high).then(|| Warning::new("moved-mode", text))
+        (!moved.is_empty()).then(|| Warning::new("moved-mode", text))
     }
 
     /// The estimated joint has no prediction.

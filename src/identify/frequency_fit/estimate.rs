@@ -14,6 +14,10 @@ use crate::IdentifyError;
 use nalgebra::{DMatrix, SVD};
 use tapjoint_numerics::stats::{NORMAL_95, root_mean_square, student};
 
+/// Half of a 95 % interval (1, of a logarithm) beyond which the scatter of set-ups leaves a quantity unknown: a factor of
+/// 1000. Near a rigid joint the set-ups' stiffnesses may be decades apart.
+const NOT_KNOWN: f64 = 6.9;
+
 /// A finished fit with what its report needs.
 struct Finished<'a> {
     estimator: &'a ConsistentEstimator,
@@ -175,8 +179,9 @@ impl Finished<'_> {
         };
         let gradient = quantity.gradient();
         let now = value_along(&gradient, point);
-        let unit = self.covariance.std(&gradient);
         let scatter = self.scatter(&gradient, &gradient).sqrt();
+        let is_known = NORMAL_95 * scatter < NOT_KNOWN;
+        let unit = self.covariance.std(&gradient).filter(|_| is_known);
         let scale = self.scale();
         // The interval with the misfit for uncertainty is that of the coordinate to first order. Student's
         // distribution accounts for the few frequencies, which give the misfit only roughly.
@@ -191,7 +196,8 @@ impl Finished<'_> {
         let [low, high] = [-1.0, 1.0].map(|sign| {
             let profile = self
                 .measured()
-                .then(|| Profile::new(self, quantity, sign))?;
+                .then(|| Profile::new(self, quantity, sign))
+                .filter(|_| is_known)?;
             let half = (profile.end()? - now).hypot(NORMAL_95 * scatter);
             Some(self.quantity_at(quantity, now + sign * half))
         });

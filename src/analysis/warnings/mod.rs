@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 72] = [
+pub const WARNING_CODES: [(&str, &str); 73] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -33,6 +33,10 @@ pub const WARNING_CODES: [(&str, &str); 72] = [
         "two channels of a UFF file have the same place and quantity",
     ),
     ("dataset-left-out", "a dataset of a UFF file is left out"),
+    (
+        "damping-left-out",
+        "the damping ratios of a file of modes are left out",
+    ),
     (
         "rate-rounded",
         "the steps of a time column scatter around the sample rate",

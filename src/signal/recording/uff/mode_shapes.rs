@@ -463,8 +463,7 @@ impl ModeReader<'_> {
         }
         .map_err(|problem| self.error(dataset, reals.place, &problem))?;
         self.count(dataset, reals.place, VALUES_OF_MODE)?;
-        let [load_case, number] =
-            [2, 3].map(|field| integer_field(integers, field).unwrap_or(0));
+        let [load_case, number] = [2, 3].map(|field| integer_field(integers, field).unwrap_or(0));
         let mut read = ReadMode {
             load_case,
             number,

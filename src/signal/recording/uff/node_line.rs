@@ -273,8 +273,9 @@ fn direction_words(direction: Vector3<f64>) -> String {
     if direction[nearest].abs() >= NEAR_AXIS.to_radians().cos() {
         return ["X", "Y", "Z"][nearest].to_owned();
     }
-    let [x, y, z] = [direction.x, direction.y, direction.z];
-    format!("({x:.2}, {y:.2}, {z:.2})")
+    // Adding 0 removes the sign of a component that is rounded to 0.
+    let [x, y, z] = [0, 1, 2].map(|axis| (10.0 * direction[axis]).round() / 10.0 + 0.0);
+    format!("({x:.1}, {y:.1}, {z:.1})")
 }
 
 /// The node farthest from a place.

@@ -550,7 +550,7 @@ fn recover_the_direction_of_a_bar_at_any_angle() {
     for (angle, words) in [
         (0.0_f64, "Z"),
         (8.0, "Z"),
-        (45.0, "(0.00, 0.71, 0.71)"),
+        (45.0, "(0.0, 0.7, 0.7)"),
         (85.0, "Y"),
     ] {
         let (sin, cos) = angle.to_radians().sin_cos();

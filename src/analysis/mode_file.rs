@@ -11,13 +11,13 @@ use tapjoint_signal::recording::{ModeShapes, NoLine, NodeLine, read_mode_shapes}
 /// Standard uncertainty of a shape over its largest value (1). Files state none; moved sensors and taps repeat within a
 /// few per cent.
 const SHAPE_STD: f64 = 0.03;
-/// Most nodes whose shapes are compared, evenly spread over the beam: more tell no more of a beam's modes, and the time
-/// grows with their square.
+/// Most nodes whose shapes are compared, evenly spread over the beam. More nodes add no information. The time grows with
+/// their square.
 const MOST_NODES: usize = 24;
-/// Nodes may lie beyond the beam's end by this share of its length (1), which is what tape measures leave.
+/// Nodes may lie beyond the beam's end by this share of its length (1). This allows for the error of a tape measure.
 const BEYOND_END: f64 = 0.01;
-/// The ends of a line of nodes are taken for exchanged where the motion at the joint is more than so many times that at
-/// the free end (1). On a soft joint both ends may move alike.
+/// Ratio of motion at the joint to motion at the free end that suggests exchanged ends. On a soft joint both ends may move
+/// alike.
 const OTHER_END: f64 = 3.0;
 
 /// Modes of a file.
@@ -78,14 +78,15 @@ pub(super) fn read_modes(
     ];
     for (key, length) in lists {
         if let Some(length) = length.filter(|length| *length != count) {
-            let plural = if length == 1 {
-                "value stands"
-            } else {
-                "values stand"
-            };
+            let plural = if length == 1 { "value" } else { "values" };
             let problem = format!(
-                "{length} {plural} here; allowed: {count}, one for each mode of {name}, lowest first; make both equally many"
+                "{length} {plural} for {count} modes of {name}; give one for each mode, lowest first"
             );
+            // The command line replaces the key.
+            if key == "half_line" && !file.key_lines.contains_key(key) {
+                let problem = format!("--half-line has {problem}");
+                return Err(PipelineError::Description(problem));
+            }
             let error = file.error(test_file, key, problem);
             return Err(PipelineError::Description(error.to_string()));
         }
@@ -141,7 +142,7 @@ fn place_shapes(
     modes.other_direction = line.other_direction.clone();
     let others = line.other_direction.iter();
     let others: Vec<f64> = others.map(|&index| read.modes[index].frequency).collect();
-    let doubt = Warning::other_direction(&name, &others, line.direction);
+    let doubt = Warning::other_direction(&name, &others, &line.direction);
     modes.warnings.extend(doubt);
     if test.joint.kind == Assembly::Free {
         return Ok(());
@@ -173,7 +174,7 @@ fn place_shapes(
     }
     if let Some(free) = moves_at_joint(&line).filter(|_| test.joint.kind == Assembly::Cantilever) {
         let reason = format!(
-            "node {}, which first_node places nearest to the joint, moves more than {OTHER_END} times as far as node {free} at the other end, in the lowest mode with a shape; is node {free} the one nearest to the joint?",
+            "in the lowest mode, node {} at the joint moves over {OTHER_END} times as far as node {free}; are the ends exchanged?",
             first.number
         );
         modes

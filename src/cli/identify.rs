@@ -68,6 +68,9 @@ impl FrequencyArguments {
                 file.name
             );
         };
+        if let Some(modes) = &mut measured.file {
+            modes.key_lines.remove("half_line");
+        }
         let count = measured.frequencies.len();
         measured.half_line = match half_lines.as_slice() {
             // The number of modes of a file is not known before it is read.

@@ -328,6 +328,8 @@ pub struct ModeFile {
     pub path: PathBuf,
     /// Line of the description that names the file.
     pub line: usize,
+    /// Lines of the keys of `[measured]` that the file is compared with.
+    pub key_lines: BTreeMap<&'static str, usize>,
     /// The node that begins the line of nodes, where it is stated.
     pub first_node: Option<FirstNode>,
 }

@@ -280,9 +280,10 @@ impl RecordingDescription {
 
 impl ModeFile {
     /// Returns the error of a key of `[measured]` that does not fit the file, or of a file that cannot be opened. It
-    /// points to the line of the description that names the file.
+    /// points to the line of the key, or to that which names the file.
     pub fn error(&self, description: &str, key: &str, problem: String) -> DescriptionError {
-        Source::new(description, "").error(self.line, format!("measured.{key}"), problem)
+        let line = self.key_lines.get(key).copied().unwrap_or(self.line);
+        Source::new(description, "").error(line, format!("measured.{key}"), problem)
     }
 }
 

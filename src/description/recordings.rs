@@ -708,7 +708,12 @@ fn read_mode_file(table: &Table<'_>, length: f64) -> Result<Option<ModeFile>, De
             position: position.within(Dimension::Length, &along(length))?,
         })
     })?;
+    let compared = ["modes", "half_line", "std", "first_node"];
+    let key_lines = compared
+        .into_iter()
+        .filter_map(|key| Some((key, table.get(key)?.line)));
     Ok(Some(ModeFile {
+        key_lines: key_lines.collect(),
         path: PathBuf::from(entry.text("the name of a universal file such as \"modes.unv\"")?),
         line: entry.line,
         first_node,

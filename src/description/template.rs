@@ -444,9 +444,9 @@ pub fn template(kind: Assembly) -> String {
             FIT_FREE,
         ),
     };
-    let head = HEAD
+    [HEAD, joint, INSTRUMENTS, fit]
+        .concat()
         .replace("@NAME@", name)
         .replace("@ORIGIN@", origin)
-        .replace("@BEAM@", beam);
-    [head.as_str(), joint, INSTRUMENTS, fit].concat()
+        .replace("@BEAM@", beam)
 }

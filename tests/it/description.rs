@@ -320,6 +320,12 @@ fn regress_a_mass_that_every_recording_places_has_a_place() {
 fn regress_templates_parse_without_warnings() {
     for kind in [Assembly::Cantilever, Assembly::Lap, Assembly::Free] {
         let test = parse(&template(kind));
+        let text = template(kind);
+        let placeholder = text
+            .split('@')
+            .skip(1)
+            .find(|word| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_uppercase()));
+        assert_eq!(placeholder, None, "{kind:?}");
         assert_eq!(test.joint.kind, kind);
         assert!(test.warnings.is_empty(), "{kind:?}: {:?}", test.warnings);
         assert!(

@@ -174,7 +174,9 @@ fn recover_the_mode_of_two_peaks_by_its_shape() {
         let analysis = run(&file, "cantilever", &mirrored).unwrap();
         let note = analysis.warnings[0].to_string();
         assert!(
-            note.contains("is node 1 the one nearest to the joint?"),
+            note.contains(
+                "node 6 at the joint moves over 3 times as far as node 1; are the ends exchanged?"
+            ),
             "{note}"
         );
         assert!(codes(&analysis).contains(&"ambiguous-pairing"));
@@ -242,16 +244,16 @@ fn regress_keys_that_do_not_fit_the_file_are_answered_with_its_line() {
     let file = file_of(&[1, 2, 3]);
     for (more, wanted) in [
         (
-            "modes = [1, 2]",
-            "test.toml:11: `measured.modes`: 2 values stand here; allowed: 3, one for each mode of modes.unv, lowest first; make both equally many",
+            "scatter = 0.001\nmodes = [1, 2]",
+            "test.toml:13: `measured.modes`: 2 values for 3 modes of modes.unv; give one for each mode, lowest first",
         ),
         (
             "std = [0.1, 0.2, 0.3, 0.4]",
-            "test.toml:11: `measured.std`: 4 values stand here; allowed: 3, one for each mode of modes.unv, lowest first; make both equally many",
+            "test.toml:12: `measured.std`: 4 values for 3 modes of modes.unv; give one for each mode, lowest first",
         ),
         (
             "first_node = { number = 3, position = 0.1 }",
-            "test.toml:11: `measured.first_node`: node 3 is no end of the line of nodes; allowed: 1 or 6; name the node that is nearest to the joint, or to the left end",
+            "test.toml:12: `measured.first_node`: node 3 is not at an end of the line of nodes; allowed: 1 or 6; name the node that is nearest to the joint, or to the left end",
         ),
     ] {
         let error = run(&file, "cantilever", more).unwrap_err();

@@ -249,7 +249,7 @@ impl Warning {
         let words = frequencies.iter().map(|f| frequency_words(*f));
         let list: Vec<String> = words.collect();
         let text = format!(
-            "the modes at {} Hz move mostly in another direction than {most}, in which most modes move; they get no number of a bending mode; state modes = [...] in [measured] where they should have one",
+            "the modes at {} Hz do not move mainly along {most}; they are not numbered; to number them, state modes = [...] in [measured]",
             list.join(", ")
         );
         (!list.is_empty()).then(|| Warning::about(file, "other-direction", text))

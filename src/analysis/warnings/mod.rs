@@ -34,6 +34,10 @@ pub const WARNING_CODES: [(&str, &str); 73] = [
     ),
     ("dataset-left-out", "a dataset of a UFF file is left out"),
     (
+        "damping-left-out",
+        "the damping ratios of a file of modes are left out",
+    ),
+    (
         "rate-rounded",
         "the steps of a time column scatter around the sample rate",
     ),

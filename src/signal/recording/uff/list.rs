@@ -339,6 +339,14 @@ impl Scanner {
 
     /// Goes on at byte `place`.
     pub(super) fn jump(&mut self, place: u64) -> Result<(), RecordingError> {
+        let in_buffer = place
+            .checked_sub(self.base)
+            .filter(|at| *at <= self.buffer.len() as u64);
+        if let Some(at) = in_buffer {
+            self.buffer.drain(..at as usize);
+            (self.base, self.at) = (place, 0);
+            return Ok(());
+        }
         self.buffer.clear();
         self.at = 0;
         let done = self.file.seek(SeekFrom::Start(place));

@@ -8,6 +8,7 @@
 //! Important conventions:
 //! - Eigenvalues are in rad/s. The natural frequency of s is |s|/2 pi, its damping ratio -Re(s)/|s|.
 //! - Datasets of the same load case, mode number and frequency are one mode: programs write one for each quantity or part.
+//!   Its shape is of the first quantity.
 //! - Places are in metres by the file's unit system (dataset 164), and without one as they stand.
 
 use std::collections::BTreeMap;
@@ -26,12 +27,15 @@ use crate::recording::{FileType, recognise, refuse_pipe};
 const DATA_AT_NODES: u32 = 55;
 /// Header records of a dataset 55.
 const HEADER_LINES: usize = 8;
-/// Most nodes of a file, and most values at nodes of all its modes together. Measured grids have hundreds of nodes; the
-/// limit keeps a mesh of finite elements out of memory.
+/// Largest number of nodes and nodal values in one file. Measured grids have hundreds of nodes; the limit keeps a mesh of
+/// finite elements out of memory.
 const MOST_VALUES: usize = 1_000_000;
-/// A mode below this share of the highest frequency moves as a rigid body; what is not 0 of it is rounding.
-const RIGID: f64 = 1e-6;
-/// Frequencies from here on (Hz) are damage and not physics.
+/// Values as which a mode counts against that limit: its header takes about as long to read as 100 values.
+const VALUES_OF_MODE: usize = 100;
+/// Below this share of the highest frequency a mode is a rigid-body mode. Solvers in single precision leave it some 1e-5
+/// of the highest instead of 0; the lowest bending mode of a measured beam lies above 1e-3.
+const RIGID: f64 = 1e-4;
+/// Highest frequency that is accepted (Hz).
 const LARGEST_FREQUENCY: f64 = 1e9;
 
 /// Modes and nodes of a universal file.
@@ -43,6 +47,8 @@ pub struct ModeShapes {
     pub modes: Vec<NodalMode>,
     /// Nodes by their numbers.
     pub nodes: BTreeMap<i64, Node>,
+    /// True if the file defines coordinate systems (dataset 18 or 2420).
+    pub defines_systems: bool,
     /// Doubts about the file.
     pub warnings: Vec<RecordingWarning>,
 }
@@ -65,6 +71,8 @@ pub struct Node {
     pub place: [f64; 3],
     /// Number of the coordinate system in which they are stated.
     pub system: i64,
+    /// Number of the coordinate system in which the displacements are stated.
+    pub displacement_system: i64,
 }
 
 /// Reads the modes of a universal file and the places of its nodes.
@@ -87,75 +95,82 @@ pub fn read_mode_shapes(path: &Path) -> Result<ModeShapes, RecordingError> {
         values: 0,
     };
     let mut nodes = BTreeMap::new();
-    let mut found: BTreeMap<[u64; 3], NodalMode> = BTreeMap::new();
+    let (mut forward, mut conjugate) = (ModeSet::default(), ModeSet::default());
     let mut warnings = Vec::from_iter(file.cut_header_doubt());
-    let (mut still, mut conjugate) = (0, 0);
+    let mut still = 0;
     for dataset in &file.datasets {
         if dataset.place.cut && [15, DATA_AT_NODES, 2411].contains(&dataset.kind) {
             let message = format!(
-                "the file ends within dataset {} ({}), which is used as far as it goes; a copy was probably interrupted; export or copy it again",
-                dataset.number,
-                dataset.kind_name()
+                "the file ends within dataset {}; its complete nodes are used; export or copy the file again",
+                dataset.number
             );
             warnings.push(RecordingWarning::new("truncated", message));
         }
         match dataset.kind {
-            15 | 2411 => {
-                let last = match dataset.kind {
-                    15 => reader.nodes_in_one_line(dataset, &mut nodes)?,
-                    _ => reader.nodes_in_two_lines(dataset, &mut nodes)?,
-                };
-                // The last number of a file that was cut may have lost digits.
-                if let Some(last) = last.filter(|_| dataset.place.cut) {
-                    nodes.remove(&last);
-                }
-            }
+            15 => reader.nodes_in_one_line(dataset, &mut nodes)?,
+            2411 => reader.nodes_in_two_lines(dataset, &mut nodes)?,
             DATA_AT_NODES => {
                 let Some(read) = reader.mode(dataset)? else {
                     continue;
                 };
                 match read.turn {
                     Turn::Still => still += 1,
-                    Turn::Conjugate => conjugate += 1,
-                    Turn::Forward => {
-                        let mode = found.entry(read.key).or_insert(NodalMode {
-                            frequency: read.mode.frequency,
-                            damping: read.mode.damping,
-                            shape: BTreeMap::new(),
-                        });
-                        for (node, value) in read.mode.shape {
-                            mode.shape.entry(node).or_insert(value);
-                        }
-                    }
+                    Turn::Forward => forward.add(read),
+                    Turn::Conjugate => conjugate.add(read),
                 }
             }
             _ => {}
         }
     }
-    if found.is_empty() {
+    // Some programs write the conjugates alone.
+    let (found, conjugates) = match forward.datasets {
+        0 => (conjugate, 0),
+        _ => (forward, conjugate.datasets),
+    };
+    if found.datasets == 0 {
         let problem = format!(
             "holds no mode (dataset 55 of analysis type 2, 3 or 7 with a frequency above 0), only {}; {remedy}",
             file.contents()
         );
         return Err(RecordingError::new(&name, problem));
     }
-    let mut modes: Vec<NodalMode> = found.into_values().collect();
-    modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    let other_load_cases = found.other_load_cases;
+    let groups = found.groups.into_values();
+    let mut modes: Vec<NodalMode> = groups
+        .flat_map(|group| group.modes.into_values())
+        .map(|read| read.mode)
+        .collect();
     let highest = modes.last().map_or(0.0, |mode| mode.frequency);
     let before = modes.len();
     modes.retain(|mode| mode.frequency > RIGID * highest);
     still += before - modes.len();
-    if still > 0 {
-        let message = format!(
-            "modes without an oscillation are left out ({still} datasets): rigid bodies, or damped beyond oscillation"
-        );
-        warnings.push(RecordingWarning::new("dataset-left-out", message));
+    let left_out = [
+        (still, "rigid-body or overdamped modes"),
+        (
+            conjugates,
+            "eigenvalues with a negative imaginary part, the conjugates of the others",
+        ),
+        (
+            other_load_cases,
+            "modes with a frequency of an earlier load case",
+        ),
+    ];
+    for (count, reason) in left_out {
+        if count > 0 {
+            let message = format!("{count} datasets are left out: {reason}");
+            warnings.push(RecordingWarning::new("dataset-left-out", message));
+        }
     }
-    if conjugate > 0 {
+    let highest_damping = modes.iter().filter_map(|mode| mode.damping);
+    let highest_damping = highest_damping.fold(0.0, f64::max);
+    if highest_damping >= 1.0 {
+        for mode in &mut modes {
+            mode.damping = None;
+        }
         let message = format!(
-            "eigenvalues with a negative imaginary part are left out ({conjugate} datasets): they are the conjugates of the others"
+            "damping ratios are left out: one is {highest_damping}, and an oscillation has less than 1; they are probably in per cent; export them as ratios"
         );
-        warnings.push(RecordingWarning::new("dataset-left-out", message));
+        warnings.push(RecordingWarning::new("damping-left-out", message));
     }
     // File units are SI units times the factor.
     let factor = file.units.map_or(1.0, |units| units.length);
@@ -166,19 +181,74 @@ pub fn read_mode_shapes(path: &Path) -> Result<ModeShapes, RecordingError> {
         file: name,
         modes,
         nodes,
+        defines_systems: file
+            .datasets
+            .iter()
+            .any(|dataset| [18, 2420].contains(&dataset.kind)),
         warnings,
     })
 }
 
 /// A dataset 55 of a mode.
 struct ReadMode {
-    /// Load case, mode number, and bits of the frequency: equal for the datasets of one mode.
-    key: [u64; 3],
+    load_case: i64,
+    number: i64,
+    /// Quantity of the shape, as its record 6 states it.
+    quantity: i64,
     mode: NodalMode,
     turn: Turn,
 }
 
-/// Sense in which an eigenvalue turns.
+/// Modes of a file.
+#[derive(Default)]
+struct ModeSet {
+    /// By the bits of the frequency, which ascend with it.
+    groups: BTreeMap<u64, FrequencyGroup>,
+    /// Number of datasets added.
+    datasets: usize,
+    /// Number of datasets that are left out, because an earlier load case has the same frequency.
+    other_load_cases: usize,
+}
+
+/// Modes of one frequency.
+struct FrequencyGroup {
+    load_case: i64,
+    /// By the mode number.
+    modes: BTreeMap<i64, ReadMode>,
+}
+
+impl ModeSet {
+    /// Adds a dataset: a new mode, or a part of one.
+    fn add(&mut self, read: ReadMode) {
+        self.datasets += 1;
+        let group = self.groups.entry(read.mode.frequency.to_bits());
+        let group = group.or_insert_with(|| FrequencyGroup {
+            load_case: read.load_case,
+            modes: BTreeMap::new(),
+        });
+        if group.load_case != read.load_case {
+            self.other_load_cases += 1;
+            return;
+        }
+        let Some(first) = group.modes.get_mut(&read.number) else {
+            group.modes.insert(read.number, read);
+            return;
+        };
+        let mode = &mut first.mode;
+        mode.damping = mode.damping.or(read.mode.damping);
+        if mode.shape.is_empty() {
+            first.quantity = read.quantity;
+        }
+        // Displacements and accelerations have other units.
+        if first.quantity == read.quantity {
+            for (node, value) in read.mode.shape {
+                mode.shape.entry(node).or_insert(value);
+            }
+        }
+    }
+}
+
+/// Sign of the imaginary part of an eigenvalue.
 enum Turn {
     Forward,
     /// Not at all.
@@ -201,17 +271,25 @@ struct ModeReader<'a> {
 }
 
 impl ModeReader<'_> {
-    /// Returns the next line of a dataset that is not blank; `None` at its end.
+    /// Returns the next line of a dataset that is not blank; `None` at its end, and for a line that the end of a
+    /// truncated file may have cut.
     fn line(&mut self, dataset: &Dataset) -> Result<Option<Line>, RecordingError> {
         while self.scanner.position() < dataset.place.end {
             let place = self.scanner.position();
             match self.scanner.line()? {
                 Some(text) if text.trim_ascii().is_empty() => {}
+                // The last number of a truncated file may be incomplete.
+                Some(_) if self.is_at_cut(dataset) => return Ok(None),
                 Some(text) => return Ok(Some(Line { place, text })),
                 None => break,
             }
         }
         Ok(None)
+    }
+
+    /// Returns `true` behind the last line of a truncated file.
+    fn is_at_cut(&self, dataset: &Dataset) -> bool {
+        dataset.place.cut && self.scanner.position() >= dataset.place.end
     }
 
     /// Returns the error of a line.
@@ -256,47 +334,44 @@ impl ModeReader<'_> {
 
     /// Reads the number of a node, the first word of a line.
     fn node_number(&self, dataset: &Dataset, line: &Line) -> Result<i64, RecordingError> {
-        let record = Record::of(&line.text);
-        let number = record
-            .integer(0, 10)
-            .or_else(|| record.word(0)?.parse().ok());
-        number.ok_or_else(|| {
+        integer_field(line, 0).ok_or_else(|| {
             let value = shown(line.text.trim_ascii());
             let problem = format!("the node number \"{value}\"; allowed: a whole number");
             self.error(dataset, line.place, &problem)
         })
     }
 
-    /// Counts values at nodes against the limit.
-    fn count(&mut self, dataset: &Dataset, place: u64) -> Result<(), RecordingError> {
-        self.values += 1;
+    /// Counts so many values against the limit.
+    fn count(
+        &mut self,
+        dataset: &Dataset,
+        place: u64,
+        values: usize,
+    ) -> Result<(), RecordingError> {
+        self.values += values;
         if self.values <= MOST_VALUES {
             return Ok(());
         }
         let line = line_number(&self.file.path, place);
         let problem = format!(
-            "with dataset {} the file holds more than {MOST_VALUES} nodes and values at nodes; allowed: up to {MOST_VALUES}; export the measured points and modes alone",
+            "with dataset {} the file holds more than {MOST_VALUES} nodes and values at nodes, where a mode counts as {VALUES_OF_MODE}; allowed: up to {MOST_VALUES}; export the measured points and modes alone",
             dataset.number
         );
         Err(RecordingError::at_line(&self.file.name, line, problem))
     }
 
-    /// Reads nodes of dataset 15, Format(4I10,3E13.5). Returns the number of the last one.
+    /// Reads nodes of dataset 15, Format(4I10,3E13.5).
     fn nodes_in_one_line(
         &mut self,
         dataset: &Dataset,
         nodes: &mut BTreeMap<i64, Node>,
-    ) -> Result<Option<i64>, RecordingError> {
+    ) -> Result<(), RecordingError> {
         self.scanner.jump(dataset.place.start)?;
-        let mut last = None;
         while let Some(line) = self.line(dataset)? {
             let mut numbers = Vec::new();
             let widths = [10, 10, 10, 10, 13, 13, 13];
             self.numbers(dataset, &line, &widths, widths.len(), &mut numbers)?;
-            if numbers.len() < widths.len() && dataset.place.cut {
-                break;
-            }
-            let [_, system, _, _, x, y, z] = numbers[..] else {
+            let [_, system, displacement_system, _, x, y, z] = numbers[..] else {
                 let problem = format!(
                     "{} numbers for a node; allowed: 7, its number, three more whole numbers, X, Y and Z",
                     numbers.len()
@@ -304,44 +379,39 @@ impl ModeReader<'_> {
                 return Err(self.error(dataset, line.place, &problem));
             };
             let number = self.node_number(dataset, &line)?;
-            self.count(dataset, line.place)?;
+            self.count(dataset, line.place, 1)?;
             nodes.insert(
                 number,
                 Node {
                     place: [x, y, z],
                     system: system as i64,
+                    displacement_system: displacement_system as i64,
                 },
             );
-            last = Some(number);
         }
-        Ok(last)
+        Ok(())
     }
 
-    /// Reads nodes of dataset 2411, Format(4I10), then Format(1P3D25.16). Returns the number of the last one.
+    /// Reads nodes of dataset 2411, Format(4I10), then Format(1P3D25.16).
     fn nodes_in_two_lines(
         &mut self,
         dataset: &Dataset,
         nodes: &mut BTreeMap<i64, Node>,
-    ) -> Result<Option<i64>, RecordingError> {
+    ) -> Result<(), RecordingError> {
         self.scanner.jump(dataset.place.start)?;
-        let mut last = None;
         while let Some(line) = self.line(dataset)? {
             let number = self.node_number(dataset, &line)?;
-            let record = Record::of(&line.text);
-            let system = record
-                .integer(10, 10)
-                .or_else(|| record.word(1)?.parse().ok());
+            let [system, displacement_system] =
+                [1, 2].map(|field| integer_field(&line, field).unwrap_or(0));
             let mut place = Vec::new();
             let behind = match self.line(dataset)? {
                 Some(line) => {
                     self.numbers(dataset, &line, &[25; 3], 3, &mut place)?;
                     line.place
                 }
+                None if dataset.place.cut => break,
                 None => line.place,
             };
-            if place.len() < 3 && dataset.place.cut {
-                break;
-            }
             let [x, y, z] = place[..] else {
                 let problem = format!(
                     "{} coordinates for node {number}; allowed: 3, X, Y and Z, in the line behind its number",
@@ -349,17 +419,17 @@ impl ModeReader<'_> {
                 );
                 return Err(self.error(dataset, behind, &problem));
             };
-            self.count(dataset, line.place)?;
+            self.count(dataset, line.place, 1)?;
             nodes.insert(
                 number,
                 Node {
                     place: [x, y, z],
-                    system: system.unwrap_or(0),
+                    system,
+                    displacement_system,
                 },
             );
-            last = Some(number);
         }
-        Ok(last)
+        Ok(())
     }
 
     /// Reads a dataset 55; `None` where it holds no mode, or ends within its header with the file.
@@ -377,9 +447,7 @@ impl ModeReader<'_> {
         let [.., kind, integers, reals] = &header[..] else {
             return self.short_header(dataset);
         };
-        // The last number of a file that was cut may have lost digits.
-        let is_whole = !dataset.place.cut || self.scanner.position() < dataset.place.end;
-        if header.len() < HEADER_LINES || !is_whole {
+        if header.len() < HEADER_LINES || self.is_at_cut(dataset) {
             return self.short_header(dataset);
         }
         let layout = Layout::read(&Record::of(&kind.text))
@@ -394,15 +462,12 @@ impl ModeReader<'_> {
             Analysis::Eigenvalue | Analysis::Other => eigenvalue(&numbers),
         }
         .map_err(|problem| self.error(dataset, reals.place, &problem))?;
-        let record = Record::of(&integers.text);
-        let field = |number: usize| {
-            let value = record
-                .integer(10 * number, 10)
-                .or_else(|| record.word(number)?.parse().ok());
-            value.unwrap_or(0) as u64
-        };
+        self.count(dataset, reals.place, VALUES_OF_MODE)?;
+        let [load_case, number] = [2, 3].map(|field| integer_field(integers, field).unwrap_or(0));
         let mut read = ReadMode {
-            key: [field(2), field(3), frequency.to_bits()],
+            load_case,
+            number,
+            quantity: layout.quantity,
             mode: NodalMode {
                 frequency,
                 damping,
@@ -433,7 +498,6 @@ impl ModeReader<'_> {
     ) -> Result<(), RecordingError> {
         let count = layout.values * if layout.is_complex { 2 } else { 1 };
         let widths: &[usize] = if layout.is_double { &[20; 4] } else { &[13; 6] };
-        let mut last = None;
         while let Some(line) = self.line(dataset)? {
             let node = self.node_number(dataset, &line)?;
             let mut numbers = Vec::with_capacity(count);
@@ -454,22 +518,23 @@ impl ModeReader<'_> {
                 );
                 return Err(self.error(dataset, line.place, &problem));
             }
-            self.count(dataset, line.place)?;
+            self.count(dataset, line.place, 1)?;
             let part = |axis: usize| match layout.is_complex {
                 true => Complex64::new(numbers[2 * axis], numbers[2 * axis + 1]),
                 false => Complex64::new(numbers[axis], 0.0),
             };
             shape.insert(node, [part(0), part(1), part(2)]);
-            last = Some(node);
-        }
-        // The last number of a file that was cut may have lost digits.
-        if dataset.place.cut
-            && let Some(last) = last
-        {
-            shape.remove(&last);
         }
         Ok(())
     }
+}
+
+/// Returns a whole number (from 0) of a line: in columns of 10, or between blanks.
+fn integer_field(line: &Line, number: usize) -> Option<i64> {
+    let record = Record::of(&line.text);
+    record
+        .integer(10 * number, 10)
+        .or_else(|| record.word(number)?.parse().ok())
 }
 
 /// Kind of analysis by which data at nodes were computed or measured.
@@ -485,6 +550,8 @@ enum Analysis {
 /// Record 6 of a dataset 55, Format(6I10).
 struct Layout {
     analysis: Analysis,
+    /// Quantity of the values.
+    quantity: i64,
     /// True where the values are motion along X, Y and Z.
     moves: bool,
     is_complex: bool,
@@ -528,6 +595,7 @@ impl Layout {
         let moves = is_motion && [0, 2, 3].contains(&characteristic);
         let mut layout = Layout {
             analysis,
+            quantity,
             moves,
             is_complex: false,
             is_double: false,
@@ -570,11 +638,9 @@ fn normal_mode(reals: &[f64]) -> Result<(f64, Option<f64>, Turn), String> {
             "the frequency \"{value}\" in its record 8; allowed: 0 to {LARGEST_FREQUENCY:e} Hz"
         ));
     }
-    // At resonance a hysteretic damping ratio acts as half of it does if viscous.
+    // At resonance a loss factor equals twice the viscous damping ratio.
     let (viscous, hysteretic) = (field(2), 0.5 * field(3));
-    // From 1 on there is no oscillation: such a number is in per cent, or something else.
-    let mut stated = [viscous, hysteretic].into_iter();
-    let damping = stated.find(|ratio| *ratio > 0.0 && *ratio < 1.0);
+    let damping = [viscous, hysteretic].into_iter().find(|ratio| *ratio > 0.0);
     let turn = if frequency > 0.0 {
         Turn::Forward
     } else {
@@ -604,7 +670,8 @@ fn eigenvalue(reals: &[f64]) -> Result<(f64, Option<f64>, Turn), String> {
     };
     Ok((
         size / TAU,
-        Some(-real / size).filter(|ratio| *ratio > 0.0),
+        // Rounding may make it 1 just below critical damping.
+        Some(-real / size).filter(|ratio| *ratio > 0.0 && *ratio < 1.0),
         turn,
     ))
 }

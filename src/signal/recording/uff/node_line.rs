@@ -2,24 +2,26 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use num_complex::Complex64;
 
 use super::mode_shapes::{ModeShapes, NodalMode};
 
 /// Nodes lie on one straight line where none is farther from it than this share of its length (1).
 const STRAIGHT: f64 = 0.01;
-/// A mode moves across the line as the others do where at least this share of its motion squared has their direction (1):
-/// a sensor's cross axis and a bar that is turned by some degrees leave most of it.
+/// Smallest share of a mode's squared motion in the common direction (1). Motion of a sensor's cross axis is far less than
+/// the other half.
 const OWN_DIRECTION: f64 = 0.5;
+/// Largest angle between a direction and the axis that names it (degrees).
+const NEAR_AXIS: f64 = 10.0;
 
 /// Nodes on one straight line, and the shapes of the modes there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeLine {
     /// The nodes in their order along the line.
     pub nodes: Vec<PlacedNode>,
-    /// Direction of the modes' motion, "X", "Y" or "Z".
-    pub direction: &'static str,
+    /// Direction of the modes' motion: "X", "Y" or "Z" within 10 degrees of that axis, else its three components.
+    pub direction: String,
     /// Shape of each mode at the nodes, displacements over the largest (1); empty for a mode that the file gives no shape,
     /// or that moves in another direction.
     pub shapes: Vec<Vec<ShapeAtNode>>,
@@ -59,9 +61,22 @@ pub enum NoLine {
     /// Nodes in several coordinate systems.
     #[error("its nodes are stated in several coordinate systems; export them in the global one")]
     SeveralSystems,
+    /// Displacements in several coordinate systems.
+    #[error(
+        "the displacements at its nodes are stated in several coordinate systems; export them in the global one"
+    )]
+    SeveralDisplacementSystems,
+    /// A coordinate system that the file defines.
+    #[error(
+        "its nodes or their displacements are stated in coordinate system {0}, which the file defines; export them in the global one, number 0"
+    )]
+    DefinedSystem(i64),
+    /// Nodes at one place.
+    #[error("its nodes have all the same place; export the nodes with their coordinates")]
+    SamePlace,
     /// A node beside the line.
     #[error(
-        "its nodes lie on no straight line: node {node} is {share:.0} % of the line's length beside that from node {from} to node {to}; allowed: up to 1 %; export the nodes of one line along the beam"
+        "its nodes lie on no straight line: node {node} is off the line from node {from} to node {to} by {share:.1} % of its length; allowed: up to 1 %; export the nodes of one line along the beam"
     )]
     NotStraight {
         /// The node that is farthest from the line.
@@ -74,7 +89,7 @@ pub enum NoLine {
         to: i64,
     },
     /// The node that was named is no end of the line.
-    #[error("node {number} is no end of the line of nodes; allowed: {from} or {to}")]
+    #[error("node {number} is not at an end of the line of nodes; allowed: {from} or {to}")]
     NotAtEnd {
         /// The node that was named.
         number: i64,
@@ -101,23 +116,33 @@ impl ModeShapes {
             return Err(NoLine::NoShapes);
         }
         let mut placed = Vec::with_capacity(shaped.len());
-        let mut systems = BTreeSet::new();
+        let (mut systems, mut displacement_systems) = (BTreeSet::new(), BTreeSet::new());
         for number in shaped {
             if let Some(node) = self.nodes.get(&number) {
                 systems.insert(node.system);
+                displacement_systems.insert(node.displacement_system);
                 placed.push((number, Vector3::from(node.place)));
             }
         }
         // The two ends: the node farthest from any, and the node farthest from that.
-        let some = placed.first().ok_or(NoLine::NoPlaces)?.1;
+        let [(_, some), _, ..] = placed[..] else {
+            return Err(NoLine::NoPlaces);
+        };
         let one = farthest(&placed, some);
         let other = farthest(&placed, one.1);
         let length = (other.1 - one.1).norm();
         if length <= 0.0 || !length.is_finite() {
-            return Err(NoLine::NoPlaces);
+            return Err(NoLine::SamePlace);
         }
         if systems.len() > 1 {
             return Err(NoLine::SeveralSystems);
+        }
+        if displacement_systems.len() > 1 {
+            return Err(NoLine::SeveralDisplacementSystems);
+        }
+        let mut stated = systems.union(&displacement_systems);
+        if let Some(&system) = stated.find(|system| **system != 0 && self.defines_systems) {
+            return Err(NoLine::DefinedSystem(system));
         }
         let (from, to) = (one.0.min(other.0), one.0.max(other.0));
         let first = first.unwrap_or(from);
@@ -152,56 +177,67 @@ impl ModeShapes {
         Ok(self.shapes_across(nodes, axis))
     }
 
-    /// Takes the shapes in that direction of X, Y and Z across the line in which the modes move most.
+    /// Takes the shapes in the direction across the line in which the modes move most.
     fn shapes_across(&self, nodes: Vec<PlacedNode>, axis: Vector3<f64>) -> NodeLine {
-        let real: Vec<Vec<(usize, [f64; 3])>> = self
+        let real: Vec<Vec<MotionAtNode>> = self
             .modes
             .iter()
             .map(|mode| real_shape(mode, &nodes))
             .collect();
-        let mut motion = [0.0; 3];
+        let mut sum = Matrix3::zeros();
         for shape in &real {
-            for (sum, share) in motion.iter_mut().zip(shares(shape)) {
-                *sum += share;
+            let whole = squared_motion(shape);
+            for at in shape {
+                let across = at.motion - axis.dot(&at.motion) * axis;
+                sum += across * across.transpose() / whole;
             }
         }
-        let along = (0..3)
-            .max_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()))
-            .unwrap_or(0);
-        let across = (0..3)
-            .filter(|direction| *direction != along)
-            .max_by(|a, b| motion[*a].total_cmp(&motion[*b]))
-            .unwrap_or(0);
+        let eigen = SymmetricEigen::new(sum);
+        let mut direction = eigen
+            .eigenvectors
+            .column(eigen.eigenvalues.imax())
+            .into_owned();
+        if direction[direction.iamax()] < 0.0 {
+            direction.neg_mut();
+        }
         let mut line = NodeLine {
             nodes,
-            direction: ["X", "Y", "Z"][across],
+            direction: direction_words(direction),
             shapes: Vec::with_capacity(real.len()),
             other_direction: Vec::new(),
         };
         for (index, shape) in real.iter().enumerate() {
-            let largest = shape.iter().fold(0.0_f64, |largest, (_, value)| {
-                largest.max(value[across].abs())
-            });
-            if shape.is_empty() {
-                line.shapes.push(Vec::new());
-            } else if shares(shape)[across] < OWN_DIRECTION || largest <= 0.0 {
+            let projected: Vec<f64> = shape.iter().map(|at| direction.dot(&at.motion)).collect();
+            let squares: f64 = projected.iter().map(|value| value * value).sum();
+            let largest = projected
+                .iter()
+                .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            let mut values = Vec::new();
+            if largest > 0.0 && squares >= OWN_DIRECTION * squared_motion(shape) {
+                for (at, value) in shape.iter().zip(projected) {
+                    let (node, value) = (at.node, value / largest);
+                    values.push(ShapeAtNode { node, value });
+                }
+            } else if !shape.is_empty() {
                 line.other_direction.push(index);
-                line.shapes.push(Vec::new());
-            } else {
-                let values = shape.iter().map(|(node, value)| ShapeAtNode {
-                    node: *node,
-                    value: value[across] / largest,
-                });
-                line.shapes.push(values.collect());
             }
+            line.shapes.push(values);
         }
         line
     }
 }
 
-/// Real shape of a mode at the nodes, which it has by their places: a complex one is turned by the phase that makes its
-/// imaginary part least. Values are over the largest, so that their squares stay finite.
-fn real_shape(mode: &NodalMode, nodes: &[PlacedNode]) -> Vec<(usize, [f64; 3])> {
+/// Real motion of a mode at one node.
+struct MotionAtNode {
+    /// Place of the node in the line.
+    node: usize,
+    /// Along X, Y and Z.
+    motion: Vector3<f64>,
+}
+
+/// Real mode shape. A complex one is rotated in phase until its imaginary part is smallest. Values are over the largest,
+/// so that their squares stay finite.
+fn real_shape(mode: &NodalMode, nodes: &[PlacedNode]) -> Vec<MotionAtNode> {
     let mut values = Vec::new();
     let mut largest = 0.0_f64;
     for (place, node) in nodes.iter().enumerate() {
@@ -219,21 +255,27 @@ fn real_shape(mode: &NodalMode, nodes: &[PlacedNode]) -> Vec<(usize, [f64; 3])> 
     let parts = values.iter().flat_map(|(_, value)| value);
     let squares: Complex64 = parts.map(|part| (part / largest).powi(2)).sum();
     let turn = Complex64::from_polar(1.0 / largest, -0.5 * squares.arg());
-    let real = values.into_iter();
-    real.map(|(node, value)| (node, value.map(|part| (part * turn).re)))
-        .collect()
+    let real = values.into_iter().map(|(node, value)| MotionAtNode {
+        node,
+        motion: Vector3::from(value.map(|part| (part * turn).re)),
+    });
+    real.collect()
 }
 
-/// Shares (1) of the directions in the squares of a shape.
-fn shares(shape: &[(usize, [f64; 3])]) -> [f64; 3] {
-    let mut squares = [0.0; 3];
-    for (_, value) in shape {
-        for (sum, part) in squares.iter_mut().zip(value) {
-            *sum += part * part;
-        }
+/// Sum of the squared motion of a shape.
+fn squared_motion(shape: &[MotionAtNode]) -> f64 {
+    shape.iter().map(|at| at.motion.norm_squared()).sum()
+}
+
+/// The axis that a unit vector is near, else its components.
+fn direction_words(direction: Vector3<f64>) -> String {
+    let nearest = direction.iamax();
+    if direction[nearest].abs() >= NEAR_AXIS.to_radians().cos() {
+        return ["X", "Y", "Z"][nearest].to_owned();
     }
-    let whole: f64 = squares.iter().sum();
-    squares.map(|square| if whole > 0.0 { square / whole } else { 0.0 })
+    // Adding 0 removes the sign of a component that is rounded to 0.
+    let [x, y, z] = [0, 1, 2].map(|axis| (10.0 * direction[axis]).round() / 10.0 + 0.0);
+    format!("({x:.1}, {y:.1}, {z:.1})")
 }
 
 /// The node farthest from a place.

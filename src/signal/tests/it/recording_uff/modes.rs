@@ -150,7 +150,10 @@ fn val_modes_by_pyuff_have_its_frequencies_damping_and_shapes() {
         );
     }
     let [normal, complex] = [&normal, &complex].map(|modes| modes.along_line(Some(8)).unwrap());
-    assert_eq!((normal.direction, normal.nodes[0].number), ("Z", 8));
+    assert_eq!(
+        (normal.direction.as_str(), normal.nodes[0].number),
+        ("Z", 8)
+    );
     assert!((normal.nodes[7].distance - 0.35).abs() < 1e-12);
     for (normal, complex) in normal.shapes.iter().zip(&complex.shapes) {
         assert_eq!(normal.len(), 8);
@@ -280,18 +283,33 @@ fn limit_what_is_no_oscillation_is_left_out_and_parts_of_a_mode_are_joined() {
         .collect();
     assert_eq!(found, [(50.0, 3), (111.0, 2)]);
     let doubts: Vec<String> = modes.warnings.iter().map(ToString::to_string).collect();
-    assert_message(&doubts[0], "modes without an oscillation", &["2 datasets"]);
-    assert_message(&doubts[1], "eigenvalues with a negative", &["1 datasets"]);
+    assert_eq!(
+        doubts[0],
+        "2 datasets are left out: rigid-body or overdamped modes"
+    );
+    assert_eq!(
+        doubts[1],
+        "1 datasets are left out: eigenvalues with a negative imaginary part, the conjugates of the others"
+    );
 }
 
 #[test]
 fn limit_a_cut_file_is_read_as_far_as_it_goes() {
-    for cut in (0..NORMAL.len()).step_by(37) {
+    // The first mode ends with the second mark behind its type.
+    let first = NORMAL.find("\n    55").unwrap();
+    let first_end = first + NORMAL[first..].find("\n    -1").unwrap() + "\n    -1\n".len();
+    let whole = read(&file("modes.unv", NORMAL));
+    // Every byte of the last mode, and every 37th before.
+    let last = NORMAL.rfind("\n    55").unwrap();
+    for cut in (0..last).step_by(37).chain(last..NORMAL.len()) {
         let tested = file("modes.unv", &NORMAL[..cut]);
-        let Ok(modes) = read_mode_shapes(&tested.path) else {
-            continue;
+        let modes = match read_mode_shapes(&tested.path) {
+            Ok(modes) => modes,
+            Err(error) => {
+                assert!(cut < first_end, "cut at {cut}: {error}");
+                continue;
+            }
         };
-        let whole = read(&file("modes.unv", NORMAL));
         for (mode, whole) in modes.modes.iter().zip(&whole.modes) {
             assert_eq!(whole.frequency, mode.frequency, "cut at {cut}");
             for (node, value) in &mode.shape {
@@ -302,6 +320,10 @@ fn limit_a_cut_file_is_read_as_far_as_it_goes() {
             assert_eq!(whole.nodes[number], *node, "cut at {cut}");
         }
     }
+    // Within the number of the last node: the node before it is whole.
+    let line = NORMAL.rfind("\n         8").unwrap();
+    let modes = read(&file("modes.unv", &NORMAL[..line + 5]));
+    assert_eq!(modes.modes[4].shape.len(), 7);
     let cut = &NORMAL[..NORMAL.len() - 60];
     let modes = read(&file("modes.unv", cut));
     assert_eq!((modes.modes.len(), modes.modes[4].shape.len()), (5, 6));
@@ -387,7 +409,7 @@ fn limit_nodes_are_on_one_line_or_say_why_not() {
     let bent = line(&[[0.0; 3], [0.1, 0.003, 0.0], [0.2, 0.0, 0.0]], None);
     assert_message(
         &bent.unwrap_err().to_string(),
-        "its nodes lie on no straight line: node 2 is 2 %",
+        "its nodes lie on no straight line: node 2 is off the line from node 1 to node 3 by 1.5 %",
         &["up to 1 %"],
     );
     let straight = [[0.0; 3], [0.1, 0.0015, 0.0], [0.2, 0.0, 0.0]];
@@ -414,9 +436,145 @@ fn limit_a_mode_in_another_direction_has_no_shape_across_the_line() {
         + &side.text()
         + &Made::normal(3, 118.0, &[-0.4, -0.2, 1.0]).text();
     let line = read(&file("modes.unv", text)).along_line(None).unwrap();
-    assert_eq!((line.direction, &line.other_direction[..]), ("Z", &[1][..]));
+    assert_eq!(
+        (line.direction.as_str(), &line.other_direction[..]),
+        ("Z", &[1][..])
+    );
     let counts: Vec<usize> = line.shapes.iter().map(Vec::len).collect();
     assert_eq!(counts, [3, 0, 3]);
+}
+
+#[test]
+fn limit_displacements_in_own_coordinate_systems_are_left_out() {
+    let places = [[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]];
+    let mode = Made::normal(1, 17.0, &[0.1, 0.5, 1.0]).text();
+    let line = |text: String| read(&file("modes.unv", text + &mode)).along_line(None);
+    let one = |number: usize| format!("{number:10}{:10}", 0);
+    let own = |number: usize, system: usize| format!("{}{system:10}", one(number));
+    let first_column = nodes(&places).replacen(&own(2, 0), &own(2, 4), 1);
+    assert_eq!(
+        line(first_column).unwrap_err(),
+        NoLine::SeveralDisplacementSystems
+    );
+    let mut all = nodes(&places);
+    for number in 1..4 {
+        all = all.replacen(&own(number, 0), &own(number, 4), 1);
+    }
+    assert!(line(all.clone()).is_ok());
+    let systems = dataset(2420, &["         1".to_owned()]);
+    assert!(line(nodes(&places) + &systems).is_ok());
+    assert_eq!(line(all + &systems).unwrap_err(), NoLine::DefinedSystem(4));
+    assert_eq!(line(nodes(&[[0.3; 3]; 3])).unwrap_err(), NoLine::SamePlace);
+}
+
+#[test]
+fn limit_damping_in_per_cent_is_left_out_of_the_whole_file() {
+    let damped = |mode: u32, frequency: f64, damping: f64| Made {
+        reals: vec![frequency, 0.0, damping, 0.0],
+        ..Made::normal(mode, frequency, &[0.5, 1.0])
+    };
+    let text = damped(1, 17.0, 1.2).text() + &damped(2, 118.0, 0.6).text();
+    let modes = read(&file("modes.unv", text));
+    let damping: Vec<Option<f64>> = modes.modes.iter().map(|mode| mode.damping).collect();
+    assert_eq!(damping, [None, None]);
+    let doubt = &modes.warnings[0];
+    assert_eq!(doubt.code(), "damping-left-out");
+    assert_message(
+        &doubt.to_string(),
+        "damping ratios are left out: one is 1.2",
+        &["per cent"],
+    );
+}
+
+#[test]
+fn regress_parts_of_a_mode_are_of_one_quantity_and_one_load_case() {
+    let mut displacement = Made::normal(1, 17.0, &[0.5]);
+    displacement.reals[2] = 0.0;
+    let mut acceleration = Made {
+        quantity: 12,
+        ..Made::normal(1, 17.0, &[400.0, 800.0])
+    };
+    acceleration.nodes[0].0 = 7;
+    let case = |number: u32| format!("{:10}{:10}{number:10}", 2, 4);
+    let other = Made::normal(2, 17.0, &[1.0, 1.0]).text();
+    let other = other.replace(&case(1), &case(5));
+    let text = displacement.text() + &acceleration.text() + &other;
+    let modes = read(&file("modes.unv", text));
+    assert_eq!(modes.modes.len(), 1);
+    let mode = &modes.modes[0];
+    assert_eq!((mode.damping, mode.shape.len()), (Some(0.01), 1));
+    assert_eq!(
+        modes.warnings[0].to_string(),
+        "1 datasets are left out: modes with a frequency of an earlier load case"
+    );
+}
+
+#[test]
+fn regress_conjugates_alone_are_modes() {
+    let text: String = [-100.0, -700.0]
+        .map(|imaginary| Made {
+            analysis: 3,
+            reals: vec![-1.0, imaginary, 0.0, 0.0, 0.0, 0.0],
+            ..Made::normal(1, 0.0, &[1.0, -1.0])
+        })
+        .iter()
+        .map(Made::text)
+        .collect();
+    let modes = read(&file("modes.unv", text));
+    assert_eq!(modes.modes.len(), 2);
+    assert!(modes.warnings.is_empty(), "{:?}", modes.warnings);
+}
+
+#[test]
+fn limit_modes_count_as_values() {
+    let empty = Made::normal(1, 17.0, &[]).text();
+    // 100 values each.
+    assert!(read(&file("modes.unv", empty.repeat(10_000))).modes.len() == 1);
+    let message = refused(&empty.repeat(10_001));
+    assert_message(
+        &message,
+        "modes.unv:",
+        &[
+            "with dataset 10001",
+            "a mode counts as 100",
+            "up to 1000000",
+        ],
+    );
+}
+
+/// A bar that is turned about its length, whose modes have a little motion along it and beside.
+#[test]
+fn recover_the_direction_of_a_bar_at_any_angle() {
+    let places = [[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]];
+    let shapes = [[0.1, 0.4, 1.0], [-0.5, -0.4, 1.0], [0.7, -0.5, 1.0]];
+    for (angle, words) in [
+        (0.0_f64, "Z"),
+        (8.0, "Z"),
+        (45.0, "(0.0, 0.7, 0.7)"),
+        (85.0, "Y"),
+    ] {
+        let (sin, cos) = angle.to_radians().sin_cos();
+        let mut text = nodes(&places);
+        for (mode, shape) in (1..).zip(shapes) {
+            // Beside the bar alternately to either side, as noise is.
+            let beside = if mode % 2 == 0 { 0.03 } else { -0.03 };
+            let mut made = Made::normal(mode, 17.0 * f64::from(mode * mode), &shape);
+            for ((_, value), z) in made.nodes.iter_mut().zip(shape) {
+                *value = vec![0.1 * z, z * (sin + beside * cos), z * (cos - beside * sin)];
+            }
+            text += &made.text();
+        }
+        let line = read(&file("modes.unv", text)).along_line(None).unwrap();
+        assert_eq!(line.direction, words);
+        assert!(line.other_direction.is_empty(), "{angle}");
+        for (found, wanted) in line.shapes.iter().zip(shapes) {
+            // All motion of a mode has one direction: six printed digits.
+            let sign = found[2].value.signum();
+            for (found, wanted) in found.iter().zip(wanted) {
+                assert!((sign * found.value - wanted).abs() < 1e-5, "{angle}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 73] = [
+pub const WARNING_CODES: [(&str, &str); 74] = [
     // Of the description and of files, by their readers.
     (
         "description",

@@ -2,9 +2,9 @@
 
 use super::Analysis;
 use super::results::{
-    AverageSection, Estimate, EstimateMethod, Identification, ModeResult, MonteCarloSection,
-    MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection, SensitivitySection,
-    measured_modes, scatter_of, set_ups,
+    AverageSection, Estimate, EstimateMethod, Identification, LeftOutMode, ModeResult,
+    MonteCarloSection, MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection,
+    SensitivitySection, measured_modes, scatter_of, set_ups,
 };
 use super::structure::{
     StructureDetails, TestedStructure, estimator_of_lengths, fitted, frequencies_of, jointed,
@@ -14,7 +14,9 @@ use super::warnings::{Warning, of_estimate, of_prediction};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::{ConsistentEstimator, MovedClamp, PointFit};
+use tapjoint_identify::consistent::{
+    ConsistentEstimate, ConsistentEstimator, MovedClamp, PointFit,
+};
 use tapjoint_identify::perturbation::{
     SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly,
     sign_pattern_estimates, spans_of,
@@ -95,7 +97,7 @@ pub fn identify(
             own.frequency = mode.mean_of_repeats().unwrap_or(own.frequency);
         }
     }
-    let used: Vec<MeasuredMode> = measured.iter().copied().take(fit_modes).collect();
+    let mut used: Vec<MeasuredMode> = measured.iter().copied().take(fit_modes).collect();
     let mut moved = Vec::with_capacity(settings.lengths.len());
     for length in &settings.lengths {
         let mut own = measured_modes(&length.modes, scatter, floor);
@@ -106,12 +108,25 @@ pub fn identify(
         });
     }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
+    let (mut from_readings, mut left_out, mut better_numbers) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
-        let found = estimator_of_lengths(structure, &settings.details, &used, &moved);
-        let estimated = found.and_then(|found| {
-            let estimate = found.estimate_with_set_ups(&set_ups)?;
-            Ok((found, estimate))
-        });
+        let details = &settings.details;
+        let mut estimated = settled(structure, details, &used, &moved, &set_ups);
+        if let Ok((all, estimate)) = &estimated {
+            better_numbers = better_numbering(structure, details, &used, &moved, estimate);
+            if let Some(found) = all.outlying_mode() {
+                let mut rest = used.clone();
+                rest.retain(|mode| mode.mode != found.mode);
+                if let Ok(without) = settled(structure, details, &rest, &moved, &set_ups) {
+                    left_out = Some(LeftOutMode {
+                        found,
+                        with_all: Box::new(estimate.clone()),
+                    });
+                    used = rest;
+                    estimated = Ok(without);
+                }
+            }
+        }
         match estimated {
             Ok((found, estimate)) => {
                 estimator = Some(found);
@@ -119,6 +134,10 @@ pub fn identify(
             }
             Err(error) => refused = Some(error.to_string()),
         }
+        let exact = estimator_of_lengths(structure, &details.exact(), &used, &moved);
+        let exact = exact.and_then(|exact| exact.estimate());
+        // Its errors are those of the estimate itself.
+        from_readings = exact.ok().map(Box::new);
     }
     let closed = match structure.regression {
         Some(model) => estimate_joint(model, &structure.beam, &used)
@@ -137,6 +156,10 @@ pub fn identify(
     };
     let mut found = Identification {
         consistent,
+        from_readings,
+        left_out,
+        better_numbers,
+        assumed: settings.details.assumed.clone(),
         estimate,
         reason,
         prediction: Vec::new(),
@@ -156,6 +179,64 @@ pub fn identify(
     }
     warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
+}
+
+/// Returns the estimator that knows what is uncertain beside the readings, and its estimate.
+fn settled(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+    moved: &[MovedClamp],
+    set_ups: &[PointFit],
+) -> Result<(ConsistentEstimator, ConsistentEstimate), IdentifyError> {
+    let estimator = estimator_of_lengths(structure, details, used, moved)?.settled();
+    let estimate = estimator.estimate_with_set_ups(set_ups)?;
+    Ok((estimator, estimate))
+}
+
+/// Returns other numbers of the modes under which the model explains them, where it fails as they are numbered: one mode was
+/// missed, or one peak is none. `None` where no such numbering explains them, or several do.
+fn better_numbering(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+    moved: &[MovedClamp],
+    estimate: &ConsistentEstimate,
+) -> Option<Vec<usize>> {
+    // A model that fails, one that explains, and how much less probable the next numbering has to be.
+    const FAILS: f64 = 1e-3;
+    const EXPLAINS: f64 = 0.05;
+    const SECOND: f64 = 0.01;
+    let fitted = estimate.fit.len();
+    let is_tested = estimate.goodness.probability? < FAILS && used.len() >= fitted + 2;
+    let mut found: Vec<(f64, Vec<usize>)> = Vec::new();
+    let own: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
+    for from in (0..own.len()).filter(|_| is_tested) {
+        for up in [true, false] {
+            let mut numbers = own.clone();
+            for number in &mut numbers[from..] {
+                *number = if up { *number + 1 } else { *number - 1 };
+            }
+            let lowest = if from > 0 { numbers[from - 1] + 1 } else { 1 };
+            if numbers[from] < lowest {
+                continue;
+            }
+            let modes = used.iter().zip(&numbers);
+            let modes: Vec<MeasuredMode> = modes
+                .map(|(mode, &number)| MeasuredMode {
+                    mode: number,
+                    ..*mode
+                })
+                .collect();
+            let other = settled(structure, details, &modes, moved, &[]);
+            let probability = other.ok().and_then(|(_, other)| other.goodness.probability);
+            found.extend(probability.map(|probability| (probability, numbers)));
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (best, numbers) = found.first()?;
+    let second = found.get(1).map_or(0.0, |(probability, _)| *probability);
+    (*best > EXPLAINS && second < SECOND * best).then(|| numbers.clone())
 }
 
 /// Fits each set-up alone, by its own modes of the described length; none where fewer than two set-ups that differ can be

@@ -297,6 +297,7 @@ fn scale_std(test: &TestDescription) -> Option<f64> {
         (tolerance.modulus, beam.modulus, 0.5),
         (tolerance.density, beam.density, 0.5),
     ];
+    let shares = shares.map(|(known, value, power)| (known.if_stated(), value, power));
     let stated = shares.iter().any(|(std, ..)| std.is_some());
     let squares = shares.iter().map(|(std, value, power)| {
         let share = std.map_or(USUAL_SHARE, |std| power * std / value);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_beam::{Beam, JointStiffness};
-use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure};
+use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure, OutlyingMode};
 use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MeasuredMode, PredictedMode, Uncertain};
 use tapjoint_numerics::stats::chi_square_quantile;
@@ -254,6 +254,14 @@ pub struct Identification {
     /// The main estimate: the joint whose frequencies are nearest; `None` where it was not asked for
     /// or could not be had.
     pub consistent: Option<Box<ConsistentEstimate>>,
+    /// The same by the readings alone: the description exact, and a model that misses nothing.
+    pub from_readings: Option<Box<ConsistentEstimate>>,
+    /// The mode that is left out because it does not belong to the others.
+    pub left_out: Option<LeftOutMode>,
+    /// Numbers of the modes under which the model would explain them, where it does not as they are numbered.
+    pub better_numbers: Option<Vec<usize>>,
+    /// Standard uncertainties of the description that it does not state, in words; empty without any.
+    pub assumed: String,
     /// The estimate in closed form, which stands beside the main one or in its place.
     pub estimate: Option<Estimate>,
     /// The reason for which there is no estimate, or not the one that was asked for.
@@ -322,6 +330,15 @@ pub enum Estimate {
     Joint(Box<JointEstimate>),
     /// A free beam's material.
     FreeBeam(Box<FreeBeamEstimate>),
+}
+
+/// A mode that is left out of the estimate, and the estimate with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutMode {
+    /// How it deviates.
+    pub found: OutlyingMode,
+    /// The estimate from all modes.
+    pub with_all: Box<ConsistentEstimate>,
 }
 
 /// Estimates under changed frequencies, by each method that has one: first the pair regression, then the consistent

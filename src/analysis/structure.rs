@@ -4,12 +4,13 @@ use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, MODE_LIMIT, StructureError};
 use tapjoint_description::{
-    FitParameter, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
+    FitParameter, FreeFrequencies, JointModel, RecordingDescription, SensorKind,
+    StandardUncertainty, TestDescription, Weights,
 };
 use tapjoint_description::{described_beam, lap_layout};
 use tapjoint_identify::consistent::{
-    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, JointedStructure,
-    LapLayout, MovedClamp, Parameter, ResidualWeights,
+    AttachmentTolerance, BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel,
+    JointedStructure, LapLayout, MovedClamp, Parameter, ResidualWeights, WeighedBeam,
 };
 use tapjoint_identify::predict::compare;
 use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
@@ -84,6 +85,9 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
 /// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
 pub(super) const NO_SPRING: f64 = 1e-9;
 
+/// Relative standard uncertainty of a density that only the bar's weight tells: as good as none.
+const UNKNOWN_DENSITY: f64 = 1.0;
+
 /// Details of the structure beyond the plain beam with its joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StructureDetails {
@@ -93,27 +97,104 @@ pub struct StructureDetails {
     pub masses: Vec<PointMass>,
     /// Relative standard uncertainties of the beam's properties.
     pub tolerances: BeamTolerances,
+    /// Standard uncertainties of the masses, in their order.
+    pub attachments: Vec<AttachmentTolerance>,
+    /// The bare bar on a balance.
+    pub weighed: Option<WeighedBeam>,
+    /// The bar without its joint, with its frequencies.
+    pub free: Option<MovedClamp>,
+    /// True where the model itself may miss the frequencies.
+    pub discrepancy: bool,
+    /// Standard uncertainties that the description does not state, in words; empty without any.
+    pub assumed: String,
     /// Parameters that are estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
     pub fit: Option<Vec<FitParameter>>,
     /// Weights; `None` = measured where every uncertainty is known.
     pub weights: Option<Weights>,
 }
 
+impl StructureDetails {
+    /// Returns the same structure, known exactly, with a model that misses nothing: what the readings say alone.
+    #[must_use]
+    pub fn exact(&self) -> Self {
+        Self {
+            tolerances: BeamTolerances::default(),
+            attachments: Vec::new(),
+            weighed: None,
+            free: None,
+            discrepancy: false,
+            assumed: String::new(),
+            ..self.clone()
+        }
+    }
+}
+
 /// The details of a described test.
 pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
     let tolerance = &test.beam.tolerance;
+    let share = |known: StandardUncertainty, value: f64| {
+        Some(known.std / value).filter(|share| *share > 0.0)
+    };
+    let density = match test.beam.density_stated {
+        true => share(tolerance.density, beam.density),
+        // The weight alone says it.
+        false => Some(UNKNOWN_DENSITY),
+    };
+    let loads = loads_in(test, test.reference_recording());
+    let bar_length = test.beam.bar_length.unwrap_or(beam.length);
     StructureDetails {
         lap: lap_layout(test),
-        masses: masses_in(test, test.reference_recording()),
+        attachments: loads
+            .iter()
+            .map(|(name, load)| AttachmentTolerance {
+                name: name.clone(),
+                mass: tolerance.masses.std * load.mass,
+                position: tolerance.positions.std,
+            })
+            .collect(),
+        masses: loads.into_iter().map(|(_, load)| load).collect(),
         tolerances: BeamTolerances {
-            length: tolerance.length.map(|std| std / beam.length),
-            width: tolerance.width.map(|std| std / beam.width),
-            thickness: tolerance.thickness.map(|std| std / beam.thickness),
-            modulus: tolerance.modulus.map(|std| std / beam.modulus),
-            density: tolerance.density.map(|std| std / beam.density),
+            length: share(tolerance.length, beam.length),
+            width: share(tolerance.width, beam.width),
+            thickness: share(tolerance.thickness, beam.thickness),
+            modulus: share(tolerance.modulus, beam.modulus),
+            density,
         },
+        weighed: test.beam.weighed.map(|weighed| WeighedBeam {
+            mass: weighed.mass,
+            std: weighed.std,
+            length: bar_length,
+        }),
+        free: test
+            .beam
+            .free
+            .as_ref()
+            .map(|free| free_bar(test, beam, free, bar_length)),
+        discrepancy: true,
+        assumed: tolerance.assumed_words(&test.beam),
         fit: test.analysis.fit.clone(),
         weights: test.analysis.weights,
+    }
+}
+
+/// The bare bar without its joint, of this length (m), with its frequencies.
+fn free_bar(
+    test: &TestDescription,
+    beam: &Beam,
+    free: &FreeFrequencies,
+    length: f64,
+) -> MovedClamp {
+    let bar = Beam { length, ..*beam };
+    let modes = (1..).zip(free.frequencies.iter().zip(&free.stds));
+    MovedClamp {
+        structure: JointedStructure::new(test.joint.beam, bar, Assembly::Free),
+        modes: modes
+            .map(|(mode, (frequency, std))| MeasuredMode {
+                mode,
+                frequency: *frequency,
+                std: Some(*std),
+            })
+            .collect(),
     }
 }
 
@@ -123,18 +204,30 @@ pub(super) fn masses_in(
     test: &TestDescription,
     recording: Option<&RecordingDescription>,
 ) -> Vec<PointMass> {
+    let loads = loads_in(test, recording).into_iter();
+    loads.map(|(_, load)| load).collect()
+}
+
+/// The masses of [`masses_in`] with their names in the budget.
+fn loads_in(
+    test: &TestDescription,
+    recording: Option<&RecordingDescription>,
+) -> Vec<(String, PointMass)> {
     let sensors = test.sensors.iter().filter(|sensor| {
         test.analysis.sensor_mass && sensor.kind != SensorKind::Sound && sensor.mass > Some(0.0)
     });
     let sensors = sensors.filter_map(|sensor| {
-        Some(PointMass {
+        let load = PointMass {
             position: recording.map_or(sensor.position, |one| one.place_of(sensor))?,
             mass: sensor.mass?,
             inertia: 0.0,
-        })
+        };
+        Some((sensor.name.clone(), load))
     });
     let fastened = recording.into_iter().flat_map(|one| &one.masses);
-    sensors.chain(fastened.copied()).collect()
+    let fastened = (1..).zip(fastened);
+    let fastened = fastened.map(|(number, load)| (format!("fastened mass {number}"), *load));
+    sensors.chain(fastened).collect()
 }
 
 /// The structure that the estimator takes.
@@ -202,6 +295,9 @@ fn settings(
             _ => ResidualWeights::Measured,
         },
         tolerances: details.tolerances,
+        attachments: details.attachments.clone(),
+        weighed: details.weighed,
+        discrepancy: details.discrepancy,
         ..ConsistentSettings::fitting(&fit)
     }
 }
@@ -215,8 +311,8 @@ pub(super) fn estimator(
     estimator_of_lengths(structure, details, used, &[])
 }
 
-/// The estimator by least squares on the frequencies of these modes and on those of the beam where its clamp was
-/// moved.
+/// The estimator by least squares on the frequencies of these modes, on those of the beam where its clamp was
+/// moved, and on those of the free bar.
 pub(super) fn estimator_of_lengths(
     structure: &TestedStructure,
     details: &StructureDetails,
@@ -224,6 +320,7 @@ pub(super) fn estimator_of_lengths(
     moved: &[MovedClamp],
 ) -> Result<ConsistentEstimator, IdentifyError> {
     let jointed = jointed(structure, details);
+    let moved = &[moved, details.free.as_slice()].concat();
     let mut settings = settings(structure, details, used, moved);
     hold_cross_stiffness(structure, &jointed, used, moved, &mut settings)?;
     ConsistentEstimator::of_lengths(&jointed, used, moved, &settings)

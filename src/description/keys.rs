@@ -36,10 +36,13 @@ pub(super) const TOP: KnownTable = KnownTable::new(
 );
 pub(super) const BEAM: KnownTable = KnownTable::new(
     "[beam]",
-    "length width thickness modulus density poisson tolerance right",
+    "length width thickness modulus density poisson tolerance position_tolerance mass bar_length \
+     free_frequencies free_std right",
 );
-pub(super) const TOLERANCE: KnownTable =
-    KnownTable::new("beam.tolerance", "length width thickness modulus density");
+pub(super) const TOLERANCE: KnownTable = KnownTable::new(
+    "beam.tolerance",
+    "length width thickness modulus density poisson masses",
+);
 pub(super) const RIGHT: KnownTable =
     KnownTable::new("[beam.right]", "width thickness modulus density poisson");
 pub(super) const JOINT: KnownTable =

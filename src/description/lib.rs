@@ -9,6 +9,7 @@ mod reader;
 mod recordings;
 mod structure;
 mod template;
+mod tolerance;
 
 pub use parse::{ChannelRefError, READINGS, WINDOWS};
 pub use reader::DescriptionError;
@@ -23,6 +24,7 @@ pub use tapjoint_signal::recording::{ResponseForm, ValueColumns, VariableRole, V
 pub use template::{
     FoundChannel, FoundContent, FoundRecording, runnable_template, template, template_of,
 };
+pub use tolerance::{BeamTolerance, FreeFrequencies, StandardUncertainty, WeighedMass};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -112,21 +114,14 @@ pub struct BeamDescription {
     pub poisson: Option<f64>,
     /// Standard uncertainties of these properties.
     pub tolerance: BeamTolerance,
-}
-
-/// Standard uncertainties of a beam's properties, where stated (absolute, SI).
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct BeamTolerance {
-    /// Length (m).
-    pub length: Option<f64>,
-    /// Width (m).
-    pub width: Option<f64>,
-    /// Thickness (m).
-    pub thickness: Option<f64>,
-    /// Young's modulus (Pa).
-    pub modulus: Option<f64>,
-    /// Density (kg/m3).
-    pub density: Option<f64>,
+    /// Length (m) of the whole bar as weighed and tested free, a clamped part included; `None` = `length`.
+    pub bar_length: Option<f64>,
+    /// The bare bar on a balance; `None` when the file is silent.
+    pub weighed: Option<WeighedMass>,
+    /// False where the density follows from the weight alone.
+    pub density_stated: bool,
+    /// Frequencies of the whole bar without its joint; `None` when the file is silent.
+    pub free: Option<FreeFrequencies>,
 }
 
 /// Number of stiffnesses that describe the joint.

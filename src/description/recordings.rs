@@ -665,7 +665,25 @@ pub(super) fn read_measured(
 
 fn read_frequencies(table: &Table<'_>) -> Result<Vec<f64>, DescriptionError> {
     let wanted = "a list of frequencies (Hz), or `file = \"modes.unv\"`,";
-    let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
+    read_ascending(&table.need("frequencies", wanted, "frequencies = [17, 118]")?)
+}
+
+/// Reads the frequencies (Hz) of the free beam from this entry, and their standard uncertainties (Hz).
+pub(super) fn read_free_frequencies(
+    table: &Table<'_>,
+    entry: &Entry<'_>,
+) -> Result<(Vec<f64>, Vec<f64>), DescriptionError> {
+    let frequencies = read_ascending(entry)?;
+    let stds = table.need(
+        "free_std",
+        "their standard uncertainty (Hz)",
+        "free_std = 0.05",
+    )?;
+    let stds = read_bounds(&stds, &STD, Some(frequencies.len()))?;
+    Ok((frequencies, stds))
+}
+
+fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
     if items.is_empty() {
         let remedy = "list the natural frequencies in Hz, lowest first";

@@ -1,6 +1,7 @@
 //! Beam, joint and effects of the model, and the structure that they describe.
 
 use super::reader::{DescriptionError, Entry, Limits, Table, number, with_unit};
+use super::tolerance::{Described, read_free, read_weighed};
 use super::{
     Assembly, BeamDescription, BeamTheory, BeamTolerance, EffectDescription, JointDescription,
     JointModel, LapOverlap, RightHalf, TestDescription, keys,
@@ -12,12 +13,12 @@ use tapjoint_beam::specimen::{Joint, LapLayout, Specimen};
 use tapjoint_numerics::quantity::Dimension;
 
 /// A property of a beam with its limits and its usual range.
-struct Property {
-    key: &'static str,
+pub(super) struct Property {
+    pub(super) key: &'static str,
     /// Words for a missing property.
     wanted: &'static str,
     example: &'static str,
-    dimension: Dimension,
+    pub(super) dimension: Dimension,
     limits: Limits,
     /// Lowest and highest usual value.
     usual: [f64; 2],
@@ -28,7 +29,7 @@ struct Property {
 // The limits are physical (no solid is denser than 1e5 kg/m3 or stiffer than 1e13 Pa) or beyond the reach
 // of a hammer. Within them no frequency leaves the range of numbers. The usual ranges are those of beams that
 // people tap.
-const LENGTH: Property = Property {
+pub(super) const LENGTH: Property = Property {
     key: "length",
     wanted: "a length (m)",
     example: "length = \"423 mm\"",
@@ -97,19 +98,50 @@ const DENSITY: Property = Property {
 const POISSON: Limits = Limits::above(-1.0, 0.5, "metals have 0.25 to 0.35; leave it out for 0.3");
 /// Smallest length of a slender beam, in thicknesses.
 const STOCKY: f64 = 3.0;
-/// No property of a beam is known better than this (relative).
-const INCREDIBLY_EXACT: f64 = 1e-7;
 
 /// Reads `[beam]` without its right half.
 pub(super) fn read_beam(table: &Table<'_>) -> Result<BeamDescription, DescriptionError> {
-    let mut beam = BeamDescription {
-        length: needed(table, &LENGTH)?,
-        width: needed(table, &WIDTH)?,
-        thickness: needed(table, &THICKNESS)?,
-        modulus: needed(table, &MODULUS)?,
-        density: needed(table, &DENSITY)?,
+    let length = needed(table, &LENGTH)?;
+    let width = needed(table, &WIDTH)?;
+    let thickness = needed(table, &THICKNESS)?;
+    let modulus = needed(table, &MODULUS)?;
+    let weighed = read_weighed(table)?;
+    let bar_length = table.optional("bar_length", read_free_length)?;
+    if let Some(entry) = table.get("bar_length")
+        && bar_length < Some(length)
+    {
+        return Err(entry.error(
+            "the whole bar is shorter than its free `length`; measure it from end to end, clamped part included",
+        ));
+    }
+    let density = match (optional(table, &DENSITY)?, weighed) {
+        (Some(density), _) => density,
+        // The weight says it: nothing else is known of it.
+        (None, Some(weighed)) if table.get("right").is_none() => {
+            weighed.mass / (bar_length.unwrap_or(length) * width * thickness)
+        }
+        (None, _) => needed(table, &DENSITY)?,
+    };
+    let described = [
+        (&LENGTH, length),
+        (&WIDTH, width),
+        (&THICKNESS, thickness),
+        (&MODULUS, modulus),
+        (&DENSITY, density),
+    ];
+    let described = described.map(|(property, value)| Described { property, value });
+    let beam = BeamDescription {
+        length,
+        width,
+        thickness,
+        modulus,
+        density,
         poisson: table.within("poisson", Dimension::Ratio, &POISSON)?,
-        tolerance: BeamTolerance::default(),
+        tolerance: BeamTolerance::read(table, described)?,
+        weighed,
+        density_stated: table.get("density").is_some(),
+        free: read_free(table)?,
+        bar_length,
     };
     let stocky = beam.length < STOCKY * beam.thickness;
     if let Some(entry) = table.get("thickness").filter(|_| stocky) {
@@ -118,24 +150,10 @@ pub(super) fn read_beam(table: &Table<'_>) -> Result<BeamDescription, Descriptio
         let question = "did you swap thickness and length, or mix units?";
         entry.unusual(beam.thickness, "m", &usual, question);
     }
-    // "exact" states that there are none.
-    let stated = table
-        .get("tolerance")
-        .filter(|entry| entry.as_text() != Some("exact"));
-    if let Some(entry) = stated {
-        let table = entry.table(&keys::TOLERANCE)?;
-        beam.tolerance = BeamTolerance {
-            length: tolerance(&table, &LENGTH, beam.length)?,
-            width: tolerance(&table, &WIDTH, beam.width)?,
-            thickness: tolerance(&table, &THICKNESS, beam.thickness)?,
-            modulus: tolerance(&table, &MODULUS, beam.modulus)?,
-            density: tolerance(&table, &DENSITY, beam.density)?,
-        };
-    }
     Ok(beam)
 }
 
-/// Reads the free length (m) of the beam in a recording.
+/// Reads a length (m) of the beam: the free one in a recording, or that of the whole bar.
 pub(super) fn read_free_length(entry: &Entry<'_>) -> Result<f64, DescriptionError> {
     read_property(entry, &LENGTH)
 }
@@ -158,33 +176,6 @@ fn read_property(entry: &Entry<'_>, property: &Property) -> Result<f64, Descript
         entry.unusual(value, unit, &usual, property.question);
     }
     Ok(value)
-}
-
-/// Reads the standard uncertainty of a property: absolute ("1 mm") or a share of its `value` ("2 %").
-fn tolerance(
-    table: &Table<'_>,
-    property: &Property,
-    value: f64,
-) -> Result<Option<f64>, DescriptionError> {
-    let Some(entry) = table.get(property.key) else {
-        return Ok(None);
-    };
-    let relative = entry.as_text().is_some_and(|text| {
-        let text = text.trim_end();
-        text.ends_with('%') || text.ends_with("ppm")
-    });
-    let remedy = "give one standard deviation, absolute (\"1 mm\") or relative (\"2 %\")";
-    let std = if relative {
-        value * entry.within(Dimension::Ratio, &Limits::inside(0.0, 1.0, remedy))?
-    } else {
-        entry.within(property.dimension, &Limits::inside(0.0, value, remedy))?
-    };
-    if std < INCREDIBLY_EXACT * value {
-        let usual = "0.01 % to 10 % of the value";
-        let question = "did you mean percent? Write \"2 %\"";
-        entry.unusual(std, property.dimension.si_unit(), usual, question);
-    }
-    Ok(Some(std))
 }
 
 /// Returns the limits of a position along the beam (m).

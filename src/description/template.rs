@@ -19,7 +19,12 @@ thickness = 0.005              # m, in the direction of vibration
 modulus = "207 GPa"            # Young's modulus, Pa
 density = 7850                 # kg/m3
 # poisson = 0.3                # Poisson's ratio, default 0.3; enters shear deformation only
-# tolerance = { length = "1 mm", width = "0.1 mm", thickness = "0.05 mm", modulus = "2 %", density = "1 %" }   # standard uncertainties, default: none stated
+# tolerance = { length = "1 mm", modulus = "2 %" }   # standard uncertainties; "exact": none. Default: modulus 1 %, density 0.5 %,
+#   thickness 0.5 % or 0.02 mm, width 0.2 % or 0.05 mm, length 0.1 % or 0.5 mm (the larger), poisson 0.02, masses on the beam 2 %
+# position_tolerance = "1 mm"   # standard uncertainty of positions on the beam, default: 1 mm
+# mass = "830 g"                # the bare bar on a balance, good to 0.1 % or 0.5 g; density is then optional
+# bar_length = "450 mm"         # the whole bar as weighed and tested free, a clamped part included; default: length
+#   free_frequencies = [102.1, 281.5] and free_std = 0.02, both in Hz: modes 1, 2, ... of the same bar free at both ends
 "#;
 
 const CANTILEVER: &str = r#"

@@ -179,6 +179,7 @@ fn model_sections<'a>(document: &Document) -> Vec<Section<'a>> {
             },
             tables: found([
                 tables::parameters(document),
+                tables::budget(document),
                 tables::correlations(document),
                 tables::methods(document),
                 tables::prediction(document),

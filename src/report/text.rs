@@ -98,9 +98,10 @@ fn estimate(document: &Document) -> String {
     if let Some(words) = tables::set_up_words(found) {
         text.push_str(&wrapped(words.trim(), 0));
     }
-    if let Some(methods) = tables::methods(document) {
+    let beside = [tables::budget(document), tables::methods(document)];
+    for table in beside.into_iter().flatten() {
         text.push('\n');
-        text.push_str(&render_table(&methods));
+        text.push_str(&render_table(&table));
     }
     if let Some(closure) = found.pairs.as_ref().and_then(|pairs| pairs.closure) {
         let percent = signed_percent(Some(100.0 * closure));

@@ -92,13 +92,15 @@ fn regress_a_full_description_is_read_in_si_units() {
     assert_near(test.beam.modulus, 207e9, "modulus");
     assert_near(test.beam.density, 7850.0, "density");
     assert_eq!(test.beam.poisson, Some(0.29));
-    assert_eq!(test.beam.tolerance.length, Some(0.001));
+    let tolerance = test.beam.tolerance;
+    assert_eq!(tolerance.length.if_stated(), Some(0.001));
+    assert_near(tolerance.modulus.std, 4.14e9, "2 % of the modulus");
+    assert_eq!(tolerance.density.if_stated(), None);
     assert_near(
-        test.beam.tolerance.modulus.unwrap(),
-        4.14e9,
-        "2 % of the modulus",
+        tolerance.density.std,
+        39.25,
+        "0.5 % of the density, assumed",
     );
-    assert_eq!(test.beam.tolerance.density, None);
     assert_eq!(test.joint.kind, Assembly::Cantilever);
     assert_eq!(test.joint.model, JointModel::ThreeParameter);
     assert_eq!(test.joint.kt, Some(1.4e6));
@@ -174,7 +176,11 @@ fn regress_defaults_of_a_minimal_description() {
         (None, None, None)
     );
     assert_eq!((test.hammer, test.beam.poisson), (None, None));
-    assert_eq!(test.beam.tolerance, BeamTolerance::default());
+    let words = test.beam.tolerance.assumed_words(&test.beam);
+    assert_eq!(
+        words,
+        "modulus 1 %, density 0.5 %, thickness 0.025 mm, width 0.1 mm, length 0.6 mm, masses 2 %, positions 1 mm"
+    );
     let analysis = test.analysis;
     assert_eq!(
         (analysis.window, analysis.fit_modes, analysis.weights),

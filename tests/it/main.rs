@@ -12,6 +12,7 @@ mod corpus;
 mod deck;
 mod deck_with_effects;
 mod description;
+mod description_uncertainty;
 mod effects;
 mod errors;
 mod fastened;

@@ -90,13 +90,13 @@ fn broken() -> Document {
     let mut document = fixture::document();
     if let Some(Some(estimate)) = &mut document.estimate {
         if let Some(kx) = &mut estimate.kx {
-            kx.value = f64::INFINITY;
-            kx.std = Some(f64::NAN);
-            kx.low = None;
-            kx.high = None;
+            kx.uncertain.value = f64::INFINITY;
+            kx.uncertain.std = Some(f64::NAN);
+            kx.uncertain.low = None;
+            kx.uncertain.high = None;
         }
         if let Some(kt) = &mut estimate.kt {
-            kt.value = f64::NAN;
+            kt.uncertain.value = f64::NAN;
         }
     }
     for row in document.prediction.iter_mut().flatten() {

@@ -3,7 +3,8 @@
 use super::Warning;
 use super::measurement::frequency_words;
 use crate::results::{
-    BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult, exceeds_noise,
+    BetweenRecordings, Estimate, EstimateMethod, Identification, LeftOutMode, ModeResult,
+    exceeds_noise,
 };
 use crate::structure::TestedStructure;
 use std::fmt;
@@ -80,7 +81,11 @@ pub(crate) fn of_estimate(
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     match (&found.consistent, &found.estimate, &found.reason) {
-        (Some(consistent), ..) => warnings.extend(of_consistent(consistent, modes)),
+        (Some(consistent), ..) => {
+            warnings.extend(found.left_out.as_ref().map(left_out));
+            warnings.extend(found.better_numbers.as_deref().map(better_numbers));
+            warnings.extend(of_consistent(consistent, modes));
+        }
         // The closed form stands in the place of the consistent estimate.
         (None, Some(_), Some(reason)) => {
             let closed = match structure.regression {
@@ -145,6 +150,9 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
             text += if has_joint(found) { ALLOWED } else { "" };
         }
         warnings.push(Warning::new("misfit", text));
+    }
+    if let Some(text) = moved_description(found) {
+        warnings.push(Warning::new("description", text));
     }
     if found.goodness.verdict == FitVerdict::Untestable {
         warnings.push(Warning::new("untestable", found.goodness.words()));
@@ -235,19 +243,14 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
         return doubtful.then(|| goodness.words());
     }
     let factor = goodness.uncertainty_factor()?;
-    let sought = match has_joint(found) {
-        true => "the joint",
-        false => "the beam's modulus",
-    };
-    let intervals = found.quantities.iter().filter_map(two_intervals);
-    let intervals: Vec<String> = intervals.map(|words| format!("; {words}")).collect();
     Some(format!(
-        "the model misses the frequencies by {} % rms, {} times as much as their uncertainty allows (goodness of fit \
-         {}); std and limits from the frequencies' uncertainty alone are too small for {sought}{}",
+        "the model misses the frequencies by {} % rms, {} times as much as readings and description allow (goodness of \
+         fit {}); the limits take what it misses for errors of {} % of each frequency at random; an effect that acts like \
+         another joint may move the estimate further: see the diagnosis",
         two_digits(percent),
         times(factor),
         chance(goodness.probability.unwrap_or(0.0)),
-        intervals.concat()
+        two_digits(100.0 * found.discrepancy)
     ))
 }
 
@@ -271,33 +274,67 @@ fn two_digits(size: f64) -> String {
     }
 }
 
-/// "95 % interval of Kx: ±0.01 % from the frequencies' uncertainty alone, ±1.3 % with the misfit", for non-dimensional
-/// stiffnesses and the material.
-fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
-    // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
-    const PERCENT_95: f64 = 196.0;
-    // The name as tables write it.
-    let name = match quantity.quantity {
-        Quantity::Kx => "Kx",
-        Quantity::Ky => "Ky",
-        other @ (Quantity::Modulus | Quantity::Density) => other.name(),
-        _ => return None,
-    };
-    let value = quantity.value.filter(|value| *value != 0.0)?;
-    let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
-    let own = two_digits(PERCENT_95 * std / value.abs());
-    let scaled = within(50.0 * (high - low) / value.abs());
-    Some(format!(
-        "95 % interval of {name}: \u{b1}{own} % from the frequencies' uncertainty alone, {scaled} with the misfit"
-    ))
+/// The mode that is left out, and the joint with it.
+fn left_out(left_out: &LeftOutMode) -> Warning {
+    let found = &left_out.found;
+    let mut with_all = Vec::new();
+    for quantity in [Quantity::Kt, Quantity::Kr, Quantity::Modulus] {
+        let own = left_out.with_all.quantity(quantity);
+        if let Some(value) = own.and_then(|own| own.value) {
+            with_all.push(format!("{} {value:.4e}", quantity.name()));
+        }
+    }
+    Warning::new(
+        "outlying-mode",
+        format!(
+            "mode {} lies {:+.2} % from what the other modes predict ({} standard deviations) and is left out; without it \
+             the model explains the rest (goodness of fit {}); with it the best fit has {}; look at its peak and its number",
+            found.mode,
+            found.percent,
+            times(found.deviations.abs()),
+            chance(found.goodness_without),
+            with_all.join(", ")
+        ),
+    )
 }
 
-/// Words for the half width (%) of an interval; one beyond the value itself determines nothing.
-fn within(percent: f64) -> String {
-    match percent > 100.0 {
-        true => "wider than \u{b1}100 %".to_owned(),
-        false => format!("\u{b1}{} %", two_digits(percent)),
-    }
+/// Other numbers of the modes that the model would explain.
+fn better_numbers(numbers: &[usize]) -> Warning {
+    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    Warning::new(
+        "other-numbers",
+        format!(
+            "the model does not explain the modes as they are numbered; it would with the numbers {}: a mode was missed, or \
+             a peak is none; check, and state `modes` in [measured]",
+            numbers.join(", ")
+        ),
+    )
+}
+
+/// Pull of a described property beyond which the description is in doubt (standard uncertainties).
+const LARGE_PULL: f64 = 2.0;
+
+/// Properties of the description that the fit moves by more than their uncertainty explains.
+fn moved_description(found: &ConsistentEstimate) -> Option<String> {
+    let pulls = found.description.iter();
+    let pulls = pulls.filter(|pull| pull.pull.abs() > LARGE_PULL);
+    let words: Vec<String> = pulls
+        .map(|pull| {
+            format!(
+                "{} from {:.4e} to {:.4e} ({:+.1} standard uncertainties)",
+                pull.input.name(),
+                pull.stated,
+                pull.fitted,
+                pull.pull
+            )
+        })
+        .collect();
+    (!words.is_empty()).then(|| {
+        format!(
+            "the frequencies move the description beyond what it allows: {}; measure it, or state a larger tolerance",
+            words.join(", ")
+        )
+    })
 }
 
 /// A value at the end of its range, or an interval without an end.
@@ -499,12 +536,6 @@ mod tests {
         assert_eq!(chance(0.0), "<0.001");
         assert_eq!(chance(3e-7), "<0.001");
         assert_eq!(chance(0.0042), "4.2e-3");
-    }
-
-    #[test]
-    fn regress_a_half_width_beyond_the_value_is_none() {
-        assert_eq!(within(8.8), "\u{b1}8.8 %");
-        assert_eq!(within(30659.0), "wider than \u{b1}100 %");
     }
 
     #[test]

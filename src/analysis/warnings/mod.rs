@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 74] = [
+pub const WARNING_CODES: [(&str, &str); 76] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -167,6 +167,14 @@ pub const WARNING_CODES: [(&str, &str); 74] = [
     (
         "doubtful-scale",
         "by the model the scale of a sensor or of the hammer cannot be right",
+    ),
+    (
+        "outlying-mode",
+        "a mode does not belong to the others and is left out of the estimate",
+    ),
+    (
+        "other-numbers",
+        "the modes would be explained if they were numbered otherwise",
     ),
     (
         "inverted-sensor",

@@ -14,17 +14,17 @@ use crate::IdentifyError;
 use nalgebra::{DMatrix, SVD};
 use tapjoint_numerics::stats::{NORMAL_95, root_mean_square, student};
 
-/// Half of a 95 % interval (1, of a logarithm) beyond which the scatter of set-ups leaves a quantity unknown: a factor of
-/// 1000. Near a rigid joint the set-ups' stiffnesses may be decades apart.
+/// Half of a 95 % interval (1, of a logarithm) beyond which a quantity is not determined: a factor of 1000. Near a rigid
+/// joint the set-ups' stiffnesses may be decades apart, and a wide tolerance leaves a stiffness open.
 const NOT_KNOWN: f64 = 6.9;
 
 /// A finished fit with what its report needs.
-struct Finished<'a> {
-    estimator: &'a ConsistentEstimator,
-    problem: Problem<'a>,
-    best: Minimum,
-    directions: Vec<Point>,
-    covariance: Covariance,
+pub(super) struct Finished<'a> {
+    pub(super) estimator: &'a ConsistentEstimator,
+    pub(super) problem: Problem<'a>,
+    pub(super) best: Minimum,
+    pub(super) directions: Vec<Point>,
+    pub(super) covariance: Covariance,
     goodness: Goodness,
     /// Fits of each set-up alone.
     set_ups: &'a [PointFit],
@@ -58,7 +58,9 @@ impl ConsistentEstimator {
         let finished = Finished {
             estimator: self,
             covariance: Covariance::new(&best.state.jacobian, &directions),
-            goodness: self.goodness(&problem, &best, directions.len()),
+            goodness: self
+                .goodness
+                .unwrap_or_else(|| self.goodness(&problem, &best, directions.len())),
             set_ups,
             problem,
             best,
@@ -76,6 +78,10 @@ impl ConsistentEstimator {
             goodness: finished.goodness,
             modes: finished.modes(),
             other_minima: minima.map(|other| finished.other(&other)).collect(),
+            discrepancy: self.discrepancy,
+            budget: finished.budget(),
+            description: finished.description(),
+            remedies: finished.remedies(),
             set_ups: set_ups.len(),
             stop: best.stop,
             identifiability: finished.identifiability(),
@@ -84,47 +90,45 @@ impl ConsistentEstimator {
         })
     }
 
-    fn goodness(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {
+    pub(super) fn goodness(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {
         let pairs = problem.data.iter().zip(&best.state.responses);
         let misfits: Vec<f64> = pairs
-            .clone()
             .map(|(datum, found)| (found.frequency - datum.frequency) / datum.frequency)
             .collect();
-        let modes: f64 = pairs
-            .map(|(datum, found)| ((found.frequency - datum.frequency) / datum.std).powi(2))
-            .sum();
-        let priors: f64 = best.state.residuals[problem.data.len()..]
-            .iter()
-            .map(|residual| residual * residual)
-            .sum();
         let measured = self.settings.weights == ResidualWeights::Measured;
         let known = problem.data.len() + problem.priors.len();
         Goodness::new(
             &misfits,
-            measured.then_some(modes + priors),
+            measured.then_some(best.state.cost),
             known.saturating_sub(free),
         )
     }
 }
 
 impl Finished<'_> {
-    fn measured(&self) -> bool {
+    pub(super) fn measured(&self) -> bool {
         self.estimator.settings.weights == ResidualWeights::Measured
     }
 
     /// Factor from the covariance's unit to standard uncertainties scaled by the misfit.
     fn scale(&self) -> Option<f64> {
-        if self.measured() {
-            self.goodness.uncertainty_factor()
-        } else {
-            self.goodness.misfit_per_freedom
+        match self.estimator.settings.weights {
+            // The misfit is in the discrepancy already.
+            ResidualWeights::Measured if self.estimator.settings.discrepancy => None,
+            ResidualWeights::Measured => self.goodness.uncertainty_factor(),
+            ResidualWeights::Relative => self.goodness.misfit_per_freedom,
         }
+    }
+
+    /// Half of a 95 % interval in standard deviations that the misfit gives.
+    fn student_95(&self) -> f64 {
+        student::quantile(0.05, self.goodness.degrees_of_freedom as f64)
     }
 
     /// Covariance of two coordinates between a further set-up and the estimate, by the scatter of n set-ups: their variance
     /// times 1 + 1/n. Its root is the standard deviation of the normal distribution with the same 95 % interval as
     /// Student's t with n - 1 degrees of freedom. 0 without set-ups.
-    fn scatter(&self, first: &Point, second: &Point) -> f64 {
+    pub(super) fn scatter(&self, first: &Point, second: &Point) -> f64 {
         let count = self.set_ups.len() as f64;
         let freedom = count - 1.0;
         if freedom < 1.0 {
@@ -185,33 +189,44 @@ impl Finished<'_> {
         let scale = self.scale();
         // The interval with the misfit for uncertainty is that of the coordinate to first order. Student's
         // distribution accounts for the few frequencies, which give the misfit only roughly.
-        let freedom = self.goodness.degrees_of_freedom as f64;
-        let scaled = unit.zip(scale).map(|(unit, scale)| {
-            let half = student::quantile(0.05, freedom) * unit * scale;
-            let half = half.hypot(NORMAL_95 * scatter);
+        let scaled: Option<f64> = unit.zip(scale).map(|(unit, scale)| {
+            let half = self.student_95() * unit * scale;
+            half.hypot(NORMAL_95 * scatter)
+        });
+        let reaches = match self.measured() {
+            true => [-1.0, 1.0].map(|sign| {
+                let profile = is_known.then(|| Profile::new(self, quantity, sign))?;
+                Some((profile.end()? - now).hypot(NORMAL_95 * scatter))
+            }),
+            // Without stated uncertainties the scatter of the residuals is all that is known.
+            false => [scaled, scaled],
+        };
+        // Ends that are decades apart determine nothing.
+        let is_determined = reaches[0]
+            .zip(reaches[1])
+            .is_none_or(|(below, above)| below + above < 2.0 * NOT_KNOWN);
+        let unit = unit.filter(|_| is_determined);
+        let [below, above] = reaches.map(|reach| reach.filter(|_| is_determined));
+        let low = below.map(|reach| self.quantity_at(quantity, now - reach));
+        let high = above.map(|reach| self.quantity_at(quantity, now + reach));
+        let scaled = scaled.filter(|half| *half < NOT_KNOWN).map(|half| {
             let ends = [now - half, now + half];
             ends.map(|coordinate| self.quantity_at(quantity, coordinate))
                 .into()
         });
-        let [low, high] = [-1.0, 1.0].map(|sign| {
-            let profile = self
-                .measured()
-                .then(|| Profile::new(self, quantity, sign))
-                .filter(|_| is_known)?;
-            let half = (profile.end()? - now).hypot(NORMAL_95 * scatter);
-            Some(self.quantity_at(quantity, now + sign * half))
-        });
         let both = unit.zip(slope);
+        let std_scaled = both
+            .zip(scale)
+            .map(|((unit, slope), scale)| (unit * scale).hypot(scatter) * slope);
         // Where one end of a profile is missing the other is all that is known.
         EstimatedQuantity {
             quantity,
             value,
-            std: both
-                .filter(|_| self.measured())
-                .map(|(unit, slope)| unit.hypot(scatter) * slope),
-            std_scaled: both
-                .zip(scale)
-                .map(|((unit, slope), scale)| (unit * scale).hypot(scatter) * slope),
+            std: match self.measured() {
+                true => both.map(|(unit, slope)| unit.hypot(scatter) * slope),
+                false => std_scaled,
+            },
+            std_scaled,
             low,
             high,
             scaled,
@@ -245,23 +260,29 @@ impl Finished<'_> {
         gradient[Parameter::Coupling.index()] = -(1.0 - c * c) / c;
         let own = self.covariance.std(&gradient).filter(|_| c != 0.0);
         let scatter = self.scatter(&gradient, &gradient).sqrt();
-        let unit = own.map(|own| own.hypot(scatter));
+        let scaled = own
+            .zip(self.scale())
+            .map(|(own, scale)| (own * scale).hypot(scatter));
+        let (unit, reach) = match self.measured() {
+            true => (own.map(|own| own.hypot(scatter)), NORMAL_95),
+            false => (scaled, self.student_95()),
+        };
         let one_sign = coupling
             .low
             .zip(coupling.high)
             .is_some_and(|(low, high)| low * high > 0.0);
         let [low, high] = [-1.0, 1.0].map(|sign: f64| {
             let (value, unit) = value.zip(unit).filter(|_| one_sign)?;
-            Some(value * (sign * value.signum() * NORMAL_95 * unit).exp())
+            Some(value * (sign * value.signum() * reach * unit).exp())
         });
         let std = value.zip(unit).map(|(value, unit)| value.abs() * unit);
         EstimatedQuantity {
             quantity,
             value,
-            std: std.filter(|_| self.measured()),
+            std,
             std_scaled: value
-                .zip(own.zip(self.scale()))
-                .map(|(value, (own, scale))| value.abs() * (own * scale).hypot(scatter)),
+                .zip(scaled)
+                .map(|(value, scaled)| value.abs() * scaled),
             low,
             high,
             scaled: None,

@@ -1,21 +1,25 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
-use super::model::{FrequencyModel, JointedStructure, Parameter, Point};
+use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
 use super::problem::{
     Covariance, Datum, Evaluation, FOLLOWED, FULL, MISFIT, Minimum, Prior, Problem, REPEATED,
-    ROUGH, along, everywhere, promising, within_bounds,
+    ROUGH, along, everywhere, promising, value_along, within_bounds,
 };
-use super::{ConsistentSettings, Limit, Quantity, ResidualWeights, joint_at, limit_of};
+use super::uncertainty::{
+    LEAST_DISCREPANCY, UncertainInput, attachment_inputs, discrepancy, joint_near, whitening,
+};
+use super::{ConsistentSettings, Goodness, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
 use crate::perturbation::MonteCarlo;
 use crate::{IdentifyError, MeasuredMode, Stiffnesses};
+use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use tapjoint_beam::interface::LAST_STEP;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_beam::{Assembly, Beam, JointStiffness};
 use tapjoint_numerics::least_squares::{Settings, StopReason};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
@@ -26,10 +30,16 @@ pub struct ConsistentEstimator {
     pub(super) settings: ConsistentSettings,
     pub(super) modes: Vec<MeasuredMode>,
     /// Index of the model of each mode.
-    structures: Vec<usize>,
+    pub(super) structures: Vec<usize>,
     pub(super) base: Point,
     /// Parameters estimated along with the joint, with their prior.
     pub(super) nuisances: Vec<(Parameter, f64)>,
+    /// Uncertain inputs that the fit does not move; found by [`Self::settled`].
+    pub(super) inputs: Vec<UncertainInput>,
+    /// What the model itself may miss (1, relative); found by [`Self::settled`].
+    pub(super) discrepancy: f64,
+    /// The test of the model with the least discrepancy; found by [`Self::settled`].
+    pub(super) goodness: Option<Goodness>,
 }
 
 /// A fit without its intervals.
@@ -46,10 +56,10 @@ pub struct PointFit {
     pub stop: StopReason,
 }
 
-/// The beam where its clamp was moved, with the frequencies that were read there.
+/// The beam where its clamp was moved, or without its joint, with the frequencies that were read there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedClamp {
-    /// The structure: of the same beam and on the same joint, but of another length.
+    /// The structure: of the same beam, of another length. It has the same joint, or as a free beam none.
     pub structure: JointedStructure,
     /// Its modes.
     pub modes: Vec<MeasuredMode>,
@@ -174,7 +184,91 @@ impl ConsistentEstimator {
             modes: all,
             structures,
             base,
+            inputs: Vec::new(),
+            discrepancy: 0.0,
+            goodness: None,
         })
+    }
+
+    /// Returns the estimator with what is uncertain beyond the readings: the attached masses' share, and the discrepancy that
+    /// the residuals ask for. The same without such settings, and with relative weights.
+    #[must_use]
+    pub fn settled(mut self) -> Self {
+        if self.settings.weights == ResidualWeights::Relative {
+            return self;
+        }
+        let frequencies = self.frequencies();
+        if self.settings.discrepancy {
+            self.discrepancy = LEAST_DISCREPANCY;
+        }
+        let (renewed, mut minima) = self.solve(&frequencies);
+        let models = renewed.unwrap_or_else(|| self.models.clone());
+        let starts: Vec<Point> = minima.iter().map(|minimum| minimum.state.point).collect();
+        let Some(best) = starts.first() else {
+            return self;
+        };
+        self.inputs = self.inputs_at(best);
+        if !self.inputs.is_empty() {
+            minima = self.minima(&self.problem(&models, &frequencies), &starts, &FULL);
+        }
+        let Some(best) = minima.into_iter().next() else {
+            return self;
+        };
+        let problem = self.problem(&models, &frequencies);
+        let directions = self.directions();
+        let goodness = self.goodness(&problem, &best, directions.len());
+        if self.settings.discrepancy {
+            let modes = self.modes.iter();
+            let readings: Vec<f64> = modes
+                .map(|mode| mode.std.unwrap_or(0.0) / mode.frequency)
+                .collect();
+            let inputs: Vec<&[f64]> = self.inputs.iter().map(|input| &input.changes[..]).collect();
+            let state = &best.state;
+            self.discrepancy = discrepancy(&problem, state, &directions, &readings, &inputs);
+        }
+        self.goodness = Some(goodness);
+        self
+    }
+
+    /// Returns true where frequencies of the beam without its joint are among the data.
+    pub(super) fn has_free_test(&self) -> bool {
+        let mut models = self.models.iter();
+        models.any(|model| model.structure().assembly == Assembly::Free)
+    }
+
+    /// Returns the inputs that the attached masses are, with the joint and the beam at a point.
+    fn inputs_at(&self, point: &Point) -> Vec<UncertainInput> {
+        let mut all: Vec<UncertainInput> = Vec::new();
+        for (index, model) in self.models.iter().enumerate() {
+            let own = self.modes.iter().zip(&self.structures);
+            let own = own.filter(|(_, structure)| **structure == index);
+            let numbers: Vec<usize> = own.map(|(mode, _)| mode.mode).collect();
+            let structure = model.structure();
+            let joint = (structure.assembly != Assembly::Free).then(|| joint_near(point));
+            let found = attachment_inputs(structure, joint, &numbers, &self.settings.attachments);
+            // The same mass loads every structure that it sits on.
+            let before: usize = self
+                .structures
+                .iter()
+                .filter(|other| **other < index)
+                .count();
+            let total = self.modes.len();
+            for input in found {
+                let known = all.iter_mut().find(|known| known.name == input.name);
+                match known {
+                    Some(known) => {
+                        known.changes[before..before + numbers.len()]
+                            .copy_from_slice(&input.changes);
+                    }
+                    None => {
+                        let mut changes = vec![0.0; total];
+                        changes[before..before + numbers.len()].copy_from_slice(&input.changes);
+                        all.push(UncertainInput { changes, ..input });
+                    }
+                }
+            }
+        }
+        all
     }
 
     /// Returns true where a stiffness of the joint is estimated.
@@ -209,23 +303,67 @@ impl ConsistentEstimator {
             structure,
             mode: mode.mode,
             frequency,
-            std: match self.settings.weights {
-                ResidualWeights::Measured => mode.std.unwrap_or(frequency),
-                ResidualWeights::Relative => frequency,
+            std: match (self.settings.weights, mode.std) {
+                (ResidualWeights::Measured, Some(std)) => std.hypot(self.discrepancy * frequency),
+                _ => frequency,
             },
         });
+        let data: Vec<Datum> = data.collect();
+        Problem {
+            models,
+            whitening: whitening(&self.standardised_inputs(&data), data.len()),
+            data,
+            priors: self.priors(),
+            last_step: LAST_STEP,
+        }
+    }
+
+    /// Returns what is known of the beam beside the frequencies.
+    pub(super) fn priors(&self) -> Vec<Prior> {
         // The beam of `base` is the described one, whose properties are never moved there.
         let priors = self.nuisances.iter().map(|&(parameter, std)| Prior {
-            parameter,
+            gradient: along(parameter),
             value: self.base[parameter.index()],
             std,
         });
-        Problem {
-            models,
-            data: data.collect(),
-            priors: priors.collect(),
-            last_step: LAST_STEP,
+        priors.chain(self.weighed()).collect()
+    }
+
+    /// Returns the change of each standardised residual by one standard uncertainty of each input.
+    pub(super) fn standardised_inputs(&self, data: &[Datum]) -> Vec<DVector<f64>> {
+        let inputs = self.inputs.iter().map(|input| {
+            let changes = data.iter().zip(&input.changes);
+            let changes = changes.map(|(datum, change)| change * datum.frequency / datum.std);
+            DVector::from_iterator(data.len(), changes)
+        });
+        inputs.collect()
+    }
+
+    /// Returns the mass by a balance as knowledge of the beam: its logarithm grows with those of density and dimensions.
+    fn weighed(&self) -> Option<Prior> {
+        let weighed = self.settings.weighed?;
+        if self.settings.weights == ResidualWeights::Relative {
+            return None;
         }
+        let structure = self.models[0].structure();
+        let body = structure.body().ok()?;
+        let mass: f64 = body.beams().iter().map(Beam::mass).sum();
+        let mass = mass * weighed.length / structure.beam.length;
+        let mut gradient = [0.0; PARAMETERS];
+        let properties = [
+            Parameter::Density,
+            Parameter::Length,
+            Parameter::Width,
+            Parameter::Thickness,
+        ];
+        for parameter in properties {
+            gradient[parameter.index()] = 1.0;
+        }
+        Some(Prior {
+            gradient,
+            value: value_along(&gradient, &self.base) + (weighed.mass / mass).ln(),
+            std: weighed.std / weighed.mass,
+        })
     }
 
     /// Returns the least misfit over all joints, from the pair regression's estimate and from wherever the
@@ -462,7 +600,12 @@ impl ConsistentEstimator {
     }
 
     /// Follows every start down roughly, keeps different minima, and finishes each by these settings.
-    fn minima(&self, problem: &Problem<'_>, starts: &[Point], settings: &Settings) -> Vec<Minimum> {
+    pub(super) fn minima(
+        &self,
+        problem: &Problem<'_>,
+        starts: &[Point],
+        settings: &Settings,
+    ) -> Vec<Minimum> {
         let directions = self.directions();
         // A last step of 1e-4 leaves 1e-8: enough to tell minima apart, and half the work.
         let rough = Problem {
@@ -510,9 +653,9 @@ impl ConsistentEstimator {
         const UNFELT: f64 = 1e-4;
         for parameter in [Parameter::Kt, Parameter::Kr] {
             let index = parameter.index();
-            let data = problem.data.iter().zip(&minimum.state.jacobian);
-            let felt = data
-                .map(|(datum, row)| (row[index] * datum.std / datum.frequency).abs())
+            let responses = minimum.state.responses.iter();
+            let felt = responses
+                .map(|response| response.sensitivity[index].abs())
                 .fold(0.0, f64::max);
             if felt > UNFELT || !self.settings.fit.contains(&parameter) {
                 continue;
@@ -541,7 +684,7 @@ const CHUNK: usize = 256;
 
 impl ConsistentEstimator {
     /// Repeats the estimate `samples` times with independent normal errors. The frequencies have their stated
-    /// standard deviations, and the beam's properties their tolerances. Each repetition starts from those minima of the
+    /// standard deviations and the discrepancy, the beam's properties and the inputs their tolerances. Each repetition starts from those minima of the
     /// first estimate that its errors can make the deepest, four at most. The body is that of the first estimate, and
     /// changes of the beam are followed to first order. This leaves less than a thousandth of a standard deviation.
     /// The result depends on the seed, not on the number of threads. Repetitions that do not converge count as
@@ -559,6 +702,7 @@ impl ConsistentEstimator {
         for mode in &self.modes {
             let std = mode.std.filter(|std| std.is_finite());
             let std = std.ok_or(IdentifyError::NoUncertainty { mode: mode.mode })?;
+            let std = std.hypot(self.discrepancy * mode.frequency);
             errors.push((mode.frequency, std));
         }
         let chunks: Vec<Vec<Stiffnesses>> = (0..samples.div_ceil(CHUNK))
@@ -593,6 +737,13 @@ impl ConsistentEstimator {
                 let error: f64 = error;
                 datum.frequency = mean + std * error;
                 moved = moved.hypot(std * error / datum.std);
+            }
+            for (input, error) in self.inputs.iter().zip(&mut normal) {
+                let error: f64 = error;
+                for (datum, change) in problem.data.iter_mut().zip(&input.changes) {
+                    datum.frequency *= 1.0 + change * error;
+                }
+                moved = moved.hypot(error);
             }
             // A stated property of the beam is a reading too, with its own error.
             for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {

@@ -13,17 +13,23 @@
 //! that every point is a joint that can exist. Unlike the pair regression an estimate satisfies its
 //! own frequency equation, and takes masses, springs and unequal halves into account.
 
+mod budget;
 mod estimate;
 mod estimator;
 mod model;
+mod outlier;
 mod problem;
+mod uncertainty;
 
+pub use budget::{BudgetEntry, BudgetInput, DescriptionPull, Measure, Remedy};
 pub use estimator::{ConsistentEstimator, MovedClamp, Neighbourhood, PointFit};
 pub use model::{
     FrequencyModel, JointedStructure, ModeResponse, PARAMETERS, Parameter, Point, Route,
 };
+pub use outlier::OutlyingMode;
 pub use tapjoint_beam::specimen::LapLayout;
 pub use tapjoint_numerics::least_squares::StopReason;
+pub use uncertainty::{AttachmentTolerance, LEAST_DISCREPANCY, MOST_DISCREPANCY};
 
 use model::log_nondimensional;
 use problem::{LOG_STIFFNESS, along};
@@ -72,6 +78,17 @@ impl BeamTolerances {
     }
 }
 
+/// The bare bar on a balance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeighedBeam {
+    /// Mass (kg).
+    pub mass: f64,
+    /// Standard uncertainty (kg).
+    pub std: f64,
+    /// Length (m) of the bar; a clamped part makes it longer than the beam.
+    pub length: f64,
+}
+
 /// Settings of an estimate from frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConsistentSettings {
@@ -85,6 +102,13 @@ pub struct ConsistentSettings {
     /// Uncertain properties of the beam: with measured weights they are estimated along with the
     /// joint, each held near its stated value. A property in `fit` has no such hold.
     pub tolerances: BeamTolerances,
+    /// Uncertainties of the structure's masses, in their order; with measured weights only.
+    pub attachments: Vec<AttachmentTolerance>,
+    /// Mass of the beam by a balance; with measured weights only.
+    pub weighed: Option<WeighedBeam>,
+    /// True where the model itself may miss every frequency by [`LEAST_DISCREPANCY`], or by more where the residuals ask
+    /// for it; with measured weights only.
+    pub discrepancy: bool,
 }
 
 impl ConsistentSettings {
@@ -95,6 +119,9 @@ impl ConsistentSettings {
             held: Joint::RIGID,
             weights: ResidualWeights::Measured,
             tolerances: BeamTolerances::default(),
+            attachments: Vec::new(),
+            weighed: None,
+            discrepancy: false,
         }
     }
 
@@ -207,6 +234,14 @@ pub struct ConsistentEstimate {
     pub modes: Vec<FittedMode>,
     /// Other minima, the deepest first.
     pub other_minima: Vec<OtherMinimum>,
+    /// What the model itself may miss (1, relative, one standard deviation of each frequency).
+    pub discrepancy: f64,
+    /// What each input contributes to the standard deviation of each quantity.
+    pub budget: Vec<BudgetEntry>,
+    /// Where the fit moved the uncertain properties of the description.
+    pub description: Vec<DescriptionPull>,
+    /// What further measurements would make of the standard deviations, where the description is uncertain.
+    pub remedies: Vec<Remedy>,
     /// Number of set-ups that differ beyond noise. Standard deviations and intervals are for a further one. 0 without.
     pub set_ups: usize,
     /// Reason for which the search ended.

@@ -67,10 +67,10 @@ pub(super) struct Datum {
     pub(super) std: f64,
 }
 
-/// A coordinate of the point that is known beforehand, with its standard deviation.
+/// A linear function of the point that is known beforehand, with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Prior {
-    pub(super) parameter: Parameter,
+    pub(super) gradient: Point,
     pub(super) value: f64,
     pub(super) std: f64,
 }
@@ -81,6 +81,8 @@ pub(super) struct Problem<'a> {
     /// The structure as described, then those whose clamp was moved.
     pub(super) models: &'a [FrequencyModel],
     pub(super) data: Vec<Datum>,
+    /// Turns standardised residuals that errors in common correlate into independent ones; `None` where they are.
+    pub(super) whitening: Option<DMatrix<f64>>,
     pub(super) priors: Vec<Prior>,
     /// Relative step of lambda that ends the search for a root.
     pub(super) last_step: f64,
@@ -92,7 +94,7 @@ pub(super) struct Evaluation {
     pub(super) point: Point,
     /// Sum of the squares of all residuals.
     pub(super) cost: f64,
-    /// Standardised residuals.
+    /// Standardised, independent residuals.
     pub(super) residuals: Vec<f64>,
     /// Their derivatives with the point.
     pub(super) jacobian: Vec<Point>,
@@ -146,20 +148,24 @@ impl Problem<'_> {
             let length = self.models[datum.structure].length;
             let residual = (response.frequency - datum.frequency) / datum.std;
             let scale = response.frequency / datum.std;
-            result.cost += residual * residual;
             result.residuals.push(residual);
             let slopes = response.sensitivity.map(|slope| scale * slope);
             result.jacobian.push(slopes);
             result.responses.push(response);
             result.lengths.push(length);
         }
-        for prior in &self.priors {
-            let residual = (point[prior.parameter.index()] - prior.value) / prior.std;
-            result.cost += residual * residual;
-            result.residuals.push(residual);
-            let slopes = along(prior.parameter).map(|slope| slope / prior.std);
-            result.jacobian.push(slopes);
+        if let Some(whitening) = &self.whitening {
+            (result.residuals, result.jacobian) =
+                whitened(whitening, &result.residuals, &result.jacobian);
         }
+        for prior in &self.priors {
+            let residual = (value_along(&prior.gradient, point) - prior.value) / prior.std;
+            result.residuals.push(residual);
+            result
+                .jacobian
+                .push(prior.gradient.map(|slope| slope / prior.std));
+        }
+        result.cost = result.residuals.iter().map(|r| r * r).sum();
         result
     }
 
@@ -187,6 +193,29 @@ impl Problem<'_> {
         };
         minimise(&descent, start, settings)
     }
+}
+
+/// Returns the product of a triangle with residuals and with their slopes.
+pub(super) fn whitened(
+    triangle: &DMatrix<f64>,
+    residuals: &[f64],
+    slopes: &[Point],
+) -> (Vec<f64>, Vec<Point>) {
+    let (mut independent, mut turned) = (Vec::new(), Vec::new());
+    for row in 0..residuals.len() {
+        let mut sum = 0.0;
+        let mut slope = [0.0; PARAMETERS];
+        for column in 0..=row {
+            let weight = triangle[(row, column)];
+            sum += weight * residuals[column];
+            for (total, part) in slope.iter_mut().zip(&slopes[column]) {
+                *total += weight * part;
+            }
+        }
+        independent.push(sum);
+        turned.push(slope);
+    }
+    (independent, turned)
 }
 
 /// A problem whose point moves along some directions only.

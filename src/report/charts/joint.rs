@@ -235,8 +235,9 @@ impl Cloud {
                 Some(pairs) if method == EstimateMethod::Pairs => pairs.kx.zip(pairs.ky),
                 _ if estimate.method == method => estimate
                     .kx
-                    .zip(estimate.ky)
-                    .map(|(kx, ky)| (kx.value, ky.value)),
+                    .as_ref()
+                    .zip(estimate.ky.as_ref())
+                    .map(|(kx, ky)| (kx.uncertain.value, ky.uncertain.value)),
                 _ => None,
             };
             cloud.estimate = place.filter(is_finite);

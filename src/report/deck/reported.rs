@@ -173,32 +173,20 @@ impl ReportFile {
     }
 }
 
-/// Returns the limits of all stiffnesses, those that are scaled by the misfit first.
-fn all_limits(estimate: &Value) -> Vec<String> {
-    let mut lines = Vec::new();
-    for (scaled, how, low, high) in [
-        (true, " scaled by the misfit", "low_scaled", "high_scaled"),
-        (false, "", "low", "high"),
-    ] {
-        let mut limits = Vec::new();
-        for (key, unit) in [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")] {
-            let found = &estimate[key];
-            if scaled != (found["low_scaled"].is_number() || found["high_scaled"].is_number()) {
-                continue;
-            }
-            let words = match (found[low].as_f64(), found[high].as_f64()) {
-                (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
-                (Some(low), None) => format!("above {low:.3e}"),
-                (None, Some(high)) => format!("below {high:.3e}"),
-                (None, None) => continue,
-            };
-            limits.push(format!("{key} {words} {unit}"));
-        }
-        if !limits.is_empty() {
-            lines.push(format!("95 % limits{how}: {}", limits.join(", ")));
-        }
+/// Returns the limits of all stiffnesses.
+fn all_limits(estimate: &Value) -> Option<String> {
+    let mut limits = Vec::new();
+    for (key, unit) in [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")] {
+        let found = &estimate[key];
+        let words = match (found["low"].as_f64(), found["high"].as_f64()) {
+            (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
+            (Some(low), None) => format!("above {low:.3e}"),
+            (None, Some(high)) => format!("below {high:.3e}"),
+            (None, None) => continue,
+        };
+        limits.push(format!("{key} {words} {unit}"));
     }
-    lines
+    (!limits.is_empty()).then(|| format!("95 % limits: {}", limits.join(", ")))
 }
 
 /// Returns the described beam with the properties that the report estimates.

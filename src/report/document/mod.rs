@@ -13,9 +13,9 @@ pub use measured::{
     frf_document, method_name,
 };
 pub use model::{
-    Baseline, BaselineSection, EstimateSection, FreeBeamSection, GapPlaceSection, GapSection,
-    IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
-    UpdatedModelSection, gap_section,
+    Baseline, BaselineSection, BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection,
+    FromReadings, GapPlaceSection, GapSection, IdentifiabilitySection, LengthSection,
+    MisfitSection, PairsSection, PredictionSection, UpdatedModelSection, gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{

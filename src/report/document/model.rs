@@ -12,9 +12,96 @@ use tapjoint_diagnosis::{
     AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
     LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
 };
-use tapjoint_identify::consistent::{ConsistentEstimate, Correlation, Limit, Quantity};
+use tapjoint_identify::consistent::{ConsistentEstimate, Correlation, Limit, Measure, Quantity};
 use tapjoint_identify::{SingleMode, Uncertain};
 use tapjoint_numerics::stats::times;
+
+/// An estimated value: its own interval takes everything that is uncertain into account.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct EstimatedValue {
+    /// Value, standard deviation and 95 % interval.
+    #[serde(flatten)]
+    pub uncertain: Uncertain,
+    /// The value by the readings alone: the description exact, and a model that misses nothing. Null of a closed form.
+    pub from_readings: Option<FromReadings>,
+    /// What each input contributes, the largest first; empty of a closed form.
+    pub budget: Vec<BudgetRow>,
+}
+
+impl EstimatedValue {
+    /// A value of a closed form.
+    pub fn of(uncertain: Uncertain) -> Self {
+        Self {
+            uncertain,
+            ..Self::default()
+        }
+    }
+}
+
+/// A value by the readings alone.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct FromReadings {
+    /// The value; null where it is infinite: rigid.
+    pub value: Option<f64>,
+    /// Standard deviation.
+    pub std: Option<f64>,
+    /// Lower 95 % limit.
+    pub low: Option<f64>,
+    /// Upper 95 % limit.
+    pub high: Option<f64>,
+}
+
+/// Contribution of an input to an estimated value.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct BudgetRow {
+    /// "readings", "discrepancy", "modulus", "mass of A", ...
+    pub input: String,
+    /// Its part in the standard deviation (%); the squares add up.
+    pub std_percent: f64,
+}
+
+/// Where the fit moved an uncertain property of the description.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DescriptionRow {
+    /// The property, as in the budget.
+    pub input: String,
+    /// Value that the description states (SI).
+    pub stated: f64,
+    /// Value that the fit gives it (SI).
+    pub fitted: f64,
+    /// Their difference in standard uncertainties of the description.
+    pub pull: f64,
+}
+
+/// A mode that was left out of the estimate.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct LeftOutRow {
+    /// Its number.
+    pub mode: usize,
+    /// Measured less predicted by the other modes (%).
+    pub error_percent: f64,
+    /// The same in standard deviations of that prediction.
+    pub deviations: f64,
+    /// Kt (N/m) with all modes; null where it is not estimated.
+    pub kt: Option<Uncertain>,
+    /// Kr (N m/rad) with all modes, likewise.
+    pub kr: Option<Uncertain>,
+    /// Modulus (Pa) with all modes, likewise.
+    pub modulus: Option<Uncertain>,
+}
+
+/// What a further measurement would make of the estimate.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RemedyRow {
+    /// "weigh-beam", "free-test", "caliper" or "weigh-masses".
+    pub measure: Measure,
+    /// Standard deviation of Kt with it (%); null where Kt is not estimated.
+    pub kt_percent: Option<f64>,
+    /// Standard deviation of Kr with it (%), likewise.
+    pub kr_percent: Option<f64>,
+    /// Standard deviation of the modulus with it (%), likewise.
+    pub modulus_percent: Option<f64>,
+}
 
 /// The joint, or the free beam's material.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -29,26 +116,37 @@ pub struct EstimateSection {
     /// Why the estimate is doubtful, if it is.
     pub reason: Option<String>,
     /// Kx, non-dimensional.
-    pub kx: Option<Uncertain>,
+    pub kx: Option<EstimatedValue>,
     /// Ky, non-dimensional.
-    pub ky: Option<Uncertain>,
+    pub ky: Option<EstimatedValue>,
     /// Kz, non-dimensional.
-    pub kz: Option<Uncertain>,
+    pub kz: Option<EstimatedValue>,
     /// sqrt(Kx Ky)/Kz.
-    pub coupling: Option<Uncertain>,
+    pub coupling: Option<EstimatedValue>,
     /// Kt (N/m).
-    pub kt: Option<Uncertain>,
+    pub kt: Option<EstimatedValue>,
     /// Kr (N m/rad).
-    pub kr: Option<Uncertain>,
+    pub kr: Option<EstimatedValue>,
     /// Ktr (N/rad).
-    pub ktr: Option<Uncertain>,
+    pub ktr: Option<EstimatedValue>,
     /// Young's modulus (Pa).
-    pub modulus: Option<Uncertain>,
+    pub modulus: Option<EstimatedValue>,
     /// Density (kg/m3).
-    pub density: Option<Uncertain>,
+    pub density: Option<EstimatedValue>,
     /// The beam that belongs to the joint: as described but for what was estimated of it; null of a closed
     /// form.
     pub beam: Option<Beam>,
+    /// What the model itself may miss: one standard deviation of each frequency (%). Null of a closed form and with relative
+    /// weights.
+    pub discrepancy_percent: Option<f64>,
+    /// Where the fit moved the uncertain properties of the description.
+    pub description: Vec<DescriptionRow>,
+    /// What further measurements would make of the standard deviations.
+    pub remedies: Vec<RemedyRow>,
+    /// The mode that was left out because it does not belong to the others; null where all belong together.
+    pub left_out: Option<LeftOutRow>,
+    /// Standard uncertainties that the description does not state, in words; null where all are stated.
+    pub assumed: Option<String>,
     /// Covariance of ln Kx and ln Ky, of a consistent estimate with both; scaled by the misfit where no
     /// uncertainty is stated.
     pub log_covariance: Option<[[f64; 2]; 2]>,
@@ -192,13 +290,13 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
                 method: EstimateMethod::Pairs,
                 modes_used: joint.modes_used.clone(),
                 reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
-                kx: joint.kx,
-                ky: joint.ky,
-                kz: joint.kz,
-                coupling: joint.coupling,
-                kt: joint.kt,
-                kr: joint.kr,
-                ktr: joint.ktr,
+                kx: joint.kx.map(EstimatedValue::of),
+                ky: joint.ky.map(EstimatedValue::of),
+                kz: joint.kz.map(EstimatedValue::of),
+                coupling: joint.coupling.map(EstimatedValue::of),
+                kt: joint.kt.map(EstimatedValue::of),
+                kr: joint.kr.map(EstimatedValue::of),
+                ktr: joint.ktr.map(EstimatedValue::of),
                 pairs: Some(PairsSection {
                     kx: joint.pairs.kx,
                     ky: joint.pairs.ky,
@@ -216,8 +314,8 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
         Estimate::FreeBeam(free) => EstimateSection {
             method: EstimateMethod::FreeBeam,
             modes_used: free.modes_used.clone(),
-            modulus: Some(free.modulus),
-            density: Some(free.density),
+            modulus: Some(EstimatedValue::of(free.modulus)),
+            density: Some(EstimatedValue::of(free.density)),
             free_beam: Some(FreeBeamSection {
                 modulus: free.modulus.value,
                 density: free.density.value,
@@ -239,15 +337,34 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
     };
     let closed = closed.unwrap_or_default();
     Some(EstimateSection {
+        assumed: Some(found.assumed.clone()).filter(|assumed| !assumed.is_empty()),
+        left_out: found.left_out.as_ref().map(|left_out| {
+            let with_all = |quantity: Quantity| {
+                let found = value(&left_out.with_all, None, quantity);
+                found.map(|found| found.uncertain)
+            };
+            LeftOutRow {
+                mode: left_out.found.mode,
+                error_percent: left_out.found.percent,
+                deviations: left_out.found.deviations,
+                kt: with_all(Quantity::Kt),
+                kr: with_all(Quantity::Kr),
+                modulus: with_all(Quantity::Modulus),
+            }
+        }),
         pairs: closed.pairs,
         free_beam: closed.free_beam,
         single_modes: closed.single_modes,
-        ..consistent_section(consistent)
+        ..consistent_section(consistent, found.from_readings.as_deref())
     })
 }
 
 /// The main estimate; what stands beside it is added by the caller.
-fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
+fn consistent_section(
+    found: &ConsistentEstimate,
+    from_readings: Option<&ConsistentEstimate>,
+) -> EstimateSection {
+    let value = |quantity: Quantity| value(found, from_readings, quantity);
     let goodness = &found.goodness;
     EstimateSection {
         method: EstimateMethod::Consistent,
@@ -261,15 +378,19 @@ fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
                 times(factor)
             )
         }),
-        kx: value(found, Quantity::Kx),
-        ky: value(found, Quantity::Ky),
-        kz: value(found, Quantity::Kz),
-        coupling: value(found, Quantity::Coupling),
-        kt: value(found, Quantity::Kt),
-        kr: value(found, Quantity::Kr),
-        ktr: value(found, Quantity::Ktr),
-        modulus: asked(found, Quantity::Modulus),
-        density: asked(found, Quantity::Density),
+        kx: value(Quantity::Kx),
+        ky: value(Quantity::Ky),
+        kz: value(Quantity::Kz),
+        coupling: value(Quantity::Coupling),
+        kt: value(Quantity::Kt),
+        kr: value(Quantity::Kr),
+        ktr: value(Quantity::Ktr),
+        // A property with a tolerance is fitted along without being asked for.
+        modulus: value(Quantity::Modulus).filter(|_| is_asked(found, Quantity::Modulus)),
+        density: value(Quantity::Density).filter(|_| is_asked(found, Quantity::Density)),
+        discrepancy_percent: (found.discrepancy > 0.0).then_some(100.0 * found.discrepancy),
+        description: description(found),
+        remedies: remedies(found),
         correlations: found.correlations.clone(),
         beam: Some(found.beam),
         log_covariance: found.stiffness_covariance,
@@ -287,34 +408,85 @@ fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
 
 /// Returns the value of an estimated quantity. A rigid joint is infinite in the tables and null in JSON; a value at the
 /// edge of its range has no standard deviation.
-fn value(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
-    let quantity = found.quantity(quantity)?;
-    let rigid = quantity.limit == Some(Limit::Rigid) || quantity.value.is_none();
-    let spring = !matches!(
-        quantity.quantity,
-        Quantity::Coupling | Quantity::Kz | Quantity::Ktr
-    );
-    if quantity.value.is_none() && !spring {
+fn value(
+    found: &ConsistentEstimate,
+    from_readings: Option<&ConsistentEstimate>,
+    quantity: Quantity,
+) -> Option<EstimatedValue> {
+    let estimated = found.quantity(quantity)?;
+    let exact = from_readings.and_then(|exact| exact.quantity(quantity));
+    // The readings scaled by the misfit, which the headline holds already where it has a discrepancy.
+    let scaled = exact.filter(|_| found.goodness.uncertainty_factor().is_some());
+    let scaled = scaled.unwrap_or(estimated);
+    let rigid = estimated.limit == Some(Limit::Rigid) || estimated.value.is_none();
+    let spring = !matches!(quantity, Quantity::Coupling | Quantity::Kz | Quantity::Ktr);
+    if estimated.value.is_none() && !spring {
         return None;
     }
     let rigid = rigid && spring;
-    let scaled = quantity.scaled.filter(|_| !rigid);
-    Some(Uncertain {
-        value: quantity.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
-        std: quantity.std.filter(|_| !rigid),
-        low: quantity.low,
-        high: quantity.high,
-        std_scaled: quantity.std_scaled.filter(|_| !rigid),
-        low_scaled: scaled.map(|scaled| scaled.0),
-        high_scaled: scaled.map(|scaled| scaled.1),
-        at_least: quantity.at_least,
-        at_most: quantity.at_most,
+    let limits = scaled.scaled.filter(|_| !rigid);
+    let contributions = found.budget.iter().filter_map(|entry| {
+        let mut stds = entry.stds.iter();
+        let (_, std) = stds.find(|(of, _)| *of == quantity)?;
+        Some(BudgetRow {
+            input: entry.input.name().to_owned(),
+            std_percent: 100.0 * std,
+        })
+    });
+    let mut budget: Vec<BudgetRow> = contributions.collect();
+    budget.sort_by(|a, b| b.std_percent.total_cmp(&a.std_percent));
+    Some(EstimatedValue {
+        uncertain: Uncertain {
+            value: estimated.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
+            std: estimated.std.filter(|_| !rigid),
+            low: estimated.low,
+            high: estimated.high,
+            std_scaled: scaled.std_scaled.filter(|_| !rigid),
+            low_scaled: limits.map(|limits| limits.0),
+            high_scaled: limits.map(|limits| limits.1),
+            at_least: estimated.at_least,
+            at_most: estimated.at_most,
+        },
+        from_readings: exact.map(|exact| {
+            let is_rigid = spring && exact.limit == Some(Limit::Rigid);
+            FromReadings {
+                value: exact.value.filter(|_| !is_rigid),
+                std: exact.std.filter(|_| !is_rigid),
+                low: exact.low,
+                high: exact.high,
+            }
+        }),
+        budget,
     })
 }
 
-/// Returns the value of a quantity that was asked for: a property with a tolerance is fitted along without that.
-fn asked(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
-    value(found, quantity).filter(|_| is_asked(found, quantity))
+fn description(found: &ConsistentEstimate) -> Vec<DescriptionRow> {
+    let pulls = found.description.iter();
+    let rows = pulls.map(|pull| DescriptionRow {
+        input: pull.input.name().to_owned(),
+        stated: pull.stated,
+        fitted: pull.fitted,
+        pull: pull.pull,
+    });
+    rows.collect()
+}
+
+fn remedies(found: &ConsistentEstimate) -> Vec<RemedyRow> {
+    let remedies = found.remedies.iter();
+    let rows = remedies.map(|remedy| {
+        let percent = |quantity: Quantity| {
+            let mut stds = remedy.stds.iter();
+            let found = stds.find(|(of, _)| *of == quantity);
+            found.map(|(_, std)| 100.0 * std)
+        };
+        RemedyRow {
+            measure: remedy.measure,
+            kt_percent: percent(Quantity::Kt),
+            kr_percent: percent(Quantity::Kr),
+            modulus_percent: percent(Quantity::Modulus),
+        }
+    });
+    rows.collect()
 }
 
 fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {

@@ -2,13 +2,14 @@
 
 use super::{Cell, Table, listed, mode_of, number, page_number, words};
 use crate::document::{
-    Document, EstimateMethod, EstimateSection, ResolutionSpanSection, SensitivitySection, Uncertain,
+    BudgetRow, Document, EstimateMethod, EstimateSection, FromReadings, ResolutionSpanSection,
+    SensitivitySection, Uncertain,
 };
 use crate::format::{
     MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
     rounded_to, signed, signed_percent, significant, trimmed, unit_words,
 };
-use tapjoint_identify::consistent::{Correlation, Parameter as Fitted};
+use tapjoint_identify::consistent::{Correlation, Measure, Parameter as Fitted};
 
 /// Most significant digits of an estimate.
 const MOST_DIGITS: i32 = 5;
@@ -23,8 +24,12 @@ pub struct Parameter<'a> {
     pub meaning: &'static str,
     /// SI unit; "1" for a number.
     pub unit: &'static str,
-    /// The value.
+    /// The value, with all that is uncertain.
     pub value: &'a Uncertain,
+    /// The value by the readings alone.
+    pub from_readings: Option<&'a FromReadings>,
+    /// What each input contributes.
+    pub budget: &'a [BudgetRow],
 }
 
 /// Returns the estimated quantities, those with SI units first.
@@ -48,12 +53,15 @@ pub fn estimated(estimate: &EstimateSection) -> Vec<Parameter<'_>> {
     ];
     let all = all.into_iter();
     all.filter_map(|(name, symbol, meaning, unit, value)| {
+        let value = value.as_ref()?;
         Some(Parameter {
             name,
             symbol,
             meaning,
             unit,
-            value: value.as_ref()?,
+            value: &value.uncertain,
+            from_readings: value.from_readings.as_ref(),
+            budget: &value.budget,
         })
     })
     .collect()
@@ -81,33 +89,29 @@ impl Parameter<'_> {
         [shown, or_missing(std), low, high, unit]
     }
 
-    /// Standard deviation scaled by the misfit, in the unit of the value.
-    pub fn written_scaled(&self) -> String {
-        let scaled = self.value.std_scaled;
-        let scaled = scaled.filter(|std| std.is_finite() && *std > 0.0);
-        or_missing(scaled.and_then(|_| self.written_together().uncertainty))
-    }
-
-    /// Value and standard deviation, the scaled one where there are two, rounded together.
+    /// Value and standard deviation, rounded together.
     pub fn written_together(&self) -> Rounded {
         let (factor, _) = self.scale();
         let value = factor * self.value.value;
-        let std = self.value.std_scaled.or(self.value.std);
-        rounded_to(value, std.map(|std| factor * std), self.finest_place(value))
+        let std = self.value.std.map(|std| factor * std);
+        rounded_to(value, std, self.finest_place(value))
     }
 
-    /// The 95 % limits scaled by the misfit, in the unit of the value; `None` where there are none.
-    pub fn written_scaled_limits(&self) -> Option<[String; 2]> {
+    /// The 95 % limits by the readings alone, in the unit of the value; a dash where there is none.
+    pub fn written_from_readings(&self) -> [String; 2] {
         let (factor, _) = self.scale();
-        let value = factor * self.value.value;
-        let (low, high) = self.value.low_scaled.zip(self.value.high_scaled)?;
-        let std = self.value.std_scaled.map(|std| factor * std);
-        // Ends farther apart than the value is large share no digit: each has its own two.
-        let wide = factor * (high - low) > value.abs();
-        Some([low, high].map(|limit| match wide {
-            true => significant(factor * limit, 2),
-            false => rounded_to(factor * limit, std, self.finest_place(value)).value,
-        }))
+        let Some(found) = self.from_readings else {
+            return [MISSING, MISSING].map(str::to_owned);
+        };
+        let std = found.std.map(|std| factor * std);
+        let ends = found.low.zip(found.high);
+        let spread = ends.map(|(low, high)| factor * (high - low) / 4.0);
+        [found.low, found.high].map(|limit| {
+            or_missing(limit.map(|limit| {
+                let limit = factor * limit;
+                rounded_to(limit, std.or(spread), self.finest_place(limit)).value
+            }))
+        })
     }
 
     /// Place of the last digit that is shown: no stiffness is known to more than five digits.
@@ -132,47 +136,38 @@ impl Parameter<'_> {
 pub fn parameters(document: &Document) -> Option<Table> {
     let estimate = document.estimate.as_ref()?.as_ref()?;
     let list = estimated(estimate);
-    let misses = list.iter().any(|p| p.value.std_scaled.is_some());
-    let stated = !misses || list.iter().any(|p| p.value.std.is_some());
+    let both = list.iter().any(|p| p.from_readings.is_some());
     let mut rows = Vec::new();
     for parameter in &list {
         let [value, std, low, high, unit] = parameter.written();
         let name = parameter.symbol.to_owned();
         let meaning = parameter.meaning.to_owned();
-        let scaled = parameter.written_scaled();
-        let limits = parameter.written_scaled_limits();
-        // With a misfit, limits from the readings alone would be too narrow.
-        let [from, to] = limits.unwrap_or_else(|| match misses {
-            true => [MISSING.to_owned(), MISSING.to_owned()],
-            false => [low.clone(), high.clone()],
-        });
-        rows.push(vec![
-            name, meaning, value, unit, std, scaled, low, high, from, to,
-        ]);
+        let [from, to] = parameter.written_from_readings();
+        rows.push(vec![name, meaning, value, unit, std, low, high, from, to]);
     }
-    let scaled_note = match (misses, stated) {
-        (false, _) => "",
-        (true, true) => {
-            " The model misses the frequencies by more than their uncertainty. So the scaled std and the 95 % limits take \
-             the misfit for the uncertainty, by Student's distribution. Std and the limits from the readings stand for \
-             the frequencies' uncertainty alone."
+    let beyond = match (estimate.discrepancy_percent, estimate.method) {
+        (Some(percent), _) => format!(
+            " The limits hold the readings, the tolerances of the description, and {} % that the model may miss of each \
+             frequency. Readings: the limits with an exact description and an exact model.",
+            significant(percent, 2)
+        ),
+        (None, EstimateMethod::Consistent) => {
+            " All frequencies weigh alike. Std and limits are those of the misfit, by \
+             Student's distribution."
+                .to_owned()
         }
-        (true, false) => {
-            " Not every frequency has an uncertainty, so all weigh alike. The scaled std and the 95 % limits take the \
-             misfit for the uncertainty, by Student's distribution."
-        }
+        (None, _) => String::new(),
     };
     let heads = [
         words("Parameter", ""),
-        words("Meaning", "").on_page_if(misses),
+        words("Meaning", "").on_page_if(both),
         number("Value", ""),
         words("Unit", ""),
         number("Std", ""),
-        number("Scaled std", ""),
-        page_number("Readings low", ""),
-        page_number("Readings high", ""),
         number("95 % low", ""),
         number("95 % high", ""),
+        page_number("Readings low", ""),
+        page_number("Readings high", ""),
     ];
     let caption = format!("Estimated parameters, method: {}", estimate.method.name());
     let mut modes = format!("From modes {}", listed(&estimate.modes_used));
@@ -185,14 +180,94 @@ pub fn parameters(document: &Document) -> Option<Table> {
     }
     let set_ups = set_up_words(estimate).unwrap_or_default();
     let note = format!(
-        "{modes}.{set_ups} Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{scaled_note}"
+        "{modes}.{set_ups} Std and limits are in the value's unit; \u{2013} means unknown or unbounded.{beyond}"
     );
     let table = Table::with_heads(caption, heads, rows, note);
-    Some(match (misses, stated) {
-        (false, _) => table.without_columns(&["Scaled std", "Readings low", "Readings high"]),
-        (true, false) => table.without_columns(&["Readings low", "Readings high"]),
-        (true, true) => table,
+    Some(match both {
+        true => table,
+        false => table.without_columns(&["Readings low", "Readings high"]),
     })
+}
+
+/// What each input contributes to the standard deviations; `None` without a budget.
+pub fn budget(document: &Document) -> Option<Table> {
+    let estimate = document.estimate.as_ref()?.as_ref()?;
+    let list = estimated(estimate);
+    let columns: Vec<&Parameter<'_>> = list
+        .iter()
+        .filter(|one| !one.budget.is_empty() && !matches!(one.name, "kx" | "ky"))
+        .collect();
+    let first = columns.first()?;
+    let mut rows = Vec::new();
+    for input in first.budget {
+        let mut row = vec![input_words(&input.input)];
+        row.extend(columns.iter().map(|column| {
+            let mut budget = column.budget.iter();
+            let own = budget.find(|own| own.input == input.input);
+            or_missing(own.map(|own| significant(own.std_percent, 2)))
+        }));
+        rows.push(row);
+    }
+    let mut total = vec!["together".to_owned()];
+    total.extend(columns.iter().map(|column| {
+        let squares: f64 = column
+            .budget
+            .iter()
+            .map(|own| own.std_percent.powi(2))
+            .sum();
+        significant(squares.sqrt(), 2)
+    }));
+    rows.push(total);
+    for remedy in &estimate.remedies {
+        let mut row = vec![remedy_words(remedy.measure).to_owned()];
+        row.extend(columns.iter().map(|column| {
+            let percent = match column.name {
+                "kt" => remedy.kt_percent,
+                "kr" => remedy.kr_percent,
+                "modulus" => remedy.modulus_percent,
+                _ => None,
+            };
+            or_missing(percent.map(|percent| significant(percent, 2)))
+        }));
+        rows.push(row);
+    }
+    let mut heads = vec![words("Input", "")];
+    heads.extend(
+        columns
+            .iter()
+            .map(|column| number(&format!("{} (%)", column.symbol), "")),
+    );
+    let assumed = estimate.assumed.as_ref();
+    let assumed = assumed.map_or(String::new(), |assumed| format!(" Assumed: {assumed}."));
+    let note = format!(
+        "Part of each input in the standard deviation; the squares add up. Below: all together after one more \
+         measurement.{assumed}"
+    );
+    let caption = "What the uncertainty comes from";
+    Some(Table::with_heads(caption, heads, rows, &note))
+}
+
+/// An input of the budget in words.
+fn input_words(input: &str) -> String {
+    match input {
+        "readings" => "readings of the frequencies".to_owned(),
+        "discrepancy" => "what the model misses".to_owned(),
+        "weighing" => "mass of the bar".to_owned(),
+        "set-ups" => "differences between set-ups".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+/// A further measurement in words.
+pub fn remedy_words(measure: Measure) -> &'static str {
+    match measure {
+        Measure::WeighBeam => "with the bar weighed to 0.1 %",
+        Measure::FreeTest => "with five modes of the free bar",
+        Measure::Caliper => {
+            "with thickness \u{b1}0.01 mm, width \u{b1}0.02 mm, length \u{b1}0.2 mm"
+        }
+        Measure::WeighMasses => "with what is attached weighed to 0.1 g",
+    }
 }
 
 /// A correlation in words: "Kr and E", "\u{2212}0.97".
@@ -237,7 +312,7 @@ pub fn methods(document: &Document) -> Option<Table> {
         ("Ky", &estimate.ky, pairs.ky),
         ("Kz", &estimate.kz, pairs.kz),
     ] {
-        let own = own.as_ref().map(|value| value.value);
+        let own = own.as_ref().map(|value| value.uncertain.value);
         if own.is_some() || pairs.is_some() {
             rows.push(vec![
                 name.to_owned(),
@@ -294,7 +369,8 @@ fn base(document: &Document, method: EstimateMethod) -> [Option<f64>; 3] {
     };
     match &estimate.pairs {
         Some(pairs) if method == EstimateMethod::Pairs => [pairs.kx, pairs.ky, pairs.kz],
-        _ => [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| Some(value.as_ref()?.value)),
+        _ => [&estimate.kx, &estimate.ky, &estimate.kz]
+            .map(|value| Some(value.as_ref()?.uncertain.value)),
     }
 }
 

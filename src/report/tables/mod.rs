@@ -8,8 +8,8 @@ mod recordings;
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;
 pub use joint::{
-    Parameter, averages, correlation_words, correlations, estimated, methods, monte_carlo, pairs,
-    parameters, perturbation, sensitivity, set_up_words, spans,
+    Parameter, averages, budget, correlation_words, correlations, estimated, methods, monte_carlo,
+    pairs, parameters, perturbation, sensitivity, set_up_words, spans,
 };
 pub use modes::{
     fitted_to, frfs, left_out, lengths, mode_details, modes, modes_from, prediction,

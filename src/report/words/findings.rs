@@ -42,10 +42,13 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
         true => "Joint",
         false => "Beam",
     };
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let assumed = estimate.and_then(|estimate| estimate.assumed.clone());
     let lines = [
         ("Taps", taps_and_channels),
         ("Modes", modes_in_short(document)),
         (sought, joint(document)),
+        ("Assumed", assumed),
         ("Model", model),
         ("Doubts", computed.then_some(warnings + &checks)),
         ("Next", described(document)),
@@ -134,26 +137,19 @@ fn behind(parameter: &Parameter<'_>, unit: &str) -> String {
     }
 }
 
-/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
-/// gives limits these are written, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+/// "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
 fn with_bounds(parameter: &Parameter<'_>) -> String {
-    let [value, _, _, _, unit] = parameter.written();
-    let unit = behind(parameter, &unit);
-    let rounded = parameter.written_together();
-    if let Some([low, high]) = parameter.written_scaled_limits() {
-        let own = format!("{} = {}{unit}", parameter.symbol, rounded.value);
-        let limits = format!("(95 %: {low} to {high})");
-        return [own, limits]
-            .map(|part| part.replace(' ', "\u{a0}"))
-            .join(" ");
-    }
-    let shown = if rounded.uncertainty.is_some() {
-        rounded.joined()
-    } else {
-        value
+    let [value, _, low, high, unit] = parameter.written();
+    let own = format!("{} = {value}{}", parameter.symbol, behind(parameter, &unit));
+    let limits = match (parameter.value.low, parameter.value.high) {
+        (Some(_), Some(_)) => format!("(95 %: {low} to {high})"),
+        (Some(_), None) => format!("(95 %: above {low})"),
+        (None, Some(_)) => format!("(95 %: below {high})"),
+        (None, None) => String::new(),
     };
     // A number stays on the line of its unit.
-    format!("{} = {shown}{unit}", parameter.symbol).replace(' ', "\u{a0}")
+    let parts = [own, limits].map(|part| part.replace(' ', "\u{a0}"));
+    parts.join(" ").trim_end().to_owned()
 }
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -280,12 +276,11 @@ fn estimate(document: &Document) -> Option<String> {
     Some(format!("{}.{doubt}", capital(&physical.join("; "))))
 }
 
-/// "translational stiffness Kt = 1.79 MN/m (95 %: 1.60 to 2.01, scaled by the misfit; from the frequencies' uncertainty
-/// alone 1.7890 to 1.7908)": what may be trusted first.
+/// "translational stiffness Kt = 1.79 MN/m (95 %: 1.60 to 2.01; from the readings alone 1.7890 to 1.7908)".
 fn stiffness(parameter: &Parameter<'_>) -> String {
-    let [exact, _, low, high, unit] = parameter.written();
+    let [value, _, low, high, unit] = parameter.written();
     let unit = behind(parameter, &unit.replace(' ', "\u{a0}"));
-    let own = match (parameter.value.low, parameter.value.high) {
+    let limits = match (parameter.value.low, parameter.value.high) {
         // More digits of a stiffness than that say nothing; how narrow the interval is does.
         (Some(from), Some(to)) if low == high && to > from && parameter.value.value != 0.0 => {
             format!(
@@ -298,27 +293,9 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
         (None, Some(_)) => format!("below {high}"),
         (None, None) => String::new(),
     };
-    let alone = match own.is_empty() {
+    let interval = match limits.is_empty() {
         true => String::new(),
-        false => format!("; from the frequencies' uncertainty alone {own}"),
-    };
-    let (value, interval) = match (
-        parameter.value.std_scaled,
-        parameter.written_scaled_limits(),
-    ) {
-        (Some(_), Some([low, high])) => (
-            parameter.written_together().value,
-            format!(" (95 %: {low} to {high}, scaled by the misfit{alone})"),
-        ),
-        (Some(_), None) => (
-            parameter.written_together().value,
-            format!(
-                " (standard deviation scaled by the misfit {}{unit}{alone})",
-                parameter.written_scaled()
-            ),
-        ),
-        (None, _) if own.is_empty() => (exact, String::new()),
-        (None, _) => (exact, format!(" (95 %: {own})")),
+        false => format!(" (95 %: {limits})"),
     };
     format!(
         "{} {}\u{a0}=\u{a0}{value}{unit}{interval}",
@@ -355,12 +332,11 @@ fn misfit(document: &Document) -> Option<String> {
     ))
 }
 
-/// Returns the spans of the stiffness if frequencies were read on lines only. `None` beside limits scaled by the
-/// misfit, which are wider: the spans would look like the uncertainty of the joint.
+/// Returns the spans of the stiffness if frequencies were read on lines only. `None` where the model misses the
+/// frequencies by more: the spans would look like the uncertainty of the joint.
 fn resolution(document: &Document) -> Option<String> {
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
-    let parameters = estimate.map(estimated).unwrap_or_default();
-    if parameters.iter().any(|one| one.value.std_scaled.is_some()) {
+    if estimate.is_some_and(|estimate| estimate.reason.is_some()) {
         return None;
     }
     let main = estimate.map(|estimate| estimate.method);

@@ -225,15 +225,15 @@ fn modes() -> Vec<ModeSection> {
     modes
 }
 
-fn value(value: f64, relative: f64) -> Option<Uncertain> {
+fn value(value: f64, relative: f64) -> Option<EstimatedValue> {
     let std = relative * value;
-    Some(Uncertain {
+    Some(EstimatedValue::of(Uncertain {
         value,
         std: Some(std),
         low: Some(value - 1.96 * std),
         high: Some(value + 1.96 * std),
         ..Uncertain::default()
-    })
+    }))
 }
 
 fn estimate() -> EstimateSection {

@@ -1,0 +1,321 @@
+//! Estimates from a description that is not exact: coverage, budget, and what further measurements bring.
+
+#[path = "../../examples/description_coverage/worlds.rs"]
+mod worlds;
+
+use statrs::distribution::{Binomial, DiscreteCDF};
+use tapjoint::identify::MeasuredMode;
+use tapjoint::identify::consistent::{
+    AttachmentTolerance, BeamTolerances, BudgetInput, ConsistentEstimate, ConsistentEstimator,
+    ConsistentSettings, FrequencyModel, JointedStructure, LEAST_DISCREPANCY, Measure, MovedClamp,
+    Parameter, Quantity, WeighedBeam,
+};
+use tapjoint::structure::specimen::PointMass;
+use tapjoint::structure::{Assembly, Beam, BeamTheory};
+use worlds::{Answer, Kind, World, answers};
+
+/// Chance at which a test fails although the intervals are true.
+const CHANCE: f64 = 1e-3;
+
+fn strip() -> Beam {
+    Beam {
+        length: 0.423,
+        width: 0.05,
+        thickness: 0.005,
+        modulus: 207e9,
+        density: 7850.0,
+        poisson: 0.3,
+    }
+}
+
+/// The strip on a joint, with a sensor of 24 g.
+fn loaded() -> JointedStructure {
+    let mut structure = JointedStructure::new(BeamTheory::Euler, strip(), Assembly::Cantilever);
+    structure.masses = vec![PointMass::new(0.338, 0.024)];
+    structure
+}
+
+/// The first `count` modes of a structure on Kt = 1.4 MN/m and Kr = 900 N m/rad, known to 0.02 %.
+fn modes_of(structure: &JointedStructure, count: usize) -> Vec<MeasuredMode> {
+    let model = FrequencyModel::new(structure, count).unwrap();
+    let mut point = model.nominal();
+    point[Parameter::Kt as usize] = 1.4e6f64.ln();
+    point[Parameter::Kr as usize] = 900f64.ln();
+    let modes = 1..=count;
+    modes
+        .map(|mode| {
+            let frequency = model.response(&point, mode, 3.1 * mode as f64).frequency;
+            MeasuredMode {
+                mode,
+                frequency,
+                std: Some(2e-4 * frequency),
+            }
+        })
+        .collect()
+}
+
+fn uncertain() -> ConsistentSettings {
+    let mut settings = ConsistentSettings::two_parameter();
+    settings.tolerances = BeamTolerances {
+        length: Some(0.0012),
+        width: Some(0.002),
+        thickness: Some(0.005),
+        modulus: Some(0.01),
+        density: Some(0.005),
+    };
+    settings.attachments = vec![AttachmentTolerance {
+        name: "A".to_owned(),
+        mass: 0.5e-3,
+        position: 1e-3,
+    }];
+    settings.discrepancy = true;
+    settings
+}
+
+fn estimated(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> ConsistentEstimate {
+    let estimator = ConsistentEstimator::new(structure, modes, settings).unwrap();
+    estimator.settled().estimate().unwrap()
+}
+
+/// Relative standard deviation.
+fn relative_std(estimate: &ConsistentEstimate, quantity: Quantity) -> f64 {
+    let found = estimate.quantity(quantity).unwrap();
+    found.std.unwrap() / found.value.unwrap()
+}
+
+fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    let error = (found / expected - 1.0).abs();
+    assert!(error < tolerance, "{what}: {found} for {expected}");
+}
+
+#[test]
+fn prop_the_budget_adds_up_to_the_whole() {
+    let structure = loaded();
+    let estimate = estimated(&structure, &modes_of(&structure, 5), &uncertain());
+    for quantity in [Quantity::Kt, Quantity::Kr] {
+        let parts = estimate.budget.iter().filter_map(|entry| {
+            let mut stds = entry.stds.iter();
+            stds.find(|(of, _)| *of == quantity)
+                .map(|(_, std)| std * std)
+        });
+        let whole = parts.sum::<f64>().sqrt();
+        // Both are first order; only rounding differs.
+        assert_close(
+            whole,
+            relative_std(&estimate, quantity),
+            1e-6,
+            quantity.name(),
+        );
+    }
+    let names: Vec<&str> = estimate
+        .budget
+        .iter()
+        .map(|entry| entry.input.name())
+        .collect();
+    let expected = [
+        "readings",
+        "discrepancy",
+        "modulus",
+        "density",
+        "length",
+        "width",
+        "thickness",
+        "mass of A",
+        "position of A",
+    ];
+    assert_eq!(names, expected);
+}
+
+#[test]
+fn val_an_uncertain_mass_moves_the_joint_as_another_mass_does() {
+    // As many modes as stiffnesses: the estimate follows each change of the description in full.
+    let structure = loaded();
+    let modes = modes_of(&structure, 2);
+    let mut settings = ConsistentSettings::two_parameter();
+    settings.attachments = uncertain().attachments;
+    let estimate = estimated(&structure, &modes, &settings);
+    let mut moved = [structure.clone(), structure.clone()];
+    moved[0].masses[0].mass += 0.5e-3;
+    moved[1].masses[0].position += 1e-3;
+    let names = ["mass of A", "position of A"];
+    for (other, name) in moved.iter().zip(names) {
+        let there = estimated(other, &modes, &ConsistentSettings::two_parameter());
+        for quantity in [Quantity::Kt, Quantity::Kr] {
+            let values =
+                [&estimate, &there].map(|one| one.quantity(quantity).unwrap().value.unwrap());
+            let expected = (values[1] / values[0]).ln().abs();
+            let mut budget = estimate.budget.iter();
+            let entry = budget.find(|entry| entry.input.name() == name).unwrap();
+            let (_, found) = entry.stds.iter().find(|(of, _)| *of == quantity).unwrap();
+            // What the second order of such changes leaves.
+            assert_close(
+                *found,
+                expected,
+                0.03,
+                &format!("{name}, {}", quantity.name()),
+            );
+        }
+    }
+}
+
+#[test]
+fn limit_an_exact_description_leaves_the_readings() {
+    let structure = loaded();
+    let modes = modes_of(&structure, 5);
+    let plain = ConsistentSettings::two_parameter();
+    let mut exact = plain.clone();
+    exact.tolerances = BeamTolerances {
+        modulus: Some(0.0),
+        ..BeamTolerances::default()
+    };
+    exact.attachments = vec![AttachmentTolerance {
+        name: "A".to_owned(),
+        mass: 0.0,
+        position: 0.0,
+    }];
+    let both = [plain, exact].map(|settings| estimated(&structure, &modes, &settings));
+    assert_eq!(both[0].quantities, both[1].quantities);
+    assert_eq!((both[1].discrepancy, both[1].description.len()), (0.0, 0));
+}
+
+#[test]
+fn val_what_a_measurement_would_bring_is_what_it_brings() {
+    let structure = loaded();
+    let modes = modes_of(&structure, 5);
+    let settings = uncertain();
+    let before = estimated(&structure, &modes, &settings);
+    let promised = |measure: Measure, quantity: Quantity| {
+        let mut remedies = before.remedies.iter();
+        let remedy = remedies.find(|remedy| remedy.measure == measure).unwrap();
+        remedy
+            .stds
+            .iter()
+            .find(|(of, _)| *of == quantity)
+            .unwrap()
+            .1
+    };
+    let mut weighed = settings.clone();
+    weighed.weighed = Some(WeighedBeam {
+        mass: strip().mass(),
+        std: 1e-3 * strip().mass(),
+        length: strip().length,
+    });
+    let mut calipered = settings.clone();
+    calipered.tolerances.thickness = Some(1e-5 / 0.005);
+    calipered.tolerances.width = Some(2e-5 / 0.05);
+    calipered.tolerances.length = Some(2e-4 / 0.423);
+    for quantity in [Quantity::Kt, Quantity::Kr] {
+        let found = relative_std(&estimated(&structure, &modes, &weighed), quantity);
+        // The size of the discrepancy is sought anew; the data are the same.
+        assert_close(
+            promised(Measure::WeighBeam, quantity),
+            found,
+            0.02,
+            "balance",
+        );
+        let found = relative_std(&estimated(&structure, &modes, &calipered), quantity);
+        // A caliper adds to what was known, here it takes its place.
+        let promise = promised(Measure::Caliper, quantity);
+        assert!(
+            (0.9..1.02).contains(&(promise / found)),
+            "caliper: {promise}, {found}"
+        );
+    }
+    // Five modes of the free bar, right to the least discrepancy.
+    let free = JointedStructure::new(BeamTheory::Euler, strip(), Assembly::Free);
+    let test = MovedClamp {
+        modes: modes_of(&free, 5)
+            .into_iter()
+            .map(|mode| MeasuredMode {
+                std: Some(1e-5 * mode.frequency),
+                ..mode
+            })
+            .collect(),
+        structure: free,
+    };
+    let estimator = ConsistentEstimator::of_lengths(&structure, &modes, &[test], &settings);
+    let with_test = estimator.unwrap().settled().estimate().unwrap();
+    let kt = relative_std(&with_test, Quantity::Kt);
+    // The free bar's length has a tolerance of its own, which the promise leaves out.
+    assert_close(
+        kt,
+        promised(Measure::FreeTest, Quantity::Kt),
+        0.15,
+        "free test",
+    );
+    assert!(kt < 0.8 * relative_std(&before, Quantity::Kt), "{kt}");
+}
+
+#[test]
+fn recover_a_wrong_modulus_is_pulled_and_the_joint_is_right() {
+    let mut soft = loaded();
+    soft.beam.modulus *= 0.97;
+    let estimate = estimated(&loaded(), &modes_of(&soft, 6), &uncertain());
+    let kt = estimate.quantity(Quantity::Kt).unwrap();
+    let (low, high) = (kt.low.unwrap(), kt.high.unwrap());
+    assert!(low < 1.4e6 && 1.4e6 < high, "{low} to {high}");
+    let mut pulls = estimate.description.iter();
+    let pull = pulls.find(|pull| pull.input == BudgetInput::Property(Parameter::Modulus));
+    // Three standard uncertainties, of which thickness, density and length take a share.
+    let pull = pull.unwrap().pull;
+    assert!((-3.0..-1.0).contains(&pull), "{pull}");
+}
+
+#[test]
+fn recover_the_size_of_what_the_model_misses() {
+    let structure = loaded();
+    let exact = modes_of(&structure, 7);
+    // Errors of 0.4 % that no joint makes: their signs alternate as no derivative does.
+    let signs = [1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0];
+    let missed: Vec<MeasuredMode> = exact
+        .iter()
+        .zip(signs)
+        .map(|(mode, sign)| MeasuredMode {
+            frequency: mode.frequency * (1.0 + 4e-3 * sign),
+            ..*mode
+        })
+        .collect();
+    let sizes =
+        [&exact, &missed].map(|modes| estimated(&structure, modes, &uncertain()).discrepancy);
+    // Seven modes say the size of a random error to a factor of two.
+    assert!(
+        (LEAST_DISCREPANCY..1.5 * LEAST_DISCREPANCY).contains(&sizes[0]),
+        "{sizes:?}"
+    );
+    assert!((2e-3..8e-3).contains(&sizes[1]), "{sizes:?}");
+}
+
+/// Intervals hold the truth as often as they say where the description errs as it says: a small version of
+/// `examples/description_coverage`.
+#[test]
+fn recover_intervals_hold_the_truth_where_the_description_errs() {
+    for (world, least) in [
+        (World::Normal, 0.93),
+        (World::Rectangular, 0.93),
+        (World::Missing, 0.89),
+    ] {
+        for kind in Kind::ALL {
+            let found = answers(kind, BeamTheory::Euler, world, 60, 7);
+            for quantity in kind.quantities() {
+                let own: Vec<&Answer> = found
+                    .iter()
+                    .filter(|one| one.quantity == *quantity)
+                    .collect();
+                let holds = own.iter().filter(|one| one.holds).count() as u64;
+                let few = Binomial::new(least, own.len() as u64).unwrap().cdf(holds);
+                let case = format!("{}, {}, {}", world.name(), kind.name(), quantity.name());
+                assert!(few > CHANCE, "{case}: {holds} of {}", own.len());
+                if *quantity != Quantity::Coupling {
+                    let mut lengths: Vec<f64> = own.iter().filter_map(|one| one.length).collect();
+                    lengths.sort_by(f64::total_cmp);
+                    let median = lengths[lengths.len() / 2];
+                    assert!(median < 1.3, "{case}: {median} times as long as needed");
+                }
+            }
+        }
+    }
+}

@@ -40,14 +40,14 @@ pub struct FrequencyAtAmplitude {
 
 /// Models of the decays of one mode after all taps.
 pub(super) struct WholeDecays<'a> {
-    models: &'a [(&'a Band, DecayModel)],
+    models: &'a [(Band, DecayModel)],
     /// Amplitude at the start of each decay.
     starts: Vec<f64>,
 }
 
 impl<'a> WholeDecays<'a> {
     /// Takes the models; `None` without one that has an amplitude.
-    pub fn new(models: &'a [(&'a Band, DecayModel)]) -> Option<Self> {
+    pub fn new(models: &'a [(Band, DecayModel)]) -> Option<Self> {
         let starts = models
             .iter()
             .map(|(band, model)| model.amplitude(-0.5 * band.filter, band));
@@ -71,18 +71,23 @@ impl<'a> WholeDecays<'a> {
         largest * sum / power
     }
 
+    /// Returns true where poles that drift explain the decays better than noise makes them.
+    pub fn changes(&self) -> bool {
+        let (mut fall, mut unknowns) = (0.0, 0.0);
+        for (_, model) in self.models {
+            fall += model.evidence.fall;
+            unknowns += model.evidence.unknowns;
+        }
+        unknowns > 0.0 && chi_square_tail(fall, unknowns) <= LEVEL
+    }
+
     /// Returns the frequency at the reference amplitude; `None` where the decays do not show that it changes.
     ///
     /// The decays that reach the amplitude have a frequency there. Their mean is weighted by the uncertainties. If they scatter beyond noise, the
     /// interval rests on the scatter, with Student's t. If they scatter so much that no law of the amplitude explains
     /// them, the interval holds all frequencies of the curve's `points` down to a tenth of the largest amplitude.
     pub fn drift(&self, points: &[AmplitudePoint]) -> Option<Drift> {
-        let (mut fall, mut unknowns) = (0.0, 0.0);
-        for (_, model) in self.models {
-            fall += model.evidence.fall;
-            unknowns += model.evidence.unknowns;
-        }
-        if unknowns == 0.0 || chi_square_tail(fall, unknowns) > LEVEL {
+        if !self.changes() {
             return None;
         }
         let reference = self.reference();

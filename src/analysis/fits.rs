@@ -441,6 +441,7 @@ impl FreeDecays {
             .map(|fit| KnownMode {
                 frequency: fit.mode.frequency.value,
                 damping_ratio: fit.mode.damping_ratio.value,
+                amplitude_part: fit.mode.amplitude_part,
             })
             .collect();
         let followed = follow_amplitude(&self.decays, &known, &steady);
@@ -486,9 +487,16 @@ impl FreeDecays {
             .collect();
         for (fit, again) in steady.into_iter().zip(fit_modes(&data, &starts, settings)) {
             let is_single = fit.mode.frequency.source != UncertaintySource::TwoPoles;
-            if let Some(again) = again.ok().filter(|_| is_single) {
-                fit.mode = again;
+            let Some(again) = again.ok().filter(|_| is_single) else {
+                continue;
+            };
+            if let Some(curve) = &mut fit.amplitude
+                && curve.drift.is_none()
+                && let [Some(part), Some(now)] = [&fit.mode, &again].map(|mode| mode.amplitude_part)
+            {
+                curve.reference = curve.reference.map(|amplitude| amplitude * now / part);
             }
+            fit.mode = again;
         }
     }
 

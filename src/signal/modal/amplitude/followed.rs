@@ -84,7 +84,7 @@ impl FollowedMode {
 
     /// Returns true where the decays show that the mode's frequency or damping changes.
     pub fn drifts(&self) -> bool {
-        WholeDecays::new(&self.decays).is_some_and(|whole| whole.changes())
+        WholeDecays::new(&self.decays, &self.mode).is_some_and(|whole| whole.changes())
     }
 
     /// Returns true where another mode lies in the band of this one, and is not one with it.
@@ -137,7 +137,7 @@ impl FollowedMode {
             companions: self.companions.clone(),
             ..AmplitudeCurve::without_points(Some(self.sensor))
         };
-        if let Some(whole) = WholeDecays::new(&self.decays) {
+        if let Some(whole) = WholeDecays::new(&self.decays, &self.mode) {
             curve.reference = Some(whole.reference());
             // Beside a mode so near, or where two poles that do not change explain the decays as well, nothing drifts. Hum
             // beats with the mode, which looks like a change.

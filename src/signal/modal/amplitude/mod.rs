@@ -57,6 +57,8 @@ pub struct KnownMode {
     pub frequency: f64,
     /// Damping ratio (1), within a factor of about three.
     pub damping_ratio: f64,
+    /// Part of its first amplitude at which it has that frequency; where it is not known, that of a fit of the whole decay.
+    pub amplitude_part: Option<f64>,
 }
 
 // Times below are shares of the decay time 1/sigma, or of a quarter of the record where that is shorter.

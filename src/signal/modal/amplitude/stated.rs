@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_numerics::stats::chi_square_tail;
 
-use super::AmplitudePoint;
+use super::{AmplitudePoint, KnownMode};
 use super::band::Band;
 use super::decay::DecayModel;
 use crate::modal::fit::{FittedValue, SCATTERS, UncertaintySource, scatter_about_mean};
@@ -43,32 +43,40 @@ pub(super) struct WholeDecays<'a> {
     models: &'a [(Band, DecayModel)],
     /// Amplitude at the start of each decay.
     starts: Vec<f64>,
+    /// Part of it at which a pole that does not change has the frequency of one that does.
+    part: f64,
 }
 
 impl<'a> WholeDecays<'a> {
-    /// Takes the models; `None` without one that has an amplitude.
-    pub fn new(models: &'a [(Band, DecayModel)]) -> Option<Self> {
+    /// Takes the models of a mode; `None` without one that has an amplitude.
+    pub fn new(models: &'a [(Band, DecayModel)], mode: &KnownMode) -> Option<Self> {
         let starts = models
             .iter()
             .map(|(band, model)| model.amplitude(-0.5 * band.filter, band));
         let starts: Vec<f64> = starts.collect();
         let are_finite = starts.iter().all(|start| start.is_finite());
         let usable = are_finite && starts.iter().any(|start| *start > 0.0);
-        usable.then_some(WholeDecays { models, starts })
+        let (band, _) = models.first()?;
+        let whole = || part(-band.decay * band.length);
+        usable.then(|| WholeDecays {
+            models,
+            starts,
+            part: mode.amplitude_part.unwrap_or_else(whole),
+        })
     }
 
     /// Returns the amplitude at which a mode has the frequency that the fit of a pole that does not change finds.
     ///
-    /// A tap counts by its power. Its part of the amplitude at the start is [`part`].
+    /// A tap counts by its power.
     pub fn reference(&self) -> f64 {
         let largest = self.starts.iter().copied().fold(0.0, f64::max);
         let (mut power, mut sum) = (0.0, 0.0);
-        for ((band, _), start) in self.models.iter().zip(&self.starts) {
+        for start in &self.starts {
             let relative: f64 = start / largest;
             power += relative.powi(2);
-            sum += part(-band.decay * band.length) * relative.powi(3);
+            sum += relative.powi(3);
         }
-        largest * sum / power
+        self.part * largest * sum / power
     }
 
     /// Returns true where poles that drift explain the decays better than noise makes them.
@@ -93,7 +101,7 @@ impl<'a> WholeDecays<'a> {
         let reference = self.reference();
         let (mut there, mut at_one_time, mut freedom) = (Vec::new(), Vec::new(), 0.0);
         for ((band, model), start) in self.models.iter().zip(&self.starts) {
-            let own = part(-band.decay * band.length) * start;
+            let own = self.part * start;
             // A decay that does not reach the amplitude says nothing of it.
             if let (Some(one), Some(other)) = (
                 model.frequency_at(reference, band),

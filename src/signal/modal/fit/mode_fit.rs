@@ -305,6 +305,9 @@ pub struct ModeFit {
     pub joint_with: Vec<usize>,
     /// Reason why the search ended.
     pub stop: StopReason,
+    /// Part of the first amplitude at which a mode that changes with its amplitude has this frequency; `None` where the
+    /// lines do not tell.
+    pub amplitude_part: Option<f64>,
     /// Amplitude in every column of the data that is not zero.
     pub amplitudes: Vec<ColumnAmplitude>,
 }
@@ -469,6 +472,7 @@ impl<'a> GroupReader<'a> {
             background_terms: fit.terms,
             joint_with: self.group.members.clone(),
             stop: fit.stop,
+            amplitude_part: fit.problem.amplitude_part(&fit.at, place),
             amplitudes: self.amplitudes(place),
         })
     }

@@ -232,12 +232,7 @@ fn mix_down(
 }
 
 /// Returns the poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
-fn neighbours(
-    modes: &[KnownMode],
-    index: usize,
-    stop: f64,
-    taken: &[usize],
-) -> Vec<Complex64> {
+fn neighbours(modes: &[KnownMode], index: usize, stop: f64, taken: &[usize]) -> Vec<Complex64> {
     let frequency = modes[index].frequency;
     let others = modes
         .iter()

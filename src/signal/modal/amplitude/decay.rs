@@ -49,6 +49,8 @@ const LEAST_VALUES: usize = 64;
 /// Most growth of a mode from the band's first value back to the beginning of its decay (log amplitude). 1: the filter is at
 /// most a third of a decay, and the damping is known within a factor of three.
 const MOST_GROWTH: f64 = 1.0;
+/// Most amplitude of a mode over the largest value of its band. 2: two lines of opposite sign that beat.
+const MOST_EXCESS: f64 = 2.0;
 /// Least decay beyond the last value above the noise (decays of the mode).
 const LEAST_FALL: f64 = 0.3;
 /// The exponent of a mode that can be followed bends by no more (rad) within half a segment.
@@ -64,6 +66,8 @@ pub(super) struct DecayModel {
     pub noise: f64,
     /// Time of the last value that is above the noise.
     last: f64,
+    /// Largest modulus of the values.
+    largest: f64,
     /// The models with what the best one found beside the mode, for every number of exponents from its own on.
     ways: Vec<Candidate>,
     /// How much better a pole that drifts explains the decay than one that does not.
@@ -106,6 +110,7 @@ impl DecayModel {
             band,
             noise,
         };
+        let largest = series.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
         let start = Exponentials {
             amplitude: series.first().copied().unwrap_or(Complex64::ONE),
             exponents: vec![Complex64::from(band.decay)],
@@ -145,6 +150,7 @@ impl DecayModel {
             // What a model of the whole decay misses is no noise.
             Some(best) => DecayModel {
                 last: whole.last(),
+                largest,
                 noise: noise.min(best.fit.squares / whole.series.len() as f64),
                 ways: whole.with_more_exponents(&best),
                 evidence: whole.evidence(&best.fit.model),
@@ -152,6 +158,7 @@ impl DecayModel {
             },
             None => DecayModel {
                 last: whole.last(),
+                largest,
                 exponentials: start,
                 noise,
                 ways: Vec::new(),
@@ -362,10 +369,21 @@ impl DecayModel {
         self.exponentials.log_amplitude(t, band).exp()
     }
 
-    /// Returns true where the amplitude grows by no more towards the beginning of the decay than that of a mode.
+    /// Returns true where the amplitude may be that of a mode: it does not grow too much towards the beginning of the decay,
+    /// nor is it far above what the band holds because another line takes it away.
     pub fn is_sound(&self, band: &Band) -> bool {
-        let [start, first] = [-0.5 * band.filter, 0.0].map(|t| self.exponentials.log_amplitude(t, band));
-        start - first < MOST_GROWTH
+        let [start, first] =
+            [-0.5 * band.filter, 0.0].map(|t| self.exponentials.log_amplitude(t, band));
+        start - first < MOST_GROWTH && first < (MOST_EXCESS * self.largest).ln()
+    }
+
+    /// Decay of the mode (1/s), positive: its mean until the amplitude has fallen to a tenth.
+    pub fn mean_decay(&self, band: &Band) -> f64 {
+        let first = self.exponentials.log_amplitude(0.0, band);
+        let amplitude = (first + 0.1f64.ln()).exp();
+        let until = self.exponentials.time_at(amplitude, self.last, band);
+        let until = until.unwrap_or(self.last);
+        (first - self.exponentials.log_amplitude(until, band)) / until
     }
 
     /// Lowest and highest frequency (Hz) of the mode while its amplitude falls to a tenth.

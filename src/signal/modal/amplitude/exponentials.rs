@@ -88,7 +88,7 @@ impl Exponentials {
 
     /// Returns the time at which the mode's amplitude falls to one; `None` where it does not within the filter's first
     /// half and `last`.
-    fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
+    pub fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
         const PARTS: usize = 200;
         let first = -0.5 * band.filter;
         let above = |t: f64| self.log_amplitude(t, band) > amplitude.ln();

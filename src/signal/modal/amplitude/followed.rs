@@ -1,6 +1,9 @@
 //! One mode followed along the decays after all taps.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex64;
+use tapjoint_numerics::stats::median;
 
 use super::band::{self, Band};
 use super::decay::DecayModel;
@@ -15,6 +18,12 @@ use super::{
 /// Distance from which a neighbour that drifts is subtracted (half-power widths of both together). 5: nearer ones are one
 /// with the mode in the model of either.
 const APART: f64 = 5.0;
+
+/// Relative change of the damping with which a mode that drifts is followed again. A tenth: the terms of the drift fit to
+/// its decay.
+const OTHER_DAMPING: f64 = 0.1;
+/// Least share of the listed damping that is believed.
+const LEAST_SHARE: f64 = 0.1;
 
 /// A mode in the decays after all taps.
 pub(super) struct FollowedMode {
@@ -102,6 +111,18 @@ impl FollowedMode {
         own.0 - theirs.1 > least || theirs.0 - own.1 > least
     }
 
+    /// Damping ratio that the models of a mode that drifts have, where it differs from the listed one. A pole that does not
+    /// change takes the change of the frequency for damping.
+    pub fn other_damping(&self) -> Option<f64> {
+        let decays = self.decays.iter();
+        let mut decays: Vec<f64> = decays.map(|(band, model)| model.mean_decay(band)).collect();
+        let ratio = median(&mut decays) / TAU / self.mode.frequency;
+        let change = ratio / self.mode.damping_ratio;
+        let differs = (change - 1.0).abs() > OTHER_DAMPING
+            && (LEAST_SHARE..1.0 / LEAST_SHARE).contains(&change);
+        (self.drifts() && differs).then_some(ratio)
+    }
+
     /// Lowest and highest frequency (Hz) along the decays.
     fn frequencies(&self) -> (f64, f64) {
         let listed = self.mode.frequency;
@@ -137,7 +158,12 @@ impl FollowedMode {
             companions: self.companions.clone(),
             ..AmplitudeCurve::without_points(Some(self.sensor))
         };
-        if let Some(whole) = WholeDecays::new(&self.decays, &self.mode) {
+        let is_unresolved = self
+            .doubts
+            .iter()
+            .any(|doubt| matches!(doubt, AmplitudeVerdict::Unresolved { .. }));
+        // Of two modes that one decay cannot separate neither amplitude is known.
+        if !is_unresolved && let Some(whole) = WholeDecays::new(&self.decays, &self.mode) {
             curve.reference = Some(whole.reference());
             // Beside a mode so near, or where two poles that do not change explain the decays as well, nothing drifts. Hum
             // beats with the mode, which looks like a change.

@@ -201,15 +201,24 @@ pub fn follow_amplitude(
     let indices = (0..modes.len()).into_par_iter();
     let followed = indices.map(|index| FollowedMode::new(decays, modes, index, &[]));
     let mut followed: Vec<Option<FollowedMode>> = followed.collect();
+    let mut modes = modes.to_vec();
     for _ in 0..ROUNDS {
+        let dampings: Vec<Option<f64>> = followed
+            .iter()
+            .map(|mode| mode.as_ref().and_then(FollowedMode::other_damping))
+            .collect();
+        for (mode, damping) in modes.iter_mut().zip(&dampings) {
+            mode.damping_ratio = damping.unwrap_or(mode.damping_ratio);
+        }
         let again = followed.par_iter().flatten().filter_map(|mode| {
             let neighbours = followed.iter().flatten();
             let neighbours: Vec<&FollowedMode> = neighbours
                 .filter(|other| other.drifts() && mode.is_disturbed_by(other))
                 .collect();
             let taken: Vec<usize> = neighbours.iter().map(|other| other.index).collect();
-            let rest = (!taken.is_empty()).then(|| without(&neighbours, decays))?;
-            FollowedMode::new(&rest, modes, mode.index, &taken)
+            let has_changed = !taken.is_empty() || dampings[mode.index].is_some();
+            let rest = has_changed.then(|| without(&neighbours, decays))?;
+            FollowedMode::new(&rest, &modes, mode.index, &taken)
         });
         let again: Vec<FollowedMode> = again.collect();
         if again.is_empty() {

@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_numerics::stats::chi_square_tail;
 
-use super::{AmplitudePoint, KnownMode};
 use super::band::Band;
 use super::decay::DecayModel;
+use super::{AmplitudePoint, KnownMode};
 use crate::modal::fit::{FittedValue, SCATTERS, UncertaintySource, scatter_about_mean};
 
 /// Probability below which a frequency changes beyond noise. 1 %: a recording has many modes to be tested.

@@ -432,11 +432,21 @@ impl FreeDecays {
             steady_lines: candidates.hum,
             ..FitSettings::default()
         };
+        let unfitted: Vec<KnownMode> = readings
+            .iter()
+            .filter(|reading| reading.fit.is_none() && reading.label.is_none())
+            .map(|reading| KnownMode {
+                frequency: reading.frequency,
+                damping_ratio: (reading.damping_ratio)
+                    .unwrap_or(reading.half_line / reading.frequency),
+                amplitude_part: None,
+            })
+            .collect();
         let fitted: Vec<&mut FittedReading> = readings
             .iter_mut()
             .filter_map(|reading| reading.fit.as_deref_mut())
             .collect();
-        let known: Vec<KnownMode> = fitted
+        let mut known: Vec<KnownMode> = fitted
             .iter()
             .map(|fit| KnownMode {
                 frequency: fit.mode.frequency.value,
@@ -444,6 +454,8 @@ impl FreeDecays {
                 amplitude_part: fit.mode.amplitude_part,
             })
             .collect();
+        // Peaks that no pole fits may be modes that drift, and disturb the others.
+        known.extend(unfitted);
         let followed = follow_amplitude(&self.decays, &known, &steady);
         for (fit, curve) in fitted.into_iter().zip(followed.curves) {
             fit.amplitude = Some(curve);

@@ -676,13 +676,15 @@ impl Mode {
         let damped = (1.0 - self.damping_ratio.powi(2)).sqrt();
         let pole = Complex64::new(-self.damping_ratio, damped) * omega;
         let step = (pole / rate).exp();
+        // Integral of the amplitude over a sample, relative to that at its beginning: the phase turns by it exactly.
+        let lasting = -(pole.re / rate).exp_m1() / -pole.re;
         let mut state = Complex64::ZERO;
         let mut states = Vec::with_capacity(frames);
         for n in 0..frames {
             let step = match slope {
                 0.0 => step,
                 _ => {
-                    let turn = omega * damped * slope * state.norm() / rate;
+                    let turn = omega * damped * slope * state.norm() * lasting;
                     step * Complex64::from_polar(1.0, turn)
                 }
             };

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, SteadyLine, TapForce, UncertaintySource, Unfit, modal_constants,
+    PoleStart, SteadyLine, TapForce, UncertaintySource, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
@@ -428,23 +428,101 @@ impl FreeDecays {
             hum,
         };
         candidates.fit(readings);
+        let settings = FitSettings {
+            steady_lines: candidates.hum,
+            ..FitSettings::default()
+        };
+        let unfitted: Vec<KnownMode> = readings
+            .iter()
+            .filter(|reading| reading.fit.is_none() && reading.label.is_none())
+            .map(|reading| KnownMode {
+                frequency: reading.frequency,
+                damping_ratio: (reading.damping_ratio)
+                    .unwrap_or(reading.half_line / reading.frequency),
+                amplitude_part: None,
+            })
+            .collect();
         let fitted: Vec<&mut FittedReading> = readings
             .iter_mut()
             .filter_map(|reading| reading.fit.as_deref_mut())
             .collect();
-        let known: Vec<KnownMode> = fitted
+        let mut known: Vec<KnownMode> = fitted
             .iter()
             .map(|fit| KnownMode {
                 frequency: fit.mode.frequency.value,
                 damping_ratio: fit.mode.damping_ratio.value,
+                amplitude_part: fit.mode.amplitude_part,
             })
             .collect();
-        let curves = follow_amplitude(&self.decays, &known, &steady);
-        for (fit, curve) in fitted.into_iter().zip(curves) {
+        // Peaks that no pole fits may be modes that drift, and disturb the others.
+        known.extend(unfitted);
+        let followed = follow_amplitude(&self.decays, &known, &steady);
+        for (fit, curve) in fitted.into_iter().zip(followed.curves) {
             fit.amplitude = Some(curve);
-            fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
+        }
+        if let Some(rest) = followed.rest {
+            self.fit_again(readings, &rest, &followed.subtracted, &settings);
+        }
+        for reading in readings {
+            if let Some(fit) = reading.fit.as_deref_mut() {
+                fit.constants = modal_constants(&fit.mode, &self.forces, kinds);
+            }
         }
         stabilisation
+    }
+
+    /// Fits the modes again in decays from which those have been subtracted whose frequency changes.
+    ///
+    /// Their lines are no resonance curves, and disturb the modes beside them.
+    fn fit_again(
+        &self,
+        readings: &mut [ModeReading],
+        rest: &[Decay],
+        subtracted: &[usize],
+        settings: &FitSettings,
+    ) {
+        let Ok(data) = self.transforms_of(rest) else {
+            return;
+        };
+        let fitted = readings.iter_mut();
+        let fitted = fitted.filter_map(|reading| reading.fit.as_deref_mut());
+        let steady: Vec<&mut FittedReading> = (fitted.enumerate())
+            .filter(|(index, _)| !subtracted.contains(index))
+            .map(|(_, fit)| fit)
+            .collect();
+        let starts: Vec<PoleStart> = steady
+            .iter()
+            .map(|fit| PoleStart {
+                frequency: fit.mode.frequency.value,
+                damping_ratio: Some(fit.mode.damping_ratio.value),
+            })
+            .collect();
+        for (fit, again) in steady.into_iter().zip(fit_modes(&data, &starts, settings)) {
+            let is_single = fit.mode.frequency.source != UncertaintySource::TwoPoles;
+            let Some(again) = again.ok().filter(|_| is_single) else {
+                continue;
+            };
+            if let Some(curve) = &mut fit.amplitude
+                && curve.drift.is_none()
+                && let [Some(part), Some(now)] = [&fit.mode, &again].map(|mode| mode.amplitude_part)
+            {
+                curve.reference = curve.reference.map(|amplitude| amplitude * now / part);
+            }
+            fit.mode = again;
+        }
+    }
+
+    /// Transforms decays onto the lines of the fit.
+    fn transforms_of(&self, decays: &[Decay]) -> Result<ModalData, FitError> {
+        let lines = self.data.frequencies();
+        let band = (lines[0], lines[lines.len() - 1]);
+        let rate = decays.first().map_or(0.0, |decay| decay.sample_rate);
+        let samples = (rate / self.data.spacing()).round() as usize;
+        let mut collector = FreeDecayCollector::new(rate, samples, &[band])?;
+        for decay in decays {
+            collector.add_tap(&decay.responses)?;
+        }
+        collector.finish()
     }
 
     /// Columns of the polyreference fit, all on the same lines: with a hammer the response of

@@ -73,6 +73,7 @@ fn mode(frequency: f64, damping_ratio: f64) -> KnownMode {
     KnownMode {
         frequency,
         damping_ratio,
+        amplitude_part: None,
     }
 }
 
@@ -87,7 +88,7 @@ fn decay(responses: Vec<Vec<f64>>) -> Decay {
 /// The curve of the first mode after one tap with one sensor.
 fn follow(samples: Vec<f64>, modes: &[KnownMode]) -> AmplitudeCurve {
     let decays = [decay(vec![samples])];
-    follow_amplitude(&decays, modes, &[]).remove(0)
+    follow_amplitude(&decays, modes, &[]).curves.remove(0)
 }
 
 #[test]
@@ -412,7 +413,9 @@ fn recover_one_curve_from_a_hard_and_a_soft_tap() {
             ])
         })
         .collect();
-    let curve = follow_amplitude(&decays, &[mode(99.8, 0.002)], &[]).remove(0);
+    let curve = follow_amplitude(&decays, &[mode(99.8, 0.002)], &[])
+        .curves
+        .remove(0);
     assert_eq!(curve.sensor, Some(1));
     assert_eq!(curve.verdict, AmplitudeVerdict::Changes);
     for tap in 0..2 {
@@ -467,12 +470,12 @@ fn limit_nothing_to_follow_gives_no_points() {
         ),
     ];
     for (decay, mode) in cases {
-        let curve = follow_amplitude(&[decay], &[mode], &[]).remove(0);
+        let curve = follow_amplitude(&[decay], &[mode], &[]).curves.remove(0);
         assert_eq!(curve.verdict, AmplitudeVerdict::TooFewPoints, "{mode:?}");
         assert!(at_time(&curve, 0, 0.5).is_none() && curve.at_amplitude(0.5).is_none());
     }
     assert!(
-        follow_amplitude(&[], &[mode(100.0, 0.003)], &[])[0]
+        follow_amplitude(&[], &[mode(100.0, 0.003)], &[]).curves[0]
             .points
             .is_empty()
     );
@@ -547,8 +550,9 @@ fn regress_a_stronger_neighbour_does_not_stand_for_the_mode() {
     let modes = [(200.0, 0.008), (260.0, 0.006)].map(|(frequency, damping_ratio)| KnownMode {
         frequency,
         damping_ratio,
+        amplitude_part: None,
     });
-    let curve = &follow_amplitude(&[decay], &modes, &[])[0];
+    let curve = &follow_amplitude(&[decay], &modes, &[]).curves[0];
     assert_eq!(curve.sensor, Some(0));
     for point in &curve.points {
         let expected = 2.0 * (-0.008 * TAU * 200.0 * point.time).exp();

@@ -233,8 +233,9 @@ fn val_the_bolted_beam_softens_with_amplitude() {
     let modes = peaks.map(|frequency| KnownMode {
         frequency,
         damping_ratio: 0.0015,
+        amplitude_part: None,
     });
-    let curves = follow_amplitude(&[decay], &modes, &[]);
+    let curves = follow_amplitude(&[decay], &modes, &[]).curves;
     let change = |mode: usize| {
         assert_eq!(curves[mode].verdict, AmplitudeVerdict::Changes);
         let early = at_time(&curves[mode], 0, 0.1).expect("the decay's start");

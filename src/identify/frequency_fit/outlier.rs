@@ -5,7 +5,7 @@
 //! 1. with all modes the model fails, with the least discrepancy: probability below [`FAILS`];
 //! 2. without the mode it explains the rest: probability above [`EXPLAINS`];
 //! 3. the mode deviates by [`DEVIATION`] standard deviations or more;
-//! 4. no other mode left out explains the rest as well: its probability is below a hundredth of the best one's;
+//! 4. no other mode left out explains the rest as well: its probability is below a twentieth of the best one's;
 //! 5. the rest has two modes more than parameters to be tested by.
 //!
 //! What a model misses in all modes is no outlier: then the rest is not explained either.
@@ -18,9 +18,9 @@ use super::uncertainty::LEAST_DISCREPANCY;
 use tapjoint_numerics::stats::chi_square_tail;
 
 const FAILS: f64 = 1e-3;
-const EXPLAINS: f64 = 0.05;
+const EXPLAINS: f64 = 0.02;
 const DEVIATION: f64 = 4.0;
-const SECOND: f64 = 0.01;
+const SECOND: f64 = 0.05;
 
 /// A mode that does not belong to the others.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -360,7 +360,7 @@ pub struct ModeSection {
     pub low: Option<f64>,
     /// Upper end of its interval (Hz).
     pub high: Option<f64>,
-    /// Amplitude at which the mode has this frequency; null where its decays were not followed.
+    /// Amplitude at which the mode has this frequency; null where its decays do not tell.
     pub at_amplitude: Option<FrequencyAtAmplitude>,
     /// Damping ratio.
     pub damping: Option<f64>,

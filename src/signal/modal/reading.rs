@@ -40,7 +40,7 @@ pub struct ModeReading {
     pub between: Option<Interpolation>,
     /// Standard deviation of the best frequency (Hz).
     pub std: Option<f64>,
-    /// Amplitude at which the mode has this frequency; `None` where the decays were not followed.
+    /// Amplitude at which the mode has this frequency; `None` where the decays do not tell.
     pub at_amplitude: Option<FrequencyAtAmplitude>,
     /// Damping ratio.
     pub damping_ratio: Option<f64>,
@@ -201,7 +201,7 @@ impl FittedReading {
         drift.map_or(fitted, |drift| drift.frequency)
     }
 
-    /// Returns the amplitude at which the mode has that frequency; `None` where the decays were not followed.
+    /// Returns the amplitude at which the mode has that frequency; `None` where the decays do not tell.
     pub fn at_amplitude(&self) -> Option<FrequencyAtAmplitude> {
         let curve = self.amplitude.as_ref()?;
         let (value, sensor) = curve.reference.zip(curve.sensor)?;

@@ -22,7 +22,7 @@ const PARTS: f64 = 4.0;
 /// Decay times that are followed: 104 dB.
 const REACH: f64 = 12.0;
 /// Least remainder of a neighbour beside those before it, relative: nearer ones are one.
-const DISTINCT: f64 = 1e-5;
+pub(super) const DISTINCT: f64 = 1e-5;
 /// Least damping ratio: no structure with a joint has less.
 const LEAST_DAMPING: f64 = 1e-6;
 /// Neighbours are kept this far beyond the stop edge.
@@ -108,12 +108,14 @@ impl Band {
     }
 }
 
-/// Extracts the band of mode `index` after one tap; `None` of a decay that is too short.
+/// Extracts the band of mode `index` after one tap; `None` of a decay that is too short. The modes `taken` have been
+/// subtracted.
 pub(super) fn extract_band(
     decay: &Decay,
     tap: usize,
     modes: &[KnownMode],
     index: usize,
+    taken: &[usize],
 ) -> Option<Band> {
     let mode = modes.get(index)?;
     let samples = decay.responses.iter().map(Vec::len).min()?;
@@ -154,7 +156,7 @@ pub(super) fn extract_band(
         sensors: mix_down(&decay.responses, &taps, omega / rate, stride, count),
         taps,
         sample_rate: rate,
-        neighbours: neighbours(modes, index, stop),
+        neighbours: neighbours(modes, index, stop, taken),
     })
 }
 
@@ -230,12 +232,12 @@ fn mix_down(
 }
 
 /// Returns the poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
-fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
+fn neighbours(modes: &[KnownMode], index: usize, stop: f64, taken: &[usize]) -> Vec<Complex64> {
     let frequency = modes[index].frequency;
     let others = modes
         .iter()
         .enumerate()
-        .filter(|(other, _)| *other != index);
+        .filter(|(other, _)| *other != index && !taken.contains(other));
     others
         .filter(|(_, mode)| (mode.frequency - frequency).abs() < stop)
         .map(|(_, mode)| {

@@ -1,4 +1,4 @@
-//! One decay: what lies in the mode's band, and the mode's pole from segment to segment.
+//! One decay: what lies in the mode's band.
 //!
 //! Models of the whole decay are compared by Schwarz's criterion 2N ln(R/2N) + k ln(2N) (N complex
 //! values, R sum of squared residuals, k real parameters): the mode with a pole that does not change
@@ -8,13 +8,14 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
-use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
 
-use super::band::{Band, noise_variance};
-use super::{AIM, AmplitudePoint, AmplitudeVerdict, Companion, END, LONGEST, SHORTEST};
+use super::band::{Band, DISTINCT, noise_variance};
+use super::exponentials::{Exponentials, Fit, Prior, fit_exponentials};
+use super::{AmplitudeVerdict, Companion};
+use crate::modal::Subspace;
 
 /// Numbers of exponents tried for the mode: one is a pole that does not change.
 const DEGREES: [usize; 5] = [1, 2, 3, 5, 7];
@@ -45,6 +46,13 @@ const UNRESOLVED: f64 = 2.0;
 const STRETCH: usize = 16;
 /// Values of a decay that are kept at least.
 const LEAST_VALUES: usize = 64;
+/// Most growth of a mode from the band's first value back to the beginning of its decay (log amplitude). 1: the filter is at
+/// most a third of a decay, and the damping is known within a factor of three.
+const MOST_GROWTH: f64 = 1.0;
+/// Most amplitude of a mode over the largest value of its band. 2: two lines of opposite sign that beat.
+const MOST_EXCESS: f64 = 2.0;
+/// Least decay beyond the last value above the noise (decays of the mode).
+const LEAST_FALL: f64 = 0.3;
 /// The exponent of a mode that can be followed bends by no more (rad) within half a segment.
 const LARGEST_BEND: f64 = 0.3;
 /// Companions below this share of the mode at the start are not reported.
@@ -53,9 +61,13 @@ const LEAST_SHARE: f64 = 1e-4;
 /// The best model of a whole decay: the mode, and what lies in its band beside it.
 pub(super) struct DecayModel {
     /// The model; times count from the band's first value.
-    exponentials: Exponentials,
+    pub exponentials: Exponentials,
     /// Noise variance of the values.
-    noise: f64,
+    pub noise: f64,
+    /// Time of the last value that is above the noise.
+    last: f64,
+    /// Largest modulus of the values.
+    largest: f64,
     /// The models with what the best one found beside the mode, for every number of exponents from its own on.
     ways: Vec<Candidate>,
     /// How much better a pole that drifts explains the decay than one that does not.
@@ -98,6 +110,7 @@ impl DecayModel {
             band,
             noise,
         };
+        let largest = series.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
         let start = Exponentials {
             amplitude: series.first().copied().unwrap_or(Complex64::ONE),
             exponents: vec![Complex64::from(band.decay)],
@@ -136,12 +149,16 @@ impl DecayModel {
         match models.into_iter().min_by(by_criterion) {
             // What a model of the whole decay misses is no noise.
             Some(best) => DecayModel {
+                last: whole.last(),
+                largest,
                 noise: noise.min(best.fit.squares / whole.series.len() as f64),
                 ways: whole.with_more_exponents(&best),
                 evidence: whole.evidence(&best.fit.model),
                 exponentials: best.fit.model,
             },
             None => DecayModel {
+                last: whole.last(),
+                largest,
                 exponentials: start,
                 noise,
                 ways: Vec::new(),
@@ -152,7 +169,7 @@ impl DecayModel {
 
     /// Returns how the mode's exponent bends about the time t, at t + s. It is 0 where the fit has lost
     /// the mode and its polynomial means nothing.
-    fn bend(&self, t: f64, s: f64) -> Complex64 {
+    pub fn bend(&self, t: f64, s: f64) -> Complex64 {
         let model = &self.exponentials;
         let bend = model.exponent(t + s) - model.exponent(t) - model.pole(t) * s;
         match bend.norm() < LARGEST_BEND {
@@ -219,6 +236,11 @@ struct WholeDecay<'a> {
 }
 
 impl WholeDecay<'_> {
+    /// Time of the last value.
+    fn last(&self) -> f64 {
+        (self.series.len() - 1) as f64 * self.band.step
+    }
+
     fn fit(&self, model: Exponentials) -> Option<Candidate> {
         let degree = model.exponents.len();
         let count = self.series.len();
@@ -341,81 +363,84 @@ impl WholeDecay<'_> {
     }
 }
 
-/// x(t) = c e^{q1 t + q2 v + q3 v^2 + ...} + sum over k of c_k e^{p_k t}, v(t) = 1 - e^{-rate t}.
-///
-/// A frequency that changes with a power of the amplitude changes exponentially in time, so powers of
-/// v describe it with few terms where powers of t would not. The parameters enter analytically: least
-/// squares may treat them as complex numbers.
-#[derive(Debug, Clone)]
-struct Exponentials {
-    /// Amplitude of the mode.
-    amplitude: Complex64,
-    /// Its exponents q1 (1/s), q2, q3, ... (1); the first alone is a pole that does not change.
-    exponents: Vec<Complex64>,
-    /// Rate of v (1/s).
-    rate: f64,
-    /// Amplitude and pole (rad/s) of everything else.
-    others: Vec<(Complex64, Complex64)>,
-}
-
-impl Exponentials {
-    /// Returns the parameters: amplitude, exponents, then amplitude and pole of every other.
-    fn parameters(&self) -> Vec<Complex64> {
-        let mut all = vec![self.amplitude];
-        all.extend(&self.exponents);
-        all.extend(self.others.iter().flat_map(|(c, p)| [*c, *p]));
-        all
-    }
-
-    /// Returns the pole at a time: the derivative of the mode's exponent.
-    fn pole(&self, t: f64) -> Complex64 {
-        let fall = (-self.rate * t).exp();
-        let v = 1.0 - fall;
-        let mut power = self.rate * fall;
-        let mut sum = self.exponents.first().copied().unwrap_or_default();
-        for (k, q) in self.exponents.iter().skip(1).enumerate() {
-            // d/dt of q v^(k+1).
-            sum += q * power * (k + 1) as f64;
-            power *= v;
-        }
-        sum
-    }
-
-    /// Returns q1 t + q2 v + q3 v^2 + ..., the powers by Horner's scheme.
-    fn exponent(&self, t: f64) -> Complex64 {
-        let v = 1.0 - (-self.rate * t).exp();
-        let drift = self.exponents.iter().skip(1).rev();
-        let drift = drift.fold(Complex64::ZERO, |sum, q| (sum + q) * v);
-        self.exponents.first().copied().unwrap_or_default() * t + drift
-    }
-
-    /// Returns the value at a time. `derivatives` are those to the parameters, in their order.
-    fn value(&self, t: f64, derivatives: &mut Vec<Complex64>) -> Complex64 {
-        derivatives.clear();
-        let growth = self.exponent(t).exp();
-        let mut sum = self.amplitude * growth;
-        derivatives.push(growth);
-        derivatives.push(sum * t);
-        let v = 1.0 - (-self.rate * t).exp();
-        let mut power = sum;
-        for _ in self.exponents.iter().skip(1) {
-            power *= v;
-            derivatives.push(power);
-        }
-        for (amplitude, pole) in &self.others {
-            let growth = (pole * t).exp();
-            sum += amplitude * growth;
-            derivatives.push(growth);
-            derivatives.push(amplitude * growth * t);
-        }
-        sum
-    }
-}
-
 impl DecayModel {
     /// Returns the amplitude at a time before or after the band's first value (unit of the sensor).
     pub fn amplitude(&self, t: f64, band: &Band) -> f64 {
         self.exponentials.log_amplitude(t, band).exp()
+    }
+
+    /// Returns true where the amplitude may be that of a mode: it does not grow too much towards the beginning of the decay,
+    /// nor is it far above what the band holds because another line takes it away.
+    pub fn is_sound(&self, band: &Band) -> bool {
+        let [start, first] =
+            [-0.5 * band.filter, 0.0].map(|t| self.exponentials.log_amplitude(t, band));
+        start - first < MOST_GROWTH && first < (MOST_EXCESS * self.largest).ln()
+    }
+
+    /// Decay of the mode (1/s), positive: its mean until the amplitude has fallen to a tenth.
+    pub fn mean_decay(&self, band: &Band) -> f64 {
+        let first = self.exponentials.log_amplitude(0.0, band);
+        let amplitude = (first + 0.1f64.ln()).exp();
+        let until = self.exponentials.time_at(amplitude, self.last, band);
+        let until = until.unwrap_or(self.last);
+        (first - self.exponentials.log_amplitude(until, band)) / until
+    }
+
+    /// Lowest and highest frequency (Hz) of the mode while its amplitude falls to a tenth.
+    pub fn frequencies(&self, band: &Band) -> (f64, f64) {
+        const PARTS: usize = 50;
+        let first = -0.5 * band.filter;
+        let last = self.last.min(0.1f64.ln() / band.decay);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for part in 0..=PARTS {
+            let t = first + (last - first) * part as f64 / PARTS as f64;
+            let frequency = band.frequency(self.exponentials.pole(t));
+            (low, high) = (low.min(frequency), high.max(frequency));
+        }
+        (low, high)
+    }
+
+    /// Returns the mode's share in every sensor: its complex amplitude over that of the series that was fitted.
+    pub fn shares(&self, band: &Band) -> Vec<Complex64> {
+        let model = &self.exponentials;
+        let count = band.sensors.iter().map(Vec::len).min().unwrap_or(0);
+        let rows = count.min((self.last / band.step) as usize + 1);
+        let others = DMatrix::from_fn(rows, model.others.len(), |n, place| {
+            (model.others[place].1 * (n as f64 * band.step)).exp()
+        });
+        let beside = Subspace::new(&others, DISTINCT);
+        let mode = DMatrix::from_fn(rows, 1, |n, _| {
+            model.amplitude * model.exponent(n as f64 * band.step).exp()
+        });
+        let mode = beside.complement(mode);
+        let energy = mode.norm_squared().max(f64::MIN_POSITIVE);
+        let shares = band.sensors.iter().map(|values| {
+            let values = DMatrix::from_fn(rows, 1, |n, _| values[n]);
+            mode.dotc(&values) / energy
+        });
+        shares.collect()
+    }
+
+    /// Returns the mode on the first samples of the decay, as an oscillation of which sensors show real parts of shares.
+    /// After the last value above the noise the pole stays.
+    pub fn ring(&self, band: &Band, samples: usize) -> Vec<Complex64> {
+        let model = &self.exponentials;
+        let middle = (band.taps.len() - 1) as f64 / 2.0;
+        let mut end = model.pole(self.last);
+        end.re = end.re.min(LEAST_FALL * band.decay);
+        let stride = (band.step * band.sample_rate).round().max(1.0) as usize;
+        let mut gain = Complex64::ONE;
+        let values = (0..samples).map(|n| {
+            let t = (n as f64 - middle) / band.sample_rate;
+            let known = t.min(self.last);
+            if n % stride == 0 && t <= self.last {
+                gain = band.gain(model.pole(known));
+            }
+            let exponent = model.exponent(known) + end * (t - known);
+            let turn = Complex64::new(0.0, band.omega * t);
+            model.amplitude * (exponent + turn).exp() / gain
+        });
+        values.collect()
     }
 
     /// Returns the frequency (Hz) at an amplitude (unit of the sensor) and its standard uncertainty, as the mean over
@@ -443,447 +468,4 @@ impl DecayModel {
         let variance = variances.sum::<f64>() / total;
         (mean.is_finite() && variance > 0.0).then(|| (mean, variance.sqrt()))
     }
-}
-
-impl Exponentials {
-    /// Log of the mode's amplitude at a time, the filter's gain taken out.
-    fn log_amplitude(&self, t: f64, band: &Band) -> f64 {
-        let gain = band.gain(self.pole(t)).norm();
-        self.amplitude.norm().ln() + self.exponent(t).re - gain.ln()
-    }
-
-    /// Returns the time at which the mode's amplitude falls to one; `None` where it does not within the filter's first
-    /// half and `last`.
-    fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
-        const PARTS: usize = 200;
-        let first = -0.5 * band.filter;
-        let above = |t: f64| self.log_amplitude(t, band) > amplitude.ln();
-        let time = |part: usize| first + (last - first) * part as f64 / PARTS as f64;
-        let part = (0..=PARTS).find(|part| !above(time(*part)))?;
-        let (mut early, mut late) = (time(part.checked_sub(1)?), time(part));
-        for _ in 0..50 {
-            let middle = 0.5 * (early + late);
-            match above(middle) {
-                true => early = middle,
-                false => late = middle,
-            }
-        }
-        Some(late)
-    }
-
-    /// Derivative of the pole with time (1/s^2).
-    fn turn(&self, t: f64) -> Complex64 {
-        let step = 1e-3 / self.rate;
-        (self.pole(t + step) - self.pole(t - step)) / (2.0 * step)
-    }
-}
-
-impl Fit {
-    /// Variance of the noise about the mode's frequency.
-    ///
-    /// Residuals that agree with their neighbours (correlation r) are what the model misses. They leave (1 - r)/(1 + r)
-    /// of the values' information. By chance the standard deviation of r is 1/sqrt(2n) with n complex values.
-    fn variance(&self, band: &Band) -> f64 {
-        let count = self.residuals.len() as f64;
-        let freedom = (count - self.right.len() as f64).max(1.0);
-        let pairs = self.residuals.windows(2);
-        let products: f64 = pairs.map(|r| (r[0].conj() * r[1]).re).sum();
-        let agreement = products / self.squares.max(f64::MIN_POSITIVE);
-        let agreement = (agreement - CHANCE / (2.0 * count).sqrt()).clamp(0.0, 0.9);
-        self.squares / freedom * band.noise_ratio * (1.0 + agreement) / (1.0 - agreement)
-    }
-
-    /// Returns the frequency (Hz) where the mode's amplitude is the given one, and its standard uncertainty.
-    ///
-    /// With g the derivatives of the pole p to the parameters, h those of the logarithm of the mode and p' the pole's
-    /// own in time, the frequency |p| changes by Re(conj(p) dp)/|p|, and the time of the amplitude by -Re(h)/Re(p).
-    fn frequency_at(&self, amplitude: f64, band: &Band) -> Option<(f64, f64)> {
-        let model = &self.model;
-        let last = band.step * self.residuals.len() as f64;
-        let t = model.time_at(amplitude, last, band)?;
-        let own = model.pole(t);
-        let pole = Complex64::new(own.re, own.im + band.omega);
-        let modulus = pole.norm();
-        let turning = (pole.conj() * model.turn(t)).re / modulus / own.re;
-        let fall = (-model.rate * t).exp();
-        let v = 1.0 - fall;
-        let mut row = vec![Complex64::ZERO; self.right.len()];
-        row[0] = -Complex64::i() * turning / model.amplitude;
-        for place in 0..model.exponents.len() {
-            let (of_pole, of_log) = match place {
-                0 => (1.0, t),
-                _ => (
-                    place as f64 * v.powi(place as i32 - 1) * model.rate * fall,
-                    v.powi(place as i32),
-                ),
-            };
-            row[1 + place] = Complex64::i() * (pole.conj() / modulus * of_pole - turning * of_log);
-        }
-        let inverse = self.inverse()?;
-        let mut variance = Complex64::ZERO;
-        for (i, a) in row.iter().enumerate() {
-            for (k, b) in row.iter().enumerate() {
-                variance += a * inverse[(i, k)] * b.conj();
-            }
-        }
-        let std = (0.5 * self.variance(band) * variance.re.max(0.0)).sqrt();
-        Some((modulus / TAU, std / TAU))
-    }
-}
-
-/// A parameter known beforehand: index, value, and 1/variance (of both parts together).
-#[derive(Debug, Clone, Copy)]
-struct Prior {
-    parameter: usize,
-    value: Complex64,
-    weight: f64,
-}
-
-/// Standard deviations by which a correlation of residuals counts as chance.
-const CHANCE: f64 = 1.0;
-/// Most steps of a fit.
-const STEPS: usize = 25;
-/// Share of the sum of squares at which another step gains nothing.
-const SETTLED: f64 = 1e-7;
-/// Values beyond this are no amplitude any more.
-const LARGEST: f64 = 1e100;
-
-/// Fits a model to values at times; `None` where the start has no finite value.
-///
-/// Priors take the noise variance as 1: scale their weights by it.
-fn fit_exponentials(
-    times: &[f64],
-    values: &[Complex64],
-    start: Exponentials,
-    priors: &[Prior],
-) -> Option<Fit> {
-    let parameters: Vec<f64> = start
-        .parameters()
-        .iter()
-        .flat_map(|x| [x.re, x.im])
-        .collect();
-    let problem = ExponentialFit {
-        times,
-        values,
-        terms: start,
-        priors,
-    };
-    let settings = Settings {
-        steps: STEPS,
-        gain: 0.0,
-        relative_gain: SETTLED,
-        first_damping: 1e-3,
-        damping: 1e6,
-        ..Settings::default()
-    };
-    Some(minimise(&problem, &parameters, &settings)?.state)
-}
-
-/// Least squares of a sum of exponentials. Its parameters are the real and imaginary parts of the model's.
-struct ExponentialFit<'a> {
-    times: &'a [f64],
-    values: &'a [Complex64],
-    /// A model with the terms that are fitted.
-    terms: Exponentials,
-    priors: &'a [Prior],
-}
-
-/// A model, its residuals and the normal equations of the next step.
-struct Fit {
-    model: Exponentials,
-    /// J^H J + priors, J being the model's complex derivatives.
-    normal: DMatrix<Complex64>,
-    /// J^H r + priors.
-    right: DVector<Complex64>,
-    residuals: Vec<Complex64>,
-    /// Sum of the squared residuals.
-    squares: f64,
-    /// Sum of squares of the deviations from the priors.
-    prior_squares: f64,
-}
-
-impl Fit {
-    /// Returns (J^H J + priors)^-1, which times the noise variance is the parameters' covariance; `None`
-    /// where the unknowns cannot be separated.
-    fn inverse(&self) -> Option<DMatrix<Complex64>> {
-        // Scaled to a unit diagonal: amplitudes and poles differ by orders of magnitude.
-        let scale = (self.normal.diagonal()).map(|x| x.re.max(f64::MIN_POSITIVE).sqrt());
-        let scales = &scale * scale.transpose();
-        let inverse = self
-            .normal
-            .zip_map(&scales, |x, scale| x / scale)
-            .try_inverse()?;
-        Some(inverse.zip_map(&scales, |x, scale| x / scale))
-    }
-}
-
-impl Problem for ExponentialFit<'_> {
-    type State = Fit;
-
-    fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
-        let parts = parameters.chunks_exact(2);
-        let all: Vec<Complex64> = parts.map(|part| Complex64::new(part[0], part[1])).collect();
-        let (mode, others) = all.split_at(1 + self.terms.exponents.len());
-        let model = Exponentials {
-            amplitude: mode[0],
-            exponents: mode[1..].to_vec(),
-            rate: self.terms.rate,
-            others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
-        };
-        let size = all.len();
-        let mut products = vec![Complex64::ZERO; size * size];
-        let mut right = DVector::zeros(size);
-        let (mut squares, mut prior_squares) = (0.0, 0.0);
-        let mut row = Vec::with_capacity(size);
-        let mut residuals = Vec::with_capacity(self.times.len());
-        for (t, value) in self.times.iter().zip(self.values) {
-            let residual = value - model.value(*t, &mut row);
-            squares += residual.norm_sqr();
-            residuals.push(residual);
-            for ((i, a), sums) in row.iter().enumerate().zip(products.chunks_mut(size)) {
-                let a = a.conj();
-                right[i] += a * residual;
-                for (sum, b) in sums.iter_mut().zip(&row[..=i]) {
-                    *sum += a * b;
-                }
-            }
-        }
-        // Only the lower triangle was summed; the matrix is Hermitian.
-        let mut normal = DMatrix::from_fn(size, size, |i, k| {
-            if k <= i {
-                products[i * size + k]
-            } else {
-                products[k * size + i].conj()
-            }
-        });
-        let current = model.parameters();
-        for prior in self.priors {
-            let k = prior.parameter;
-            let away = prior.value - current[k];
-            normal[(k, k)] += prior.weight;
-            right[k] += away * prior.weight;
-            prior_squares += away.norm_sqr() * prior.weight;
-        }
-        (squares + prior_squares < LARGEST).then_some(Fit {
-            model,
-            normal,
-            right,
-            residuals,
-            squares,
-            prior_squares,
-        })
-    }
-
-    fn cost(&self, state: &Self::State) -> f64 {
-        0.5 * (state.squares + state.prior_squares)
-    }
-
-    /// With a step x + j y, J (x + j y) has the real parts Re J x - Im J y and the imaginary parts
-    /// Im J x + Re J y. The curvature of the real problem is therefore J^H J with each entry a + j b as
-    /// the block (a, -b; b, a).
-    fn linearise(&self, _: &[f64], state: &mut Self::State) -> Option<Linearised> {
-        let size = 2 * state.right.len();
-        Some(Linearised::Normal {
-            curvature: DMatrix::from_fn(size, size, |i, k| {
-                let entry = state.normal[(i / 2, k / 2)];
-                match (i % 2, k % 2) {
-                    (0, 1) => -entry.im,
-                    (1, 0) => entry.im,
-                    _ => entry.re,
-                }
-            }),
-            gradient: DVector::from_fn(size, |i, _| {
-                let entry = state.right[i / 2];
-                -if i % 2 == 0 { entry.re } else { entry.im }
-            }),
-        })
-    }
-}
-
-/// Fewest values of a segment: 24 real numbers against four unknowns.
-const LEAST_IN_SEGMENT: usize = 12;
-/// A pole this many decays away from that of the segment before is another's.
-const LARGEST_JUMP: f64 = 3.0;
-/// Freedom of a companion's amplitude about that of the whole decay, relative.
-const AMPLITUDE_FREEDOM: f64 = 0.2;
-/// Freedom of its pole (shares of the mode's decay).
-const POLE_FREEDOM: f64 = 0.3;
-
-/// A part of a decay and the mode's pole in it.
-#[derive(Debug, Clone, Copy)]
-struct Segment {
-    /// Time at which a linear drift has the value found (s after the band's first value).
-    time: f64,
-    /// Amplitude there, as the band has it.
-    amplitude: f64,
-    /// Pole relative to the band's middle (rad/s).
-    pole: Complex64,
-    /// Diagonal element of the inverse normal matrix for the pole.
-    inverse: f64,
-    /// Sum of squared residuals.
-    squares: f64,
-    /// Sum of the residuals' lag-one products.
-    products: f64,
-    /// Complex degrees of freedom.
-    freedom: f64,
-}
-
-/// Returns the mode's pole along one decay, until it falls into the noise.
-pub(super) fn follow_decay(
-    series: &[Complex64],
-    band: &Band,
-    model: &DecayModel,
-) -> Vec<AmplitudePoint> {
-    let mut segments: Vec<Segment> = Vec::new();
-    let mut pole = model.exponentials.pole(0.0);
-    pole.re = pole.re.min(0.3 * band.decay);
-    let mut amplitude = model.exponentials.amplitude.norm();
-    let mut from = 0;
-    while let Some(length) = segment_length(amplitude, pole.re, model.noise, band) {
-        let Some(values) = series.get(from..from + length) else {
-            break;
-        };
-        let indices = from..from + length;
-        let times: Vec<f64> = indices.map(|n| n as f64 * band.step).collect();
-        let Some(segment) = fit_segment(&times, values, pole, model) else {
-            break;
-        };
-        if (segment.pole - pole).norm() > LARGEST_JUMP / band.scale {
-            break;
-        }
-        from += length;
-        pole = Complex64::new(segment.pole.re.min(0.3 * band.decay), segment.pole.im);
-        let ahead = from as f64 * band.step - segment.time;
-        amplitude = segment.amplitude * (pole.re * ahead).exp();
-        segments.push(segment);
-    }
-    let mut points = Vec::with_capacity(segments.len());
-    for (index, segment) in segments.iter().enumerate() {
-        // The noise variance comes from the residuals of neighbouring segments: one alone has too few values.
-        let (mut squares, mut products, mut freedom) = (0.0, 0.0, 0.0);
-        for near in &segments[index.saturating_sub(1)..(index + 2).min(segments.len())] {
-            squares += near.squares;
-            products += near.products;
-            freedom += near.freedom;
-        }
-        // Residuals that agree with their neighbours (correlation r) are what the model misses. They leave
-        // (1 - r)/(1 + r) of the values' information. One standard deviation of a correlation by chance is
-        // 1/sqrt(2n) with n complex values.
-        let agreement = products / f64::max(squares, f64::MIN_POSITIVE);
-        let agreement = (agreement - 1.0 / f64::sqrt(2.0 * freedom)).clamp(0.0, 0.9);
-        let noise = squares / freedom * (1.0 + agreement) / (1.0 - agreement);
-        let std = (0.5 * noise * band.noise_ratio * segment.inverse).sqrt();
-        let pole = Complex64::new(segment.pole.re, segment.pole.im + band.omega);
-        points.push(AmplitudePoint {
-            tap: band.tap,
-            time: band.first + segment.time,
-            amplitude: segment.amplitude / band.gain(segment.pole).norm(),
-            frequency: pole.norm() / TAU,
-            frequency_std: std / TAU,
-            damping_ratio: -pole.re / pole.norm(),
-            damping_std: std / pole.norm(),
-        });
-    }
-    points
-}
-
-/// Returns the number of values of the next segment: as few as give the damping with the wanted
-/// uncertainty. `None` where even the longest segment leaves it too uncertain.
-///
-/// Bound of Cramer and Rao for one exponential of amplitude A in noise of variance v:
-/// var(sigma) = 6 v/(A^2 N^3 step^2) with A that of the segment's middle.
-fn segment_length(amplitude: f64, decay: f64, noise: f64, band: &Band) -> Option<usize> {
-    let [least, most] = [SHORTEST, LONGEST]
-        .map(|share| ((share * band.scale / band.step) as usize).max(LEAST_IN_SEGMENT));
-    let mut length = least.min(most);
-    loop {
-        let n = length as f64;
-        let middle = amplitude * (0.5 * decay * n * band.step).exp();
-        let uncertainty = (6.0 * noise / n.powi(3)).sqrt() / (middle * band.step) / decay.abs();
-        if uncertainty <= AIM || length >= most {
-            return (uncertainty <= END).then_some(length);
-        }
-        length += 1;
-    }
-}
-
-/// Fits the mode to values at `times` (s after the band's first value), starting at `pole`.
-fn fit_segment(
-    times: &[f64],
-    values: &[Complex64],
-    pole: Complex64,
-    model: &DecayModel,
-) -> Option<Segment> {
-    let reference = effective_time(times, pole.re);
-    let local: Vec<f64> = times.iter().map(|t| t - reference).collect();
-    // How the drift bends within the segment is taken from the whole decay, so that the pole is that of
-    // the reference time.
-    let straight: Vec<Complex64> = local
-        .iter()
-        .zip(values)
-        .map(|(s, value)| value * (-model.bend(reference, *s)).exp())
-        .collect();
-    let others: Vec<(Complex64, Complex64)> = (model.exponentials.others.iter())
-        .map(|(c, p)| (c * (p * reference).exp(), *p))
-        .collect();
-    let mut priors = Vec::with_capacity(2 * others.len());
-    for (k, (amplitude, other)) in others.iter().enumerate() {
-        let [vague_amplitude, vague_pole] =
-            [AMPLITUDE_FREEDOM * amplitude.norm(), POLE_FREEDOM * pole.re]
-                .map(|std| (2.0 * std * std).max(f64::MIN_POSITIVE));
-        priors.push(Prior {
-            parameter: 2 + 2 * k,
-            value: *amplitude,
-            weight: model.noise / (vague_amplitude + model.noise * 1e-9),
-        });
-        priors.push(Prior {
-            parameter: 3 + 2 * k,
-            value: *other,
-            weight: model.noise / vague_pole,
-        });
-    }
-    // Least-squares amplitude of the mode with everything else as the whole decay has it.
-    let (mut product, mut energy) = (Complex64::ZERO, f64::MIN_POSITIVE);
-    for (t, value) in local.iter().zip(&straight) {
-        let rest: Complex64 = others.iter().map(|(c, p)| c * (p * t).exp()).sum();
-        let growth = (pole * t).exp();
-        product += growth.conj() * (value - rest);
-        energy += growth.norm_sqr();
-    }
-    let start = Exponentials {
-        amplitude: product / energy,
-        exponents: vec![pole],
-        rate: model.exponentials.rate,
-        others,
-    };
-    let fit = fit_exponentials(&local, &straight, start, &priors)?;
-    let pairs = fit.residuals.windows(2);
-    Some(Segment {
-        time: reference,
-        amplitude: fit.model.amplitude.norm(),
-        pole: *fit.model.exponents.first()?,
-        inverse: fit.inverse()?[(1, 1)].re,
-        squares: fit.squares,
-        products: pairs.map(|r| (r[0].conj() * r[1]).re).sum(),
-        freedom: values.len() as f64 - 2.0,
-    })
-}
-
-/// Returns the time at which a parabola has the slope of the straight line fitted to it with weights w:
-/// mean + mu3/(2 mu2). Log amplitude and phase are weighted with the amplitude squared,
-/// w = e^{2 decay t}, so that an estimate from a drifting pole is that of this time.
-fn effective_time(times: &[f64], decay: f64) -> f64 {
-    let first = times.first().copied().unwrap_or(0.0);
-    let weights: Vec<f64> = times
-        .iter()
-        .map(|t| (2.0 * decay * (t - first)).exp())
-        .collect();
-    let total: f64 = weights.iter().sum();
-    let mean = times.iter().zip(&weights).map(|(t, w)| w * t).sum::<f64>() / total;
-    let (mut second, mut third) = (0.0, 0.0);
-    for (t, w) in times.iter().zip(&weights) {
-        second += w * (t - mean).powi(2);
-        third += w * (t - mean).powi(3);
-    }
-    mean + 0.5 * third / second
 }

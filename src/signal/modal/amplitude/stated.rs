@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_numerics::stats::chi_square_tail;
 
-use super::AmplitudePoint;
 use super::band::Band;
 use super::decay::DecayModel;
+use super::{AmplitudePoint, KnownMode};
 use crate::modal::fit::{FittedValue, SCATTERS, UncertaintySource, scatter_about_mean};
 
 /// Probability below which a frequency changes beyond noise. 1 %: a recording has many modes to be tested.
@@ -40,35 +40,53 @@ pub struct FrequencyAtAmplitude {
 
 /// Models of the decays of one mode after all taps.
 pub(super) struct WholeDecays<'a> {
-    models: &'a [(&'a Band, DecayModel)],
+    models: &'a [(Band, DecayModel)],
     /// Amplitude at the start of each decay.
     starts: Vec<f64>,
+    /// Part of it at which a pole that does not change has the frequency of one that does.
+    part: f64,
 }
 
 impl<'a> WholeDecays<'a> {
-    /// Takes the models; `None` without one that has an amplitude.
-    pub fn new(models: &'a [(&'a Band, DecayModel)]) -> Option<Self> {
+    /// Takes the models of a mode; `None` without one that has an amplitude.
+    pub fn new(models: &'a [(Band, DecayModel)], mode: &KnownMode) -> Option<Self> {
         let starts = models
             .iter()
             .map(|(band, model)| model.amplitude(-0.5 * band.filter, band));
         let starts: Vec<f64> = starts.collect();
         let are_finite = starts.iter().all(|start| start.is_finite());
         let usable = are_finite && starts.iter().any(|start| *start > 0.0);
-        usable.then_some(WholeDecays { models, starts })
+        let (band, _) = models.first()?;
+        let whole = || part(-band.decay * band.length);
+        usable.then(|| WholeDecays {
+            models,
+            starts,
+            part: mode.amplitude_part.unwrap_or_else(whole),
+        })
     }
 
     /// Returns the amplitude at which a mode has the frequency that the fit of a pole that does not change finds.
     ///
-    /// A tap counts by its power. Its part of the amplitude at the start is [`part`].
+    /// A tap counts by its power.
     pub fn reference(&self) -> f64 {
         let largest = self.starts.iter().copied().fold(0.0, f64::max);
         let (mut power, mut sum) = (0.0, 0.0);
-        for ((band, _), start) in self.models.iter().zip(&self.starts) {
+        for start in &self.starts {
             let relative: f64 = start / largest;
             power += relative.powi(2);
-            sum += part(-band.decay * band.length) * relative.powi(3);
+            sum += relative.powi(3);
         }
-        largest * sum / power
+        self.part * largest * sum / power
+    }
+
+    /// Returns true where poles that drift explain the decays better than noise makes them.
+    pub fn changes(&self) -> bool {
+        let (mut fall, mut unknowns) = (0.0, 0.0);
+        for (_, model) in self.models {
+            fall += model.evidence.fall;
+            unknowns += model.evidence.unknowns;
+        }
+        unknowns > 0.0 && chi_square_tail(fall, unknowns) <= LEVEL
     }
 
     /// Returns the frequency at the reference amplitude; `None` where the decays do not show that it changes.
@@ -77,18 +95,13 @@ impl<'a> WholeDecays<'a> {
     /// interval rests on the scatter, with Student's t. If they scatter so much that no law of the amplitude explains
     /// them, the interval holds all frequencies of the curve's `points` down to a tenth of the largest amplitude.
     pub fn drift(&self, points: &[AmplitudePoint]) -> Option<Drift> {
-        let (mut fall, mut unknowns) = (0.0, 0.0);
-        for (_, model) in self.models {
-            fall += model.evidence.fall;
-            unknowns += model.evidence.unknowns;
-        }
-        if unknowns == 0.0 || chi_square_tail(fall, unknowns) > LEVEL {
+        if !self.changes() {
             return None;
         }
         let reference = self.reference();
         let (mut there, mut at_one_time, mut freedom) = (Vec::new(), Vec::new(), 0.0);
         for ((band, model), start) in self.models.iter().zip(&self.starts) {
-            let own = part(-band.decay * band.length) * start;
+            let own = self.part * start;
             // A decay that does not reach the amplitude says nothing of it.
             if let (Some(one), Some(other)) = (
                 model.frequency_at(reference, band),

@@ -10,17 +10,19 @@
 //! deviation comes from the noise that remains, or from the scatter of the taps where that is larger. Columns
 //! come from a [`FreeDecayCollector`], or are frequency response functions.
 
+mod extra_mode;
 mod group;
 mod modal_constant;
 mod mode_fit;
 mod steady;
 mod variable_projection;
 
+pub use extra_mode::ExtraMode;
 pub use group::Accepted;
 pub use modal_constant::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub(super) use mode_fit::SCATTERS;
 pub use mode_fit::{
-    ColumnAmplitude, ExtraMode, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
+    ColumnAmplitude, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
     scatter_about_mean, weighted_mean,
 };
 pub use tapjoint_numerics::least_squares::StopReason;

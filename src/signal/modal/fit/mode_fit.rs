@@ -11,10 +11,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, Matrix2};
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail, root_mean_square, student};
+use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail, student};
 
-use super::group::{Accepted, BandData, Group, GroupFit, ModeState, complex_row};
+use super::group::{Accepted, Group, GroupFit, ModeState, complex_row};
 use super::variable_projection::{PoleProblem, half_width};
 use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
@@ -305,6 +304,9 @@ pub struct ModeFit {
     pub joint_with: Vec<usize>,
     /// Reason why the search ended.
     pub stop: StopReason,
+    /// Part of the first amplitude at which a mode that changes with its amplitude has this frequency; `None` where the
+    /// lines do not tell.
+    pub amplitude_part: Option<f64>,
     /// Amplitude in every column of the data that is not zero.
     pub amplitudes: Vec<ColumnAmplitude>,
 }
@@ -469,6 +471,7 @@ impl<'a> GroupReader<'a> {
             background_terms: fit.terms,
             joint_with: self.group.members.clone(),
             stop: fit.stop,
+            amplitude_part: fit.problem.amplitude_part(&fit.at, place),
             amplitudes: self.amplitudes(place),
         })
     }
@@ -601,39 +604,6 @@ fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
     }
 }
 
-/// Test result for one more mode.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExtraMode {
-    /// True where the data need the mode: noise alone does not explain it, and it decays.
-    pub needed: bool,
-    /// Probability of a larger fall of the residual by noise alone at one given place.
-    pub probability: f64,
-    /// Modal assurance criterion between its shape and that of the nearest other mode of its group.
-    ///
-    /// For free decays it is taken over the sensors, as the mean of all taps weighted by their power; for
-    /// frequency response functions over all columns. `None` without such a mode, or with one sensor. Near 1
-    /// the second pole may only correct a decay that is not straight: one mode whose frequency changes while
-    /// it rings. The two poles' shares of a tap then depend on the tap's strength, which is no other shape.
-    pub likeness: Option<f64>,
-    /// Fit of the mode together with the others.
-    pub fit: Result<ModeFit, Unfit>,
-    /// Fit of the nearest other mode of its group beside it.
-    pub neighbour: Option<ModeFit>,
-}
-
-/// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
-/// the data, out of some tens of lines.
-const LEVEL: f64 = 1e-4;
-/// The probability beyond which an added mode is given up after any sweep. 1 %: a hundred times the level, for the next
-/// sweeps lower the residual a little more.
-const HOPELESS: f64 = 0.01;
-/// Least amplitude in standard deviations.
-const LEAST_AMPLITUDE: f64 = 4.0;
-/// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
-/// thousand of them, too many to fit for every chance proposal. On one line in s an amplitude has sqrt(s)
-/// times its standard deviation, so that a mode that only all lines together show is not found.
-const SCREENED: usize = 1000;
-
 impl<'a> Accepted<'a> {
     /// Fits the modes that begin at `starts`. Returns also for each start its mode or the reason why there is
     /// none, as [`fit_modes`](super::fit_modes) does.
@@ -668,7 +638,7 @@ impl<'a> Accepted<'a> {
     }
 
     /// Reads the modes from the fits of their groups. Returns for each start its mode, or why there is none.
-    fn read(&mut self, groups: &[Group]) -> Vec<Result<ModeFit, Unfit>> {
+    pub(super) fn read(&mut self, groups: &[Group]) -> Vec<Result<ModeFit, Unfit>> {
         let mut fits: Vec<Option<ModeFit>> = vec![None; self.modes.len()];
         for group in groups {
             let reader = GroupReader::new(self.data, &self.settings, group);
@@ -684,148 +654,4 @@ impl<'a> Accepted<'a> {
         fits.map(|(fit, state)| fit.ok_or_else(|| state.reason()))
             .collect()
     }
-
-    /// Tests whether the data ask for a mode that begins at `extra`. Returns the test, and all modes together.
-    ///
-    /// The models with and without it are fitted to the same lines with the same background. The extra pole
-    /// must lower the residual by far more than its unknowns explain, decay, and exceed its own uncertainty.
-    /// Modes that are not fitted jointly with it do not change. A start that fails on thinned lines is not
-    /// tried on all lines.
-    pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
-        let (test, mut together, stride) = self.test_on(extra, SCREENED);
-        if test.needed && stride > 1 {
-            let (test, together, _) = self.test_on(extra, usize::MAX);
-            return (test, together);
-        }
-        together.most_lines = usize::MAX;
-        (test, together)
-    }
-
-    /// Tests on at most so many lines of the band. Returns also the step between the lines taken.
-    fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
-        let mut beside = self.clone();
-        beside.most_lines = most_lines;
-        let group = beside.add(extra);
-        let mut fits = group
-            .as_ref()
-            .map(|group| beside.read(std::slice::from_ref(group)));
-        let last = self.modes.len();
-        let mut test = ExtraMode {
-            needed: false,
-            probability: 1.0,
-            likeness: None,
-            fit: match &mut fits {
-                Some(fits) => fits.swap_remove(last),
-                None => Err(beside.modes[last].reason()),
-            },
-            neighbour: None,
-        };
-        let stride = group
-            .as_ref()
-            .map_or(1, |group| group.fit.problem.lines.stride);
-        if let (Some(group), Ok(mode)) = (&group, &test.fit)
-            && let Some(place) = group.members.iter().position(|&index| index == last)
-            && let Some((probability, information_gain)) = beside.gain_of(group, place)
-        {
-            test.probability = probability;
-            if let Some(nearest) = group.fit.nearest(place) {
-                test.likeness = group.fit.likeness(self.data, place, nearest);
-                let index = group.members[nearest];
-                test.neighbour = fits.and_then(|mut fits| fits.swap_remove(index).ok());
-            }
-            test.needed = is_needed(mode, probability, information_gain);
-        }
-        (test, beside, stride)
-    }
-
-    /// Compares the fits with and without the pole at `place`, as [`gain`]; `None` where one of them fails.
-    fn gain_of(&self, group: &Group, place: usize) -> Option<(f64, f64)> {
-        let fit = &group.fit;
-        let band = BandData::new(self, &group.members).ok()?;
-        let mut fewer: Vec<Complex64> = fit.at.poles.clone();
-        fewer.remove(place);
-        // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
-        let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
-        let without = match fewer.is_empty() {
-            true => band.square_sum_without(fit.terms, &fit.noise),
-            false => band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum,
-        };
-        gain(&band, &with, without)
-    }
-
-    /// Returns true where the data ask for the fitted mode of start `index`, all other poles being as they are.
-    ///
-    /// [`test`](Self::test) lets the others move, and takes much longer.
-    pub fn needs(&self, index: usize, mode: &ModeFit) -> bool {
-        let members = &mode.joint_with;
-        let Some(place) = members.iter().position(|&member| member == index) else {
-            return false;
-        };
-        let gain = BandData::new(self, members).ok().and_then(|band| {
-            let noise = self.noise(members, &band.used)?;
-            self.gain_at(&band, members, place, mode.background_terms, &noise)
-        });
-        gain.is_some_and(|(probability, gain)| is_needed(mode, probability, gain))
-    }
-
-    /// Compares the fits with and without the pole at `place` of a group, all poles being as they are, as [`gain`].
-    fn gain_at(
-        &self,
-        band: &BandData,
-        members: &[usize],
-        place: usize,
-        terms: usize,
-        noise: &[f64],
-    ) -> Option<(f64, f64)> {
-        let poles = self.poles(members);
-        let mut fewer = poles.clone();
-        fewer.remove(place);
-        let with = band.search(&poles, terms, noise, 0).ok()?;
-        let without = match fewer.is_empty() {
-            true => band.square_sum_without(terms, noise),
-            false => band.search(&fewer, terms, noise, 0).ok()?.at.square_sum,
-        };
-        gain(band, &with, without)
-    }
-
-    /// Returns false where a mode that has just been added will not be needed, so that more sweeps are vain.
-    ///
-    /// Without it the others have not moved: the residual falls by more than it will between two settled fits.
-    pub(super) fn may_be_needed(&self, group: &Group, start: usize) -> bool {
-        let (members, fit) = (&group.members, &group.fit);
-        let Some(place) = members.iter().position(|&index| index == start) else {
-            return true;
-        };
-        let gain = (BandData::new(self, members).ok())
-            .and_then(|band| self.gain_at(&band, members, place, fit.terms, &fit.noise));
-        gain.is_none_or(|(probability, _)| probability < HOPELESS)
-    }
-}
-
-/// Compares two fits of a group's band, one `with` a pole and one without it, which leaves the sum of squares `without`.
-/// Returns the probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
-/// criterion.
-///
-/// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
-/// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
-/// n ln S + k ln n.
-fn gain(band: &BandData, with: &GroupFit, without: f64) -> Option<(f64, f64)> {
-    let columns = band.used.len() as f64;
-    let unknowns = 2.0 + 2.0 * columns;
-    let values = 2.0 * band.lines.count() as f64 * columns;
-    let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
-    let fall = (without - with.at.square_sum) / unknowns / with.variance;
-    let probability = if fall > 0.0 { chance.sf(fall) } else { 1.0 };
-    let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
-    Some((probability, criterion))
-}
-
-/// Returns true where noise alone does not explain the fall of the residual, and the mode is certain to decay.
-fn is_needed(mode: &ModeFit, probability: f64, information_gain: f64) -> bool {
-    let amplitudes = mode.amplitudes.iter();
-    let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
-    probability < LEVEL
-        && information_gain > 0.0
-        && root_mean_square(&ratios) > LEAST_AMPLITUDE
-        && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std
 }

@@ -275,6 +275,39 @@ impl PoleProblem {
         }
     }
 
+    /// Returns the part of its first amplitude at which a mode whose frequency changes a little, in proportion to its
+    /// amplitude, has the frequency that the fit finds; `None` of functions, and where no part between 0 and 1 fits.
+    ///
+    /// A frequency that is higher by d s e^{-s t} turns the phase by d (1 - e^{-s t}): to first order the decay gains
+    /// j d a (e^{p t} - e^{(p - s) t}). Gauss and Newton's step to these data moves the pole by the part times d s.
+    pub fn amplitude_part(&self, best: &Evaluation, place: usize) -> Option<f64> {
+        self.lines.kappa?;
+        let pole = best.poles[place];
+        let faster = Complex64::new(2.0 * pole.re, pole.im);
+        // Both begin with one amplitude; see the factor of the truncation above.
+        let ratio = (1.0 - (TAU * faster).exp()) / (1.0 - (TAU * pole).exp());
+        let amplitudes = DMatrix::from_fn(4, self.columns.ncols(), |row, column| {
+            let b = Complex64::new(
+                best.amplitudes[(2 * place, column)],
+                best.amplitudes[(2 * place + 1, column)],
+            );
+            let turned = Complex64::i() * b;
+            let value = if row < 2 { turned } else { -turned * ratio };
+            if row % 2 == 0 { value.re } else { value.im }
+        });
+        let gained = self.lines.model(&[pole, faster]) * amplitudes;
+        let mut residual = self.fixed.complement(gained);
+        let shares = best.orthonormal.tr_mul(&residual);
+        residual.gemm(-1.0, &best.orthonormal, &shares, 1.0);
+        let slopes = self.slopes(&Evaluation {
+            residual,
+            ..best.clone()
+        });
+        let step = slopes.information.cholesky()?.solve(&-slopes.gradient);
+        let part = step[2 * place] / -pole.re;
+        (part > 0.0 && part < 1.0).then_some(part)
+    }
+
     /// Minimises the residual from `start` with at most `steps` steps.
     ///
     /// `freedom` are the degrees of freedom of the residual. `None` where the poles' columns or their

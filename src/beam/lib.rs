@@ -24,11 +24,15 @@ pub mod joint;
 pub mod natural_modes;
 pub mod receptance;
 pub mod specimen;
+pub mod width;
 
 mod eigen;
+mod modal_interface;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::{Assembly, Joint, JointStiffness};
+pub use width::WidthStiffening;
+
 pub use natural_modes::{
     MEASURED_LIMIT, MODE_LIMIT, ModeShape, NaturalMode, Symmetry, mode_shapes, natural_frequencies,
     natural_lambdas, natural_lambdas_of_any_joint, natural_modes,

@@ -18,7 +18,7 @@ width = 0.05                   # m
 thickness = 0.005              # m, in the direction of vibration
 modulus = "207 GPa"            # Young's modulus, Pa
 density = 7850                 # kg/m3
-# poisson = 0.3                # Poisson's ratio, default 0.3; enters shear deformation only
+# poisson = 0.3                # Poisson's ratio, default 0.3; enters shear and stiffening by the width
 # tolerance = { length = "1 mm", width = "0.1 mm", thickness = "0.05 mm", modulus = "2 %", density = "1 %" }   # standard uncertainties, default: none stated
 "#;
 
@@ -29,7 +29,7 @@ model = "2p"                   # "2p" (default): translation and rotation | "3p"
 # kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
 # kr = 320                     # N m/rad, default: fitted
 #   ktr = 2e4, N/rad, only with model = "3p", default: fitted; negative where elasticity reaches into the support
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 "#;
 
 const LAP: &str = r#"
@@ -41,7 +41,7 @@ kind = "lap"                   # "cantilever": held at one end | "lap": two halv
 # model = "2p"                 # translation and rotation, the only model of a lap joint
 # kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
 # kr = 320                     # N m/rad, default: fitted
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 # position = 0.2115            # m, default: the middle
 # overlap = { length = "40 mm", mass = "50 g" }   # the overlapping piece with its bolts, default: none
 "#;
@@ -49,7 +49,7 @@ kind = "lap"                   # "cantilever": held at one end | "lap": two halv
 const FREE: &str = r#"
 [joint]
 kind = "free"                  # "cantilever": held at one end | "lap": two halves joined | "free": no joint
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 "#;
 
 /// The line that begins the table of a recording.

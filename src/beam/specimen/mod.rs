@@ -14,7 +14,7 @@ pub(crate) mod model;
 pub(crate) mod modes;
 
 pub use crate::joint::Joint;
-use crate::{Assembly, Beam, BeamTheory, STIFFNESS_RULE, StructureError, require};
+use crate::{Assembly, Beam, BeamTheory, STIFFNESS_RULE, StructureError, WidthStiffening, require};
 pub use modes::{BeamModes, SpecimenModes};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -179,6 +179,8 @@ pub struct Specimen {
     pub body: Body,
     /// Share of shear flexibility and rotary inertia (1): 0 = Euler's beam, 1 = Timoshenko's.
     pub shear_rotary: f64,
+    /// Stiffening by the width. Timoshenko's beam has it, Euler's has not.
+    pub width_stiffening: WidthStiffening,
     /// The joint: it holds the beam's left end, or the two halves of a lap joint together. `None` where
     /// nothing does.
     pub joint: Option<Joint>,
@@ -205,6 +207,7 @@ impl Specimen {
         Self {
             body,
             shear_rotary: 0.0,
+            width_stiffening: WidthStiffening::Ignored,
             joint,
             joint_mass: PointInertia::default(),
             overlap: None,
@@ -228,6 +231,7 @@ impl Specimen {
         let mut specimen = Self::new(Body::of(beam, assembly, lap), joint);
         if theory == BeamTheory::Timoshenko {
             specimen.shear_rotary = 1.0;
+            specimen.width_stiffening = WidthStiffening::SprungAtJoint;
         }
         specimen.overlap = lap.overlap.filter(|_| assembly == Assembly::Lap);
         specimen

@@ -208,7 +208,7 @@ fn all_pairs(
     Ok(pairs)
 }
 
-fn failure(reason: &str) -> StructureError {
+pub(crate) fn failure(reason: &str) -> StructureError {
     StructureError::FiniteElements {
         reason: reason.to_owned(),
     }

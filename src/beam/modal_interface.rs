@@ -1,11 +1,12 @@
 //! A structure of finite elements seen from its joint.
 
 use super::StructureError;
-use super::eigen::{dot, pairs_for_forces};
+use super::eigen::{BandedMatrix, Eigenpairs, dot, failure, pairs_for_forces};
 use super::interface::{AcrossFunctions, Coefficients, InterfaceFunctions};
 use super::specimen::model::{ACROSS, Model, Motion, Place};
 use super::specimen::modes::SHIFT;
 use super::specimen::{Body, Specimen};
+use nalgebra::{DMatrix, SymmetricEigen};
 use std::ops::{Add, Mul, Sub};
 
 /// All modes of a structure without its joint, by finite elements.
@@ -13,7 +14,8 @@ use std::ops::{Add, Mul, Sub};
 /// The joint touches two motions only, so that the finite-element model with any joint has the
 /// frequencies at which compliance and receptance of those two motions cancel. The receptance is
 /// the sum over the lowest modes of the model without joint, and over motions that stand for all
-/// higher ones: nothing is truncated, and one decomposition serves every joint.
+/// higher ones: nothing is truncated, and one decomposition serves every joint. What elements miss of their own inertia
+/// is added to second order among these motions ([`SecondOrder`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceModes {
     /// Squares of the natural frequencies, in units of lambda^4 (1), ascending.
@@ -23,9 +25,9 @@ pub struct InterfaceModes {
     joint: Vec<[f64; 3]>,
     /// Stiffness of the joint against curvature across the width over its Kx (1); 0 where nothing resists it.
     across_ratio: f64,
-    /// Curvature across the width at the joint per load on it, by all that the modes here miss. The curling has no
-    /// inertia, so that most of it is missed; and what the higher modes add is nearly static.
-    across_beyond: f64,
+    /// Static receptance beside the modes. Curling has no inertia, so that modes miss most of it, and what higher modes
+    /// add to it is nearly static.
+    beyond: [[f64; 3]; 3],
     masses: Vec<Attachment>,
     springs: Vec<Attachment>,
     rigid_modes: usize,
@@ -71,7 +73,7 @@ impl InterfaceModes {
         // The lowest mode left out then has about four times the highest frequency.
         let count = 2 * highest + 10;
         let forces = [0, 1].map(|component| model.joint_load(component));
-        let pairs = pairs_for_forces(
+        let mut pairs = pairs_for_forces(
             [&stiffness, &mass],
             SHIFT,
             model.highest_square(),
@@ -79,6 +81,12 @@ impl InterfaceModes {
             count,
             &forces,
         )?;
+        // Motions that only rounding gives an inertia.
+        let most = 1e3 * model.highest_square();
+        let moving = pairs.values.partition_point(|square| *square < most);
+        pairs.values.truncate(moving);
+        pairs.vectors.truncate(moving);
+        let second_order = SecondOrder::of(&pairs, &model.second_order_matrix())?;
         let vectors = pairs.vectors.iter();
         let motions: Vec<Motion> = vectors.map(|vector| model.motion(vector)).collect();
         let joint: Vec<[f64; 3]> = motions
@@ -88,8 +96,20 @@ impl InterfaceModes {
                 [w, -theta, model.joint_curling(motion)]
             })
             .collect();
+        let mut beyond = [[0.0; 3]; 3];
+        for index in 0..pairs.values.len() {
+            let motion = [0, 1, 2].map(|i| second_order.fixed(index, |row| joint[row][i]));
+            for (row, a) in beyond.iter_mut().zip(motion) {
+                for (entry, b) in row.iter_mut().zip(motion) {
+                    *entry += a * b;
+                }
+            }
+        }
+        let squares = second_order.squares.clone();
+        let joint: Vec<[f64; 3]> = (0..squares.len())
+            .map(|index| [0, 1, 2].map(|i| second_order.moving(index, |row| joint[row][i])))
+            .collect();
         // The pairs exist, and so does this factor.
-        let mut across_beyond = 0.0;
         if model.across_ratio > 0.0
             && let Some(factor) = stiffness.plus(SHIFT, &mass).cholesky()
         {
@@ -97,21 +117,34 @@ impl InterfaceModes {
             let mut answer = load.clone();
             factor.solve_lower(&mut answer);
             factor.solve_upper(&mut answer);
-            across_beyond = dot(&load, &answer);
-            for (square, motion) in pairs.values.iter().zip(&joint) {
-                across_beyond -= motion[ACROSS].powi(2) / (square + SHIFT);
+            beyond[ACROSS][ACROSS] = dot(&load, &answer);
+            for (square, motion) in squares.iter().zip(&joint) {
+                beyond[ACROSS][ACROSS] -= motion[ACROSS].powi(2) / (square + SHIFT);
             }
         }
+        let attached = |size: f64, place: &Place| {
+            let plain = Attachment::new(size, place, &motions).motion;
+            let motion =
+                (0..squares.len()).map(|index| second_order.moving(index, |row| plain[row]));
+            Attachment {
+                size,
+                motion: motion.collect(),
+            }
+        };
         let masses = model.masses.iter();
-        let masses = masses.map(|item| Attachment::new(item.mass, &item.place, &motions));
+        let masses = masses
+            .map(|item| attached(item.mass, &item.place))
+            .collect();
         let springs = model.springs.iter();
-        let springs = springs.map(|item| Attachment::new(item.stiffness, &item.place, &motions));
+        let springs = springs
+            .map(|item| attached(item.stiffness, &item.place))
+            .collect();
         Ok(Self {
-            squares: pairs.values,
+            squares,
             joint,
-            across_beyond,
-            masses: masses.collect(),
-            springs: springs.collect(),
+            beyond,
+            masses,
+            springs,
             across_ratio: model.across_ratio,
             rigid_modes: model.rigid_motions(),
             uncounted: match specimen.body {
@@ -161,7 +194,7 @@ impl InterfaceModes {
         if self.across_ratio > 0.0 {
             // The springs' load on the curvature across the width follows from the other two.
             let compliance = translation / self.across_ratio;
-            let (mut curling, mut receptance) = (0.0, compliance + self.across_beyond);
+            let (mut curling, mut receptance) = (0.0, compliance + self.beyond[ACROSS][ACROSS]);
             let modes = self.squares.iter().zip(&self.joint);
             for ((free, phi), weight) in modes.clone().zip(&weights) {
                 curling += phi[ACROSS] * weight;
@@ -221,8 +254,8 @@ impl InterfaceModes {
     /// Receptance at an omega^2, the nearest mode apart.
     fn receptance_beside(&self, nearest: usize, square: f64) -> Receptance {
         let rows = if self.across_ratio > 0.0 { 3 } else { 2 };
-        let mut rest = [[Dual::default(); 3]; 3];
-        rest[ACROSS][ACROSS].value = self.across_beyond;
+        let fixed = |value| Dual { value, slope: 0.0 };
+        let mut rest = self.beyond.map(|row| row.map(fixed));
         for (index, (free, motion)) in self.squares.iter().zip(&self.joint).enumerate() {
             if index == nearest {
                 continue;
@@ -241,10 +274,108 @@ impl InterfaceModes {
                 value: self.squares[nearest] - square,
                 slope: -1.0,
             },
-            motion: self.joint[nearest].map(|value| Dual { value, slope: 0.0 }),
+            motion: self.joint[nearest].map(fixed),
             rest,
         }
     }
+}
+
+/// The motions of a model anew, with what omega^4 adds.
+///
+/// With unit modal masses and S = V V^T among the motions their equation is (D - omega^2 - omega^4 S) q = f. With
+/// p = omega^2 V^T q it is linear in omega^2, of twice the size:
+///
+/// ```text
+/// ( [D 0; 0 1] - omega^2 [1 V; V^T 0] ) [q; p] = [f; 0].
+/// ```
+///
+/// Half of its eigenvalues are the squares of frequencies. The others are negative, and so far away that their share of a
+/// receptance is static.
+struct SecondOrder {
+    squares: Vec<f64>,
+    /// Columns: each motion in terms of those before, of unit modal mass.
+    moving: DMatrix<f64>,
+    /// Columns: what remains, by its static receptance.
+    fixed: DMatrix<f64>,
+}
+
+impl SecondOrder {
+    fn of(pairs: &Eigenpairs, second_order: &BandedMatrix) -> Result<Self, StructureError> {
+        let count = pairs.values.len();
+        let loads: Vec<Vec<f64>> = pairs
+            .vectors
+            .iter()
+            .map(|vector| second_order.times(vector))
+            .collect();
+        let among = DMatrix::from_fn(count, count, |row, column| {
+            0.5 * (dot(&pairs.vectors[row], &loads[column])
+                + dot(&pairs.vectors[column], &loads[row]))
+        });
+        let among = eigen_of(among)?;
+        let mut inertia = DMatrix::zeros(2 * count, 2 * count);
+        let mut stiffness = DMatrix::identity(2 * count, 2 * count);
+        for row in 0..count {
+            inertia[(row, row)] = 1.0;
+            stiffness[(row, row)] = pairs.values[row];
+            for column in 0..count {
+                let root = among.eigenvalues[column].max(0.0).sqrt();
+                let entry = among.eigenvectors[(row, column)] * root;
+                inertia[(row, count + column)] = entry;
+                inertia[(count + column, row)] = entry;
+            }
+        }
+        let shifted = stiffness + SHIFT * &inertia;
+        let lower = shifted.cholesky().ok_or_else(|| {
+            failure("its elements are too long for their own inertia; divide finer")
+        })?;
+        let lower = lower.l();
+        let half = lower.solve_lower_triangular(&inertia);
+        let inverse = half.and_then(|half| lower.solve_lower_triangular(&half.transpose()));
+        let inverse = inverse.ok_or_else(|| failure("the stiffness matrix is nearly singular"))?;
+        let eigen = eigen_of(0.5 * (&inverse + inverse.transpose()))?;
+        let vectors = lower.tr_solve_lower_triangular(&eigen.eigenvectors);
+        let vectors = vectors.ok_or_else(|| failure("the stiffness matrix is nearly singular"))?;
+        let mut order: Vec<usize> = (0..2 * count).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let inverses = eigen.eigenvalues;
+        let moving = DMatrix::from_fn(count, count, |row, column| {
+            vectors[(row, order[column])] / inverses[order[column]].sqrt()
+        });
+        let fixed = DMatrix::from_fn(count, count, |row, column| {
+            vectors[(row, order[count + column])]
+        });
+        let squares = order[..count].iter();
+        Ok(Self {
+            squares: squares.map(|&i| 1.0 / inverses[i] - SHIFT).collect(),
+            moving,
+            fixed,
+        })
+    }
+
+    /// Value of a new motion, from those of the motions before.
+    fn moving(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
+        let column = self.moving.column(index);
+        column
+            .iter()
+            .enumerate()
+            .map(|(row, share)| share * value(row))
+            .sum()
+    }
+
+    /// The same of a part that is static.
+    fn fixed(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
+        let column = self.fixed.column(index);
+        column
+            .iter()
+            .enumerate()
+            .map(|(row, share)| share * value(row))
+            .sum()
+    }
+}
+
+fn eigen_of(matrix: DMatrix<f64>) -> Result<SymmetricEigen<f64, nalgebra::Dyn>, StructureError> {
+    SymmetricEigen::try_new(matrix, f64::EPSILON, 10_000)
+        .ok_or_else(|| failure("its eigenvalues did not settle"))
 }
 
 /// A number and its derivative with omega^2.
@@ -383,10 +514,10 @@ mod tests {
                     let [found, exact] =
                         [&few, &all].map(|body| body.root(compliances, mode, guess, LAST_STEP));
                     let off = found.lambda / exact.lambda - 1.0;
-                    // What is left out, and the rounding of the dense matrix, are less than 1e-9; the same again
-                    // is left out of the curling at a rigid joint, more of high modes.
+                    // What is left out of the motions, of their second order and of the curling at a rigid joint, and
+                    // the rounding of the dense matrix.
                     assert!(
-                        off.abs() < 1e-8,
+                        off.abs() < 5e-8,
                         "{assembly:?} {compliances:?} {mode}: {off:e}"
                     );
                 }

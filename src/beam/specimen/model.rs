@@ -479,6 +479,27 @@ impl Model {
         (stiffness, mass)
     }
 
+    /// What omega^4 adds: the matrix of [`Energies::second_order`].
+    pub(crate) fn second_order_matrix(&self) -> BandedMatrix {
+        let mut matrix = BandedMatrix::zeros(self.numbering.size);
+        for run in &self.runs {
+            for node in run.first_node..run.first_node + run.elements {
+                self.scatter(&mut matrix, node, &run.section.second_order);
+            }
+        }
+        for item in &self.masses {
+            let (w, inner) = (item.place.weights.displacement, item.place.inner);
+            let of_mass = std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    item.mass * item.mass * item.compliance * w[i] * w[j]
+                        + item.mass * (w[i] * inner[j] + inner[i] * w[j])
+                })
+            });
+            self.scatter(&mut matrix, item.place.node, &of_mass);
+        }
+        matrix
+    }
+
     /// What the width adds to the element behind a node.
     fn across_at<'a>(&'a self, run: &'a Run, node: usize) -> &'a Across {
         match self.hinged_at(node) {

@@ -97,7 +97,7 @@ fn compliances(joint: &JointStiffness) -> [f64; 3] {
 }
 
 fn body_of(specimen: &Specimen) -> JointedBody {
-    let modes = InterfaceModes::new(specimen, 262, 7).unwrap();
+    let modes = InterfaceModes::new(specimen, 157, 7).unwrap();
     JointedBody::Elements(Box::new(modes))
 }
 
@@ -115,9 +115,9 @@ fn prop_frequency_equation_and_specimen_agree() {
                 let guess = 3.0 * mode as f64;
                 let root = body.root(compliances(&joint), mode, guess, LAST_STEP);
                 let found = strip().frequency_of(root.lambda);
-                // Elements of this size leave 4e-6 in the seventh mode, without the width as well.
+                // What elements of either mesh leave in the seventh mode.
                 assert!(
-                    (found / exact - 1.0).abs() < 5e-6,
+                    (found / exact - 1.0).abs() < 1e-6,
                     "{assembly:?} {joint:?}, mode {mode}: {found} against {exact}"
                 );
             }
@@ -171,10 +171,15 @@ fn limit_nothing_is_left_of_a_narrow_or_incompressible_section() {
                 natural_frequencies(BeamTheory::Timoshenko, &beam, assembly, &joint, 7).unwrap();
             for (exact, found) in exact.iter().zip(found) {
                 let exact = beam.frequency_of(exact.lambda);
-                // nu^2 = 1e-10, (b/L)^2 = 2e-7 times 0.01. Where the width is a tenth of an element, the curvature's
-                // jumps at the nodes leave (k h)^4 nu^2/36 = 7e-7 in the seventh mode.
+                // nu^2 = 1e-10, (b/L)^2 = 2e-7 times 0.01; elements leave 1e-7. At a rigid joint the first order in the
+                // width is left: an end that cannot curl seems shorter by about 0.3 nu^2 b.
+                let mut allowed = 1e-6;
+                if joint.kx.is_infinite() {
+                    allowed += 0.8 * poisson.powi(2) * width / beam.length;
+                }
+                let off = (found / exact - 1.0).abs();
                 assert!(
-                    (found / exact - 1.0).abs() < 1e-6,
+                    off < allowed,
                     "{assembly:?} {joint:?} {poisson} {width}: {found} against {exact}"
                 );
             }

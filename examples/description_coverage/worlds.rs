@@ -252,7 +252,7 @@ fn draw(kind: Kind, theory: BeamTheory, world: World, random: &mut ChaCha8Rng) -
     let length = log_uniform(random, 0.2, 1.0);
     let beam = Beam {
         length,
-        width: length * log_uniform(random, 0.03, 0.12),
+        width: length * log_uniform(random, 0.03, 0.15),
         thickness: length * log_uniform(random, 0.006, 0.02),
         modulus,
         density,
@@ -266,6 +266,7 @@ fn draw(kind: Kind, theory: BeamTheory, world: World, random: &mut ChaCha8Rng) -
         thickness: Some(relative(0.005, 0.02e-3, beam.thickness)),
         modulus: Some(0.01),
         density: Some(0.005),
+        poisson: Some(0.02),
     };
     let mut described = JointedStructure::new(theory, beam, kind.assembly());
     let mut settings = kind.settings();
@@ -280,7 +281,7 @@ fn draw(kind: Kind, theory: BeamTheory, world: World, random: &mut ChaCha8Rng) -
         thickness: moved(beam.thickness, tolerances.thickness),
         modulus: moved(beam.modulus, tolerances.modulus),
         density: moved(beam.density, tolerances.density),
-        poisson: beam.poisson,
+        poisson: beam.poisson + 0.02 * error(world, random),
     };
     let mut actual = JointedStructure::new(theory, true_beam, kind.assembly());
     for sensor in 0..random.random_range(0..3) {

@@ -159,6 +159,7 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
             thickness: share(tolerance.thickness, beam.thickness),
             modulus: share(tolerance.modulus, beam.modulus),
             density,
+            poisson: share(tolerance.poisson, 1.0),
         },
         weighed: test.beam.weighed.map(|weighed| WeighedBeam {
             mass: weighed.mass,

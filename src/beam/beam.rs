@@ -18,7 +18,7 @@ pub const DEFAULT_POISSON: f64 = 0.3;
 pub enum BeamTheory {
     /// Bending and translational inertia only, as in Ingole & Chatterjee.
     Euler,
-    /// Shear deformation ([`SHEAR_COEFFICIENT`]) and rotary inertia as well.
+    /// Shear deformation ([`SHEAR_COEFFICIENT`]), rotary inertia and stiffening by the width ([`crate::width`]) as well.
     Timoshenko,
 }
 
@@ -117,6 +117,11 @@ impl Beam {
     /// Frequency (Hz) of a non-dimensional frequency lambda (1).
     pub fn frequency_of(&self, lambda: f64) -> f64 {
         lambda * lambda * self.unit_frequency()
+    }
+
+    /// Returns true where the theory lets the width stiffen the beam. With a Poisson's ratio of 0 no section curls.
+    pub fn is_stiffened(&self, theory: BeamTheory) -> bool {
+        theory == BeamTheory::Timoshenko && self.poisson != 0.0
     }
 
     /// Returns how slender the beam is for the given theory.

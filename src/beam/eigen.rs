@@ -7,7 +7,7 @@
 //! suffice, each of them two solutions with the banded factor. All pairs come from the dense matrix, whose
 //! time grows with the cube of its size: small ones only.
 //!
-//! The matrices are symmetric and of half-bandwidth 3, as beams have them. The fixed band lets the compiler
+//! The matrices are symmetric and of half-bandwidth 5, as beams have them. The fixed band lets the compiler
 //! unroll every inner loop.
 
 use crate::StructureError;
@@ -208,7 +208,7 @@ fn all_pairs(
     Ok(pairs)
 }
 
-fn failure(reason: &str) -> StructureError {
+pub(crate) fn failure(reason: &str) -> StructureError {
     StructureError::FiniteElements {
         reason: reason.to_owned(),
     }
@@ -395,9 +395,9 @@ fn normalise(vector: &mut [f64]) -> f64 {
     length
 }
 
-/// Half-bandwidth of a beam's matrices. Nodes have two motions, so that an element reaches three
+/// Half-bandwidth of a beam's matrices. Nodes have up to three motions, so that an element reaches five
 /// equations to the left.
-const HALF_BAND: usize = 3;
+const HALF_BAND: usize = 5;
 
 /// One row: the entries left of the diagonal (nearest last), and the diagonal at the end.
 type Row = [f64; HALF_BAND + 1];

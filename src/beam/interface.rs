@@ -14,12 +14,9 @@
 //! the like are exact. One beam, two beams joined end to end and finite elements differ in these
 //! five functions only.
 
-use super::eigen::pairs_for_forces;
+pub use super::modal_interface::InterfaceModes;
 use super::receptance::{EndFunctions, EndSlopes};
-use super::specimen::model::{Model, Motion, Place};
-use super::specimen::modes::SHIFT;
-use super::specimen::{Body, Specimen};
-use super::{Beam, BeamTheory, JointStiffness, Slenderness, StructureError};
+use super::{Beam, BeamTheory, JointStiffness, Slenderness};
 
 /// The five functions P, X, Y, Z, Q at one frequency, or their slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +47,18 @@ impl Coefficients {
         }
     }
 
-    fn scaled(&self, factor: f64) -> Self {
+    /// Returns `weight` self + `other_weight` other.
+    fn plus(&self, weight: f64, other_weight: f64, other: &Self) -> Self {
+        Self {
+            p: weight * self.p + other_weight * other.p,
+            x: weight * self.x + other_weight * other.x,
+            y: weight * self.y + other_weight * other.y,
+            z: weight * self.z + other_weight * other.z,
+            q: weight * self.q + other_weight * other.q,
+        }
+    }
+
+    pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             p: factor * self.p,
             x: factor * self.x,
@@ -58,6 +66,13 @@ impl Coefficients {
             z: factor * self.z,
             q: factor * self.q,
         }
+    }
+}
+
+impl From<[f64; 5]> for Coefficients {
+    /// P, X, Y, Z, Q in this order.
+    fn from([p, x, y, z, q]: [f64; 5]) -> Self {
+        Self { p, x, y, z, q }
     }
 }
 
@@ -83,6 +98,8 @@ pub struct JointWeights {
     missing: usize,
     /// Number of negative eigenvalues of the joint's stiffness: motions that grow.
     unstable: usize,
+    /// Translational compliance and stiffness 1/Kx and 1, by one factor that keeps both finite.
+    translation: [f64; 2],
 }
 
 impl From<&JointStiffness> for JointWeights {
@@ -119,6 +136,7 @@ impl From<&JointStiffness> for JointWeights {
             sign: if (sx < 0.0) == (sy < 0.0) { 1.0 } else { -1.0 },
             missing,
             unstable,
+            translation: [cx, sx],
         }
     }
 }
@@ -136,6 +154,7 @@ impl JointWeights {
             sign: 1.0,
             missing: 0,
             unstable: 0,
+            translation: [a, 1.0],
         }
     }
 
@@ -162,12 +181,49 @@ pub struct InterfaceFunctions {
     pub slopes: Coefficients,
     /// Natural frequencies of the body without joint below lambda, rigid-body motions included.
     pub free_count: usize,
+    /// The same functions where the joint's end cannot curl across the width; `None` where no joint resists that.
+    pub across: Option<AcrossFunctions>,
+}
+
+/// The functions of a body whose end cannot curl across the width.
+///
+/// A joint whose springs are spread over the width resists curling by the stiffness `ratio` Kx. With this third
+/// spring every function is F + ratio Kx F', F' the one here; both are multiplied by 1/Kx.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AcrossFunctions {
+    /// Stiffness against curling over Kx (1).
+    pub ratio: f64,
+    /// P, X, Y, Z, Q.
+    pub values: Coefficients,
+    /// Their derivatives with lambda.
+    pub slopes: Coefficients,
 }
 
 impl InterfaceFunctions {
     /// Returns value and slope of the frequency equation with this joint.
     pub fn equation(&self, joint: &JointWeights) -> (f64, f64) {
-        (joint.equation(&self.values), joint.equation(&self.slopes))
+        let at = self.with_springs(joint);
+        (joint.equation(&at.values), joint.equation(&at.slopes))
+    }
+
+    /// Returns the functions of the body with the joint's resistance to curling as a part of it.
+    fn with_springs(&self, joint: &JointWeights) -> Self {
+        let Some(across) = &self.across else {
+            return *self;
+        };
+        let [compliance, stiffness] = joint.translation;
+        let size = compliance + across.ratio * stiffness;
+        let (free, held) = (compliance / size, across.ratio * stiffness / size);
+        let values = self.values.plus(free, held, &across.values);
+        // A spring more: the body has one frequency less below where receptance and compliance together are negative.
+        let fewer = usize::from(values.p * self.values.p < 0.0);
+        Self {
+            lambda: self.lambda,
+            values,
+            slopes: self.slopes.plus(free, held, &across.slopes),
+            free_count: self.free_count.saturating_sub(fewer),
+            across: None,
+        }
     }
 
     /// Returns Newton's step of lambda towards a root: on lambda^4 G, which has no pole at zero frequency
@@ -180,7 +236,8 @@ impl InterfaceFunctions {
     /// & Williams 1971): those of the free body, less the negative eigenvalues of compliance plus
     /// receptance, and those of the compliance itself.
     pub fn count(&self, joint: &JointWeights, value: f64) -> usize {
-        let v = &self.values;
+        let at = self.with_springs(joint);
+        let v = &at.values;
         let negative = if joint.sign * value * v.p < 0.0 {
             1
         } else if joint.sign * (joint.a * v.p + joint.one * v.x) * v.p < 0.0 {
@@ -188,7 +245,7 @@ impl InterfaceFunctions {
         } else {
             0
         };
-        (self.free_count + joint.unstable).saturating_sub(negative)
+        (at.free_count + joint.unstable).saturating_sub(negative)
     }
 }
 
@@ -248,6 +305,7 @@ impl JointedBody {
                         q: first.q + second.q,
                     },
                     free_count: left.free_count + right.free_count,
+                    across: None,
                 }
             }
             Self::Elements(modes) => modes.functions(lambda),
@@ -257,7 +315,7 @@ impl JointedBody {
     /// Natural frequencies below `lambda` (1) on a joint.
     fn count(&self, joint: &JointWeights, lambda: f64) -> usize {
         let at = self.functions(lambda);
-        at.count(joint, joint.equation(&at.values))
+        at.count(joint, at.equation(joint).0)
     }
 
     /// Returns the number of rigid-body motions that no joint with springs takes away; they are no modes.
@@ -283,12 +341,17 @@ impl JointedBody {
         let weights = JointWeights::from_compliances(compliances);
         let number = mode + self.uncounted();
         let (lambda, at) = self.find_root(&weights, number, guess, last_step);
-        let (_, slope) = at.equation(&weights);
-        let v = &at.values;
+        let sprung = at.with_springs(&weights);
+        let slope = weights.equation(&sprung.slopes);
+        let v = &sprung.values;
         let first = [b * v.p + v.y, -(c * v.p + v.z)];
         let second = [first[1], a * v.p + v.x];
+        // The resistance to curling changes with a, too.
+        let curling = at.across.as_ref().map_or(0.0, |across| {
+            weights.equation(&at.values) / (a + across.ratio)
+        });
         // d lambda/da = -(dG/da)/G'.
-        let by = [first[0], second[1], -2.0 * (c * v.p + v.z)];
+        let by = [first[0] + curling, second[1], -2.0 * (c * v.p + v.z)];
         InterfaceRoot {
             lambda,
             by_compliance: by.map(|by| -by / slope),
@@ -418,6 +481,7 @@ impl JoinedHalf {
             values: self.in_units(&own.values),
             slopes: self.in_units(&own.slopes).scaled(self.lambda),
             free_count: own.free_count,
+            across: None,
         }
     }
 
@@ -461,6 +525,7 @@ fn rooted(slenderness: &Slenderness, lambda: f64) -> InterfaceFunctions {
             q: (rise * ends.f4 - slopes.f4) / power,
         },
         free_count: ends.clamped_free_count() + released,
+        across: None,
     }
 }
 
@@ -473,249 +538,5 @@ fn combined(l: &Coefficients, r: &Coefficients) -> Coefficients {
         y: l.y * r.p + l.p * r.y,
         z: l.p * r.z - l.z * r.p,
         q: l.q * r.p + l.p * r.q + l.x * r.y + l.y * r.x + 2.0 * l.z * r.z,
-    }
-}
-
-/// All modes of a structure without its joint, by finite elements.
-///
-/// The joint touches two motions only, so that the finite-element model with any joint has the
-/// frequencies at which compliance and receptance of those two motions cancel. The receptance is
-/// the sum over the lowest modes of the model without joint, and over motions that stand for all
-/// higher ones: nothing is truncated, and one decomposition serves every joint.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InterfaceModes {
-    /// Squares of the natural frequencies, in units of lambda^4 (1), ascending.
-    squares: Vec<f64>,
-    /// Motion of every mode at the joint: displacement, and rotation -dw/dx; of a lap joint right
-    /// minus left.
-    joint: Vec<[f64; 2]>,
-    masses: Vec<Attachment>,
-    springs: Vec<Attachment>,
-    rigid_modes: usize,
-    uncounted: usize,
-}
-
-/// A mass or spring that is part of the model.
-#[derive(Debug, Clone, PartialEq)]
-struct Attachment {
-    /// In the model's unit of mass or stiffness.
-    size: f64,
-    /// Displacement of every mode at its place.
-    motion: Vec<f64>,
-}
-
-impl Attachment {
-    fn new(size: f64, place: &Place, modes: &[Motion]) -> Self {
-        let motion = modes
-            .iter()
-            .map(|mode| place.displacement(&mode.ends(place.node)));
-        let motion = motion.collect();
-        Self { size, motion }
-    }
-}
-
-impl InterfaceModes {
-    /// Modes of a specimen without its joint, each of its beams divided into `elements`, for frequencies up to
-    /// those of mode `highest` on any joint.
-    ///
-    /// # Errors
-    /// [`StructureError`] where a part of the specimen cannot exist.
-    pub fn new(
-        specimen: &Specimen,
-        elements: usize,
-        highest: usize,
-    ) -> Result<Self, StructureError> {
-        let free = Specimen {
-            joint: None,
-            ..specimen.clone()
-        };
-        let model = Model::new(&free, &vec![elements; free.body.beams().len()])?;
-        let (stiffness, mass) = model.matrices();
-        // The lowest mode left out then has about four times the highest frequency.
-        let count = 2 * highest + 10;
-        let forces = [0, 1].map(|component| model.joint_load(component));
-        let pairs = pairs_for_forces(
-            [&stiffness, &mass],
-            SHIFT,
-            model.highest_square(),
-            &model.locked_motions(),
-            count,
-            &forces,
-        )?;
-        let vectors = pairs.vectors.iter();
-        let motions: Vec<Motion> = vectors.map(|vector| model.motion(vector)).collect();
-        let joint = motions.iter().map(|motion| {
-            let [w, theta] = model.joint_motion(motion);
-            [w, -theta]
-        });
-        let masses = model.masses.iter();
-        let masses = masses.map(|item| Attachment::new(item.mass, &item.place, &motions));
-        let springs = model.springs.iter();
-        let springs = springs.map(|item| Attachment::new(item.stiffness, &item.place, &motions));
-        Ok(Self {
-            squares: pairs.values,
-            joint: joint.collect(),
-            masses: masses.collect(),
-            springs: springs.collect(),
-            rigid_modes: model.rigid_motions(),
-            uncounted: match specimen.body {
-                Body::One(_) => 0,
-                Body::Joined(_) => 2,
-            },
-        })
-    }
-
-    /// Squares of lambda of the modes without any joint, rigid-body motions left out: those of the
-    /// free beam.
-    pub fn free_squares(&self) -> &[f64] {
-        &self.squares[self.rigid_modes.min(self.squares.len())..]
-    }
-
-    /// Relative change of the n-th free frequency (from 0) per relative change of all attached
-    /// masses, and of all support springs.
-    pub fn free_attachment_sensitivity(&self, mode: usize) -> [f64; 2] {
-        let index = mode + self.rigid_modes;
-        // d(omega^2)/dm = -omega^2 psi^2 and d(omega^2)/dk = psi^2 for unit modal mass.
-        let [masses, springs] = [&self.masses, &self.springs].map(|list| -> f64 {
-            let list = list.iter();
-            list.map(|item| item.size * item.motion[index].powi(2))
-                .sum()
-        });
-        [-0.5 * masses, 0.5 * springs / self.squares[index]]
-    }
-
-    /// Relative change of the frequency of a mode at `lambda` (1) on a joint, per relative change of
-    /// all attached masses, and of all support springs. Force and moment of the joint are in the
-    /// ratio `load`: the mode's shape is the sum of phi (phi . load)/(omega_i^2 - omega^2).
-    pub fn attachment_sensitivity(&self, lambda: f64, load: [f64; 2]) -> [f64; 2] {
-        if self.masses.is_empty() && self.springs.is_empty() {
-            return [0.0; 2];
-        }
-        let square = lambda.powi(4);
-        let free = self.squares.iter().zip(&self.joint);
-        let weights: Vec<f64> = free
-            .map(|(free, phi)| (phi[0] * load[0] + phi[1] * load[1]) / (free - square))
-            .collect();
-        let modal_mass: f64 = weights.iter().map(|weight| weight * weight).sum();
-        let [masses, springs] = [&self.masses, &self.springs].map(|list| {
-            let energies = list.iter().map(|item| {
-                let psi: f64 = item.motion.iter().zip(&weights).map(|(m, w)| m * w).sum();
-                item.size * psi.powi(2)
-            });
-            energies.fold(0.0, |sum, energy| sum + energy) / modal_mass
-        });
-        [-0.5 * masses, 0.5 * springs / square]
-    }
-
-    /// The functions of the frequency equation, multiplied by the distance to the nearest
-    /// frequency without joint, where each of them would be infinite.
-    ///
-    /// With d = distance, that frequency's motion (w, t) at the joint and the rest of the receptance
-    /// eta: P = d, X = d eta11 + w^2 and likewise, Q = d det(eta) + w^2 eta22 + t^2 eta11
-    /// - 2 w t eta12. Their slopes are those with omega^2, which lowers d.
-    fn functions(&self, lambda: f64) -> InterfaceFunctions {
-        let square = lambda.powi(4);
-        let below = self.squares.partition_point(|free| *free < square);
-        let last = self.squares.len() - 1;
-        let (low, high) = (below.saturating_sub(1).min(last), below.min(last));
-        let low_is_nearer =
-            (self.squares[low] - square).abs() < (self.squares[high] - square).abs();
-        let nearest = if low_is_nearer { low } else { high };
-        let (mut eta, mut slope) = ([0.0; 3], [0.0; 3]);
-        for (index, (free, [w, t])) in self.squares.iter().zip(&self.joint).enumerate() {
-            if index != nearest {
-                let inverse = 1.0 / (free - square);
-                let terms = [w * w, w * t, t * t].map(|term| term * inverse);
-                for i in 0..3 {
-                    eta[i] += terms[i];
-                    slope[i] += terms[i] * inverse;
-                }
-            }
-        }
-        let d = self.squares[nearest] - square;
-        let [w, t] = self.joint[nearest];
-        let [a, c, b] = eta;
-        let [a_slope, c_slope, b_slope] = slope;
-        let determinant = a * b - c * c;
-        let determinant_slope = a_slope * b + a * b_slope - 2.0 * c * c_slope;
-        let mixed = w * w * b + t * t * a - 2.0 * w * t * c;
-        let mixed_slope = w * w * b_slope + t * t * a_slope - 2.0 * w * t * c_slope;
-        let slopes = Coefficients {
-            p: -1.0,
-            x: d * a_slope - a,
-            y: d * b_slope - b,
-            z: d * c_slope - c,
-            q: d * determinant_slope - determinant + mixed_slope,
-        };
-        InterfaceFunctions {
-            lambda,
-            values: Coefficients {
-                p: d,
-                x: d * a + w * w,
-                y: d * b + t * t,
-                z: d * c + w * t,
-                q: d * determinant + mixed,
-            },
-            slopes: slopes.scaled(4.0 * lambda.powi(3)),
-            free_count: below,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Assembly;
-    use crate::specimen::{LapLayout, PointMass};
-    use std::f64::consts::PI;
-
-    fn specimen(assembly: Assembly) -> Specimen {
-        let beam = Beam {
-            length: 0.423,
-            width: 0.05,
-            thickness: 0.005,
-            modulus: 207e9,
-            density: 7850.0,
-            poisson: 0.3,
-        };
-        let layout = LapLayout::default();
-        let mut specimen =
-            Specimen::jointed(BeamTheory::Timoshenko, &beam, assembly, &layout, None);
-        if assembly == Assembly::Cantilever {
-            specimen.masses.push(PointMass::new(0.2, 0.02));
-        }
-        specimen
-    }
-
-    #[test]
-    fn prop_few_motions_stand_for_all_modes() {
-        // A lap joint of equal halves has every frequency twice without its joint.
-        for assembly in [Assembly::Cantilever, Assembly::Lap] {
-            let specimen = specimen(assembly);
-            let [few, all] =
-                [20, 1000].map(|highest| InterfaceModes::new(&specimen, 100, highest).unwrap());
-            assert_eq!(few.squares.len(), 2 * 20 + 10 + 8);
-            assert!(all.squares.len() > 200);
-            let [few, all] = [few, all].map(|modes| JointedBody::Elements(Box::new(modes)));
-            for compliances in [[1e-3, 1e-2, 0.0], [0.0, 0.1, 0.0], [10.0, 1e-6, 0.0]] {
-                for mode in 1..=20 {
-                    let guess = PI * mode as f64;
-                    let [found, exact] =
-                        [&few, &all].map(|body| body.root(compliances, mode, guess, LAST_STEP));
-                    let off = found.lambda / exact.lambda - 1.0;
-                    // What is left out, and the rounding of the dense matrix, are less than 1e-9.
-                    assert!(
-                        off.abs() < 1e-9,
-                        "{assembly:?} {compliances:?} {mode}: {off:e}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn limit_a_hundred_modes_need_no_dense_matrix() {
-        let modes = InterfaceModes::new(&specimen(Assembly::Cantilever), 500, 100).unwrap();
-        assert_eq!(modes.squares.len(), 2 * 100 + 10 + 8);
     }
 }

@@ -12,6 +12,7 @@
 //!                          (closed form, counted so that no root is missed)
 //! specimen                 the structure with everything fastened to it, by finite elements -> modes
 //! interface                either of both seen from the joint, with exact derivatives
+//! width                    how the width stiffens a beam: three coefficients for the elements
 //! ```
 //!
 //! This crate must not depend on anything about measurements.
@@ -24,11 +25,15 @@ pub mod joint;
 pub mod natural_modes;
 pub mod receptance;
 pub mod specimen;
+pub mod width;
 
 mod eigen;
+mod modal_interface;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::{Assembly, Joint, JointStiffness};
+pub use width::WidthStiffening;
+
 pub use natural_modes::{
     MEASURED_LIMIT, MODE_LIMIT, ModeShape, NaturalMode, Symmetry, mode_shapes, natural_frequencies,
     natural_lambdas, natural_lambdas_of_any_joint, natural_modes,

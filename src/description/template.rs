@@ -18,7 +18,7 @@ width = 0.05                   # m
 thickness = 0.005              # m, in the direction of vibration
 modulus = "207 GPa"            # Young's modulus, Pa
 density = 7850                 # kg/m3
-# poisson = 0.3                # Poisson's ratio, default 0.3; enters shear deformation only
+# poisson = 0.3                # Poisson's ratio, default 0.3; enters shear and stiffening by the width
 # tolerance = { length = "1 mm", modulus = "2 %" }   # standard uncertainties; "exact": none. Default: modulus 1 %, density 0.5 %,
 #   thickness 0.5 % or 0.02 mm, width 0.2 % or 0.05 mm, length 0.1 % or 0.5 mm (the larger), poisson 0.02, masses on the beam 2 %
 # position_tolerance = "1 mm"   # standard uncertainty of positions on the beam, default: 1 mm
@@ -34,7 +34,7 @@ model = "2p"                   # "2p" (default): translation and rotation | "3p"
 # kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
 # kr = 320                     # N m/rad, default: fitted
 #   ktr = 2e4, N/rad, only with model = "3p", default: fitted; negative where elasticity reaches into the support
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 "#;
 
 const LAP: &str = r#"
@@ -46,7 +46,7 @@ kind = "lap"                   # "cantilever": held at one end | "lap": two halv
 # model = "2p"                 # translation and rotation, the only model of a lap joint
 # kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
 # kr = 320                     # N m/rad, default: fitted
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 # position = 0.2115            # m, default: the middle
 # overlap = { length = "40 mm", mass = "50 g" }   # the overlapping piece with its bolts, default: none
 "#;
@@ -54,7 +54,7 @@ kind = "lap"                   # "cantilever": held at one end | "lap": two halv
 const FREE: &str = r#"
 [joint]
 kind = "free"                  # "cantilever": held at one end | "lap": two halves joined | "free": no joint
-# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# beam = "timoshenko"          # "timoshenko" (default): with shear, rotary inertia and stiffening by the width | "euler": bending only
 "#;
 
 /// The line that begins the table of a recording.
@@ -126,9 +126,9 @@ const STAND_IN: &str = "#   Example frequencies, so that this file runs unchange
 /// commented out.
 pub fn runnable_template(kind: Assembly) -> String {
     let frequencies = match kind {
-        Assembly::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
-        Assembly::Lap => "[97.5, 387.125, 657.75, 1110.25, 1698.625]",
-        Assembly::Free => "[147.375, 406, 794.75, 1311.5, 1954.5]",
+        Assembly::Cantilever => "[16.625, 115.375, 324, 603.25, 954.625]",
+        Assembly::Lap => "[97.625, 387.875, 660.25, 1115.625, 1714.625]",
+        Assembly::Free => "[147.5, 407.25, 799.625, 1323.5, 1978.75]",
     };
     let text = template(kind);
     let mut recording = false;

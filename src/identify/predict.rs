@@ -113,8 +113,7 @@ pub fn estimate_modulus(
         found: 0,
         simpler: "",
     })?;
-    let theory = beam.slenderness(theory);
-    let exact = natural_modes(Assembly::Free, &JointStiffness::FREE, &theory, highest)?;
+    let exact = natural_frequencies(theory, beam, Assembly::Free, &JointStiffness::FREE, highest)?;
     // Measured over nominal frequency, for each mode.
     let mut ratios = Vec::with_capacity(modes.len());
     for mode in modes {
@@ -126,7 +125,7 @@ pub fn estimate_modulus(
                 mode: mode.mode,
                 value: mode.frequency,
             })?;
-        ratios.push(mode.frequency / beam.frequency_of(nominal.lambda));
+        ratios.push(mode.frequency / nominal);
     }
     // min sum (1 - x/r)^2 over x = sqrt(E/E0): x = sum(1/r) / sum(1/r^2).
     let first: f64 = ratios.iter().map(|ratio| 1.0 / ratio).sum();

@@ -1,5 +1,9 @@
 //! Estimates from a description that is not exact: coverage, budget, and what further measurements bring.
 
+#[allow(
+    dead_code,
+    reason = "the study asks for more of the worlds than the tests"
+)]
 #[path = "../../examples/description_coverage/worlds.rs"]
 mod worlds;
 
@@ -12,7 +16,7 @@ use tapjoint::identify::consistent::{
 };
 use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
-use worlds::{Answer, Kind, World, answers};
+use worlds::{Answer, Kind, World, answers, outlier_answers};
 
 /// Chance at which a test fails although the intervals are true.
 const CHANCE: f64 = 1e-3;
@@ -62,6 +66,7 @@ fn uncertain() -> ConsistentSettings {
         thickness: Some(0.005),
         modulus: Some(0.01),
         density: Some(0.005),
+        poisson: None,
     };
     settings.attachments = vec![AttachmentTolerance {
         name: "A".to_owned(),
@@ -317,5 +322,32 @@ fn recover_intervals_hold_the_truth_where_the_description_errs() {
                 }
             }
         }
+    }
+}
+
+/// A mode that is far off is named, and nothing is named where all modes belong together.
+#[test]
+fn recover_the_mode_that_does_not_belong_to_the_others() {
+    for (kind, least) in [(Kind::TwoParameter, 0.7), (Kind::Free, 0.9)] {
+        let found = outlier_answers(kind, BeamTheory::Euler, World::Outlier, 60, 3);
+        let beyond = found.iter().filter_map(|answer| {
+            let (mode, deviations) = answer.planted?;
+            (deviations > 5.0).then_some(answer.named == Some(mode))
+        });
+        let beyond: Vec<bool> = beyond.collect();
+        let right = beyond.iter().filter(|right| **right).count() as u64;
+        // The study finds 75 to 80 % of a cantilever's and 95 % of a free beam's: few modes leave open which one it is.
+        let few = Binomial::new(least, beyond.len() as u64)
+            .unwrap()
+            .cdf(right);
+        assert!(few > CHANCE, "{}: {right} of {}", kind.name(), beyond.len());
+        let wrong = found.iter().filter(|answer| {
+            answer.named.is_some() && answer.named != answer.planted.map(|(mode, _)| mode)
+        });
+        assert!(wrong.count() <= 1, "{}: a wrong mode is named", kind.name());
+        let clean = outlier_answers(kind, BeamTheory::Euler, World::Normal, 60, 3);
+        // The rule asks for a failure of the model, which a right one shows in one of a thousand.
+        let false_alarms = clean.iter().filter(|answer| answer.named.is_some()).count();
+        assert_eq!(false_alarms, 0, "{}", kind.name());
     }
 }

@@ -102,9 +102,13 @@ fn limit_the_model_agrees_with_the_counted_roots() {
                 let found = frequencies_at(&model, &point_of(&model, &joint), 8);
                 let exact = natural_frequencies(theory, &thick, assembly, &joint, 8).unwrap();
                 for (mode, (found, exact)) in found.iter().zip(&exact).enumerate() {
-                    // Both are roots of the same function to its last digits.
+                    // Both are roots of the same function to its last digits, or by elements of two meshes.
                     let what = format!("{theory:?} {assembly:?} {joint:?} mode {}", mode + 1);
-                    close(*found, *exact, 1e-11, &what);
+                    let tolerance = match theory {
+                        BeamTheory::Euler => 1e-11,
+                        BeamTheory::Timoshenko => 5e-6,
+                    };
+                    close(*found, *exact, tolerance, &what);
                 }
             }
         }

@@ -566,8 +566,10 @@ mod finite_elements {
     #[test]
     fn val_timoshenko_closed_form_agrees_with_extrapolated_elements() {
         for thickness in [0.005, 0.04] {
+            // No section curls that has no Poisson's ratio: the closed form does without the width.
             let beam = Beam {
                 thickness,
+                poisson: 0.0,
                 ..steel_strip()
             };
             for case in assemblies() {

@@ -334,7 +334,7 @@ fn frozen_five_simulated_recordings() {
         "--out",
         "v",
         "--seed",
-        "7",
+        "8",
         "--with",
         "added-mass:mass=5g,position=200mm",
         "-q",

@@ -380,10 +380,10 @@ pub(crate) fn neglected_effects(
     let of_regression = [
         (
             structure.theory == BeamTheory::Timoshenko,
-            "the pair regression takes an Euler beam (no shear, no rotary inertia); the consistent \
-             estimate and the prediction include both",
-            "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
-             includes both, so that its errors show what that neglects",
+            "the pair regression takes an Euler beam (no shear, no rotary inertia, no stiffening by the width); \
+             the consistent estimate and the prediction include them",
+            "the pair regression takes an Euler beam (no shear, no rotary inertia, no stiffening by the width); \
+             the prediction includes them, so that its errors show what that neglects",
         ),
         (
             structure.known.any(),

@@ -10,11 +10,15 @@
 //! 10.5). With it the error of a frequency falls with the eighth power of the element's length
 //! instead of the fourth.
 
+use crate::width::Curling;
 use crate::{Beam, BeamTheory, StructureError};
 use nalgebra::DMatrix;
 
 /// Matrix for (w, theta) near and (w, theta) far.
 pub(super) type Square = [[f64; 4]; 4];
+
+/// Motions of an element's ends: (w, theta) near, (w, theta) far, curvature across the width near and far.
+pub(super) type Ends = [f64; 6];
 
 /// Units of a model: those in which the first beam has E I = rho A = 1 and the structure length 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -293,6 +297,80 @@ pub(super) struct Section {
     pub(super) second_order: Square,
     /// Displacement inside, over omega^2, for each end motion.
     inner: [Polynomial; 4],
+    curling: Option<Curling>,
+    /// What the width adds.
+    pub(super) across: Across,
+}
+
+/// Stiffening of an element by its width: twice the strain energy that the curling adds (`width.rs`).
+///
+/// Along the element the curvature kappa is linear, and `a` without mass follows exactly: a + nu kappa is a sum of
+/// e^(qx) and e^(-qx) with q^2 = follow/twist. With s and d the mean of a + nu kappa at the nodes and half of its
+/// change, and c = q h/2, the energy is
+///
+/// ```text
+/// E I h ( follow tanh(c)/c s^2 + follow (c coth(c) - 1)/c^2 d^2 + twist/h^2 (a1 - a0)^2 ).
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Across {
+    /// Weight, and what of the end motions is squared.
+    terms: [(f64, Ends); 3],
+}
+
+impl Across {
+    /// For the curvature at both ends of the element for a unit of each end motion.
+    fn new(element: &Element, curling: &Curling, near: &[f64; 4], far: &[f64; 4]) -> Self {
+        let (nu, follow, twist) = (curling.poisson, curling.follow, curling.twist);
+        let scale = element.bending_stiffness * element.length;
+        let c = 0.5 * element.length * (follow / twist).sqrt();
+        // The rest of the series is 2 c^4/945, and beyond it c coth(c) - 1 has lost five digits at most.
+        let odd = match c < 0.005 {
+            true => 1.0 / 3.0 - c * c / 45.0,
+            false => (c / c.tanh() - 1.0) / (c * c),
+        };
+        let (mut mean, mut change) = ([0.0; 6], [0.0; 6]);
+        for i in 0..4 {
+            mean[i] = 0.5 * nu * (near[i] + far[i]);
+            change[i] = 0.5 * nu * (far[i] - near[i]);
+        }
+        (mean[4], mean[5]) = (0.5, 0.5);
+        (change[4], change[5]) = (-0.5, 0.5);
+        Self {
+            terms: [
+                (scale * follow * c.tanh() / c, mean),
+                (scale * follow * odd, change),
+                (
+                    scale * twist / element.length.powi(2),
+                    [0.0, 0.0, 0.0, 0.0, -1.0, 1.0],
+                ),
+            ],
+        }
+    }
+
+    /// Twice the strain energy.
+    pub(super) fn strain_energy(&self, ends: &Ends) -> f64 {
+        let terms = self.terms.iter();
+        terms
+            .map(|(weight, of)| weight * product(of, ends).powi(2))
+            .sum()
+    }
+
+    /// The stiffness matrix.
+    pub(super) fn matrix(&self) -> [Ends; 6] {
+        let mut matrix = [[0.0; 6]; 6];
+        for (weight, of) in &self.terms {
+            for (row, a) in matrix.iter_mut().zip(of) {
+                for (entry, b) in row.iter_mut().zip(of) {
+                    *entry += weight * a * b;
+                }
+            }
+        }
+        matrix
+    }
+}
+
+fn product(a: &Ends, b: &Ends) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Displacement and rotation of the section at one place for a unit of each end motion.
@@ -304,12 +382,13 @@ pub(super) struct Weights {
 
 impl Section {
     /// One of `elements` equal elements of a beam, with a share of shear flexibility and rotary
-    /// inertia (1) and an axial force (N).
+    /// inertia (1) and an axial force (N). `stiffened` where its width stiffens it.
     pub(super) fn new(
         beam: &Beam,
         elements: usize,
         shear_rotary: f64,
         axial_force: f64,
+        stiffened: bool,
         units: &Units,
     ) -> Self {
         let element = Element::of(beam, elements, shear_rotary, units);
@@ -318,7 +397,14 @@ impl Section {
         let geometric = element.geometric_stiffness(axial_force);
         let motions = element.end_motions();
         let responses = motions.map(|motion| element.inertia_response(&motion));
-        Self {
+        let curling = stiffened.then(|| {
+            let curling = Curling::of(beam);
+            Curling {
+                twist: curling.twist / units.length.powi(2),
+                ..curling
+            }
+        });
+        let mut section = Self {
             element,
             axial_force,
             stiffness: sum(&element.stiffness(), &geometric),
@@ -326,6 +412,19 @@ impl Section {
             mass: element.mass(),
             second_order: element.second_order(&motions, &responses),
             inner: responses.map(|response| response.displacement),
+            curling,
+            across: Across::default(),
+        };
+        let [near, far] = [0.0, 1.0].map(|x| section.curvature(x));
+        section.across = section.across_for(&near, &far);
+        section
+    }
+
+    /// What the width adds where the element has this curvature at its ends.
+    fn across_for(&self, near: &[f64; 4], far: &[f64; 4]) -> Across {
+        match &self.curling {
+            Some(curling) => Across::new(&self.element, curling, near, far),
+            None => Across::default(),
         }
     }
 
@@ -369,13 +468,18 @@ impl Section {
         h.powi(3) / self.element.bending_stiffness * (bent + sheared)
     }
 
-    /// Bending moment at x from 0 to 1, from the two ways the element is strained.
+    /// Bending moment at x from 0 to 1.
     fn moment(&self, x: f64) -> [f64; 4] {
+        let stiffness = self.element.bending_stiffness;
+        self.curvature(x).map(|entry| stiffness * entry)
+    }
+
+    /// Curvature at x from 0 to 1, from the two ways the element is strained.
+    fn curvature(&self, x: f64) -> [f64; 4] {
         let (h, phi) = (self.element.length, self.element.shear);
-        // M = E I/h (theta1 - theta0 + 6 (2x - 1)/(1 + phi) ((theta0 + theta1)/2 - (w1 - w0)/h)).
+        // kappa = 1/h (theta1 - theta0 + 6 (2x - 1)/(1 + phi) ((theta0 + theta1)/2 - (w1 - w0)/h)).
         let tilt = 6.0 * (2.0 * x - 1.0) / (1.0 + phi);
-        [tilt / h, 0.5 * tilt - 1.0, -tilt / h, 0.5 * tilt + 1.0]
-            .map(|entry| self.element.bending_stiffness / h * entry)
+        [tilt / h, 0.5 * tilt - 1.0, -tilt / h, 0.5 * tilt + 1.0].map(|entry| entry / h)
     }
 }
 
@@ -478,6 +582,8 @@ pub(super) struct HingedElement {
     kinks: Vec<[f64; 4]>,
     pub(super) stiffness: Square,
     pub(super) mass: Square,
+    /// What the width adds.
+    pub(super) across: Across,
 }
 
 impl HingedElement {
@@ -504,7 +610,10 @@ impl HingedElement {
             kinks,
             stiffness,
             mass: [[0.0; 4]; 4],
+            across: Across::default(),
         };
+        let [near, far] = [0.0, 1.0].map(|x| hinged.curvature(section, x));
+        hinged.across = section.across_for(&near, &far);
         // Mass and stiffness of the axial force, piece by piece between the kinks.
         for (x, weight) in hinged.gauss_points() {
             let scale = weight * element.length;
@@ -560,6 +669,17 @@ impl HingedElement {
             }
         }
         slope
+    }
+
+    /// Curvature at x, by bending between the kinks.
+    fn curvature(&self, section: &Section, x: f64) -> [f64; 4] {
+        let mut curvature = section.curvature(x);
+        for (kink, per_motion) in self.kinks(section) {
+            for (total, share) in curvature.iter_mut().zip(per_motion) {
+                *total += share * kink.moment(x) / section.element.length;
+            }
+        }
+        curvature
     }
 
     /// Twice the strain energy: that of the whole element less what the kinks release.

@@ -4,15 +4,19 @@
 //! all numbers stay near 1. Rotations are dw/dx with x in units of the length.
 
 use super::element::{
-    ElementHinge, HingedElement, Section, Square, Units, Weights, dot, quadratic,
+    Across, ElementHinge, Ends, HingedElement, Section, Square, Units, Weights, dot, quadratic,
 };
 use super::{Body, Joint, Specimen};
-use crate::StructureError;
 use crate::eigen::BandedMatrix;
+use crate::width::Curling;
+use crate::{StructureError, WidthStiffening};
 use std::f64::consts::PI;
 
 /// Equation of a motion that does not exist; larger than the number of any that does.
 const HELD: usize = usize::MAX;
+
+/// Index of the curvature across the width among a node's motions, and among the joint's.
+pub(crate) const ACROSS: usize = 2;
 
 /// Equations of a specimen's motions.
 ///
@@ -20,8 +24,10 @@ const HELD: usize = usize::MAX;
 /// element: left end's own, shared, right end's own.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Numbering {
-    /// For each node displacement and rotation.
-    nodes: Vec<[usize; 2]>,
+    /// For each node displacement, rotation, and curvature across the width.
+    nodes: Vec<[usize; 3]>,
+    /// Whether nodes have a curvature across the width.
+    stiffened: bool,
     /// Rotation of the base.
     base: Option<usize>,
     /// Number of equations.
@@ -31,8 +37,15 @@ pub(super) struct Numbering {
 impl Numbering {
     /// `elements` of each beam; `has_base` where the fixture has a motion of its own.
     fn new(specimen: &Specimen, elements: &[usize], has_base: bool) -> Self {
-        let rigid = specimen.joint_stiffnesses().map(f64::is_infinite);
+        let [kt, kr] = specimen.joint_stiffnesses().map(f64::is_infinite);
+        let held = match specimen.width_stiffening {
+            WidthStiffening::HeldAtJoint => specimen.joint.is_some(),
+            WidthStiffening::SprungAtJoint => kt,
+            WidthStiffening::FreeAtJoint | WidthStiffening::Ignored => false,
+        };
+        let rigid = [kt, kr, held];
         let mut numbering = Self {
+            stiffened: is_stiffened(specimen),
             nodes: Vec::new(),
             base: None,
             size: 0,
@@ -42,21 +55,27 @@ impl Numbering {
         }
         match specimen.body {
             Body::One(_) => {
-                let first = rigid.map(|rigid| if rigid { HELD } else { numbering.next() });
+                let mut first = [HELD; 3];
+                for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
+                    first[motion] = numbering.next();
+                }
                 numbering.nodes.push(first);
                 numbering.add_nodes(elements[0]);
             }
             Body::Joined(_) => {
                 numbering.add_nodes(elements[0]);
                 // The two nodes of the joint.
-                let mut left = [HELD; 2];
+                let mut left = [HELD; 3];
                 for shared in [false, true] {
-                    for motion in (0..2).filter(|&motion| rigid[motion] == shared) {
+                    for motion in numbering
+                        .motions()
+                        .filter(|&motion| rigid[motion] == shared)
+                    {
                         left[motion] = numbering.next();
                     }
                 }
                 let mut right = left;
-                for motion in (0..2).filter(|&motion| !rigid[motion]) {
+                for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
                     right[motion] = numbering.next();
                 }
                 numbering.nodes.extend([left, right]);
@@ -71,18 +90,32 @@ impl Numbering {
         self.size - 1
     }
 
+    /// Motions of a node that exist.
+    fn motions(&self) -> std::ops::Range<usize> {
+        0..if self.stiffened { 3 } else { 2 }
+    }
+
     fn add_nodes(&mut self, count: usize) {
         for _ in 0..count {
-            let node = [self.next(), self.next()];
+            let mut node = [HELD; 3];
+            for motion in self.motions() {
+                node[motion] = self.next();
+            }
             self.nodes.push(node);
         }
     }
 }
 
-/// Displacement and rotation of every node, and the rotation of the base.
+/// Returns true where the width stiffens the beams. With a Poisson's ratio of 0 no section curls.
+fn is_stiffened(specimen: &Specimen) -> bool {
+    let mut beams = specimen.body.beams().iter();
+    specimen.width_stiffening != WidthStiffening::Ignored && beams.any(|beam| beam.poisson != 0.0)
+}
+
+/// Displacement, rotation and curvature across the width of every node, and the rotation of the base.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
-    pub(super) nodes: Vec<[f64; 2]>,
+    pub(super) nodes: Vec<[f64; 3]>,
     /// `None` where the base does not move on its own.
     pub(super) base: Option<f64>,
 }
@@ -92,7 +125,7 @@ impl Motion {
     pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
         let mut sum = self.clone();
         for (node, other) in sum.nodes.iter_mut().zip(&other.nodes) {
-            *node = [node[0] + factor * other[0], node[1] + factor * other[1]];
+            *node = std::array::from_fn(|i| node[i] + factor * other[i]);
         }
         if let Some(turn) = &mut sum.base {
             *turn += factor * other.base.unwrap_or(0.0);
@@ -110,8 +143,14 @@ impl Motion {
 
     /// Motions of both ends of the element behind a node.
     pub(crate) fn ends(&self, node: usize) -> [f64; 4] {
-        let ([w0, t0], [w1, t1]) = (self.nodes[node], self.nodes[node + 1]);
+        let ([w0, t0, _], [w1, t1, _]) = (self.nodes[node], self.nodes[node + 1]);
         [w0, t0, w1, t1]
+    }
+
+    /// The same, with the curvatures across the width.
+    fn all_ends(&self, node: usize) -> Ends {
+        let ([w0, t0, a0], [w1, t1, a1]) = (self.nodes[node], self.nodes[node + 1]);
+        [w0, t0, w1, t1, a0, a1]
     }
 }
 
@@ -207,6 +246,10 @@ pub(crate) struct Model {
     pub(super) units: Units,
     /// Stiffness of the joint for (w, theta), infinite where rigid.
     pub(super) joint: [[f64; 2]; 2],
+    /// Stiffness of the joint against curvature across the width, infinite where rigid.
+    joint_across: f64,
+    /// That over the joint's translational stiffness where springs are spread over the width.
+    pub(crate) across_ratio: f64,
     pub(super) base: Option<RotatingBase>,
     pub(crate) masses: Vec<AttachedMass>,
     pub(crate) springs: Vec<AttachedSpring>,
@@ -222,6 +265,7 @@ impl Model {
         specimen.check()?;
         let beams = specimen.body.beams();
         let units = Units::of(&beams[0], specimen.body.length());
+        let stiffened = is_stiffened(specimen);
         let mut runs: Vec<Run> = Vec::new();
         for (beam, &elements) in beams.iter().zip(elements) {
             let last = runs.last();
@@ -230,7 +274,7 @@ impl Model {
                 start: last.map_or(0.0, |_| beams[0].length / units.length),
                 elements,
                 first_node: last.map_or(0, |run| run.elements + 1),
-                section: Section::new(beam, elements, shear_rotary, axial_force, &units),
+                section: Section::new(beam, elements, shear_rotary, axial_force, stiffened, &units),
             });
         }
         // The base where it gives: k = Kr/ratio, and the inertia that has its frequency on that spring.
@@ -244,10 +288,21 @@ impl Model {
             let inertia = stiffness / (omega * omega);
             RotatingBase { inertia, stiffness }
         });
+        let joint = joint_matrix(specimen.joint, &units);
+        let mean_square = Curling::of(&beams[0]).mean_square / units.length.powi(4);
+        let sprung = stiffened && specimen.width_stiffening == WidthStiffening::SprungAtJoint;
+        let across_ratio = if sprung { mean_square } else { 0.0 };
+        let [kt, _] = specimen.joint_stiffnesses();
+        let joint_across = match across_ratio > 0.0 {
+            true => across_ratio * kt / units.stiffness(),
+            false => 0.0,
+        };
         let mut model = Self {
+            joint_across,
+            across_ratio,
             numbering: Numbering::new(specimen, elements, base.is_some()),
             runs,
-            joint: joint_matrix(specimen.joint, &units),
+            joint,
             base,
             masses: Vec::new(),
             springs: Vec::new(),
@@ -386,6 +441,9 @@ impl Model {
                 };
                 self.scatter(&mut stiffness, node, of_stiffness);
                 self.scatter(&mut mass, node, of_mass);
+                if self.numbering.stiffened {
+                    self.scatter_across(&mut stiffness, node, self.across_at(run, node));
+                }
             }
         }
         for item in &self.masses {
@@ -404,7 +462,11 @@ impl Model {
         let ends = self.joint_ends();
         for &(row, i, row_sign) in &ends {
             for &(column, j, column_sign) in &ends {
-                let entry = self.joint[i][j];
+                let entry = match (i, j) {
+                    (ACROSS, ACROSS) => self.joint_across,
+                    (ACROSS, _) | (_, ACROSS) => 0.0,
+                    _ => self.joint[i][j],
+                };
                 if row != HELD && column != HELD && entry.is_finite() {
                     stiffness.add(row, column, row_sign * column_sign * entry);
                 }
@@ -415,6 +477,47 @@ impl Model {
             mass.add(row, row, base.inertia);
         }
         (stiffness, mass)
+    }
+
+    /// What omega^4 adds: the matrix of [`Energies::second_order`].
+    pub(crate) fn second_order_matrix(&self) -> BandedMatrix {
+        let mut matrix = BandedMatrix::zeros(self.numbering.size);
+        for run in &self.runs {
+            for node in run.first_node..run.first_node + run.elements {
+                self.scatter(&mut matrix, node, &run.section.second_order);
+            }
+        }
+        for item in &self.masses {
+            let (w, inner) = (item.place.weights.displacement, item.place.inner);
+            let of_mass = std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    item.mass * item.mass * item.compliance * w[i] * w[j]
+                        + item.mass * (w[i] * inner[j] + inner[i] * w[j])
+                })
+            });
+            self.scatter(&mut matrix, item.place.node, &of_mass);
+        }
+        matrix
+    }
+
+    /// What the width adds to the element behind a node.
+    fn across_at<'a>(&'a self, run: &'a Run, node: usize) -> &'a Across {
+        match self.hinged_at(node) {
+            Some(hinged) => &hinged.across,
+            None => &run.section.across,
+        }
+    }
+
+    fn scatter_across(&self, target: &mut BandedMatrix, node: usize, across: &Across) {
+        let [near, far] = [self.numbering.nodes[node], self.numbering.nodes[node + 1]];
+        let equations = [near[0], near[1], far[0], far[1], near[2], far[2]];
+        for (&row, values) in equations.iter().zip(&across.matrix()) {
+            for (&column, value) in equations.iter().zip(values) {
+                if row != HELD && column != HELD {
+                    target.add(row, column, *value);
+                }
+            }
+        }
     }
 
     /// Adds the matrix of the element behind a node.
@@ -437,18 +540,18 @@ impl Model {
             let (before, after) = (nodes[left.elements], nodes[right.first_node]);
             let ends = [(before, -1.0), (after, 1.0)].into_iter();
             return ends
-                .flat_map(|(rows, sign)| [(rows[0], 0, sign), (rows[1], 1, sign)])
+                .flat_map(|(rows, sign)| (0..3).map(move |i| (rows[i], i, sign)))
                 .collect();
         }
-        let mut ends = vec![(nodes[0][0], 0, 1.0), (nodes[0][1], 1, 1.0)];
+        let mut ends: Vec<_> = (0..3).map(|i| (nodes[0][i], i, 1.0)).collect();
         if let Some(base) = self.numbering.base {
             ends.push((base, 1, -1.0));
         }
         ends
     }
 
-    /// The load of a unit force (component 0) or moment (1) on the beam's end, and its opposite on what the joint
-    /// fastens it to.
+    /// The load of a unit force (component 0), moment (1) or load on the curvature across the width ([`ACROSS`]) on the
+    /// beam's end, and its opposite on what the joint fastens it to.
     pub(crate) fn joint_load(&self, of: usize) -> Vec<f64> {
         let mut load = vec![0.0; self.numbering.size];
         for (row, component, sign) in self.joint_ends() {
@@ -465,8 +568,18 @@ impl Model {
             let (before, after) = (motion.nodes[left.elements], motion.nodes[right.first_node]);
             return [after[0] - before[0], after[1] - before[1]];
         }
-        let [w, theta] = motion.nodes[0];
+        let [w, theta, _] = motion.nodes[0];
         [w, theta - motion.base.unwrap_or(0.0)]
+    }
+
+    /// Curvature across the width that the joint's springs feel; of a lap joint right minus left.
+    pub(crate) fn joint_curling(&self, motion: &Motion) -> f64 {
+        match self.runs.as_slice() {
+            [left, right] => {
+                motion.nodes[right.first_node][ACROSS] - motion.nodes[left.elements][ACROSS]
+            }
+            _ => motion.nodes[0][ACROSS],
+        }
     }
 
     /// Twice the strain energy of the joint's springs. A rigid one is strained by nothing.
@@ -479,6 +592,9 @@ impl Model {
                     sum += entry * a * b;
                 }
             }
+        }
+        if self.joint_across > 0.0 && self.joint_across.is_finite() {
+            sum += self.joint_across * self.joint_curling(motion).powi(2);
         }
         sum
     }
@@ -496,6 +612,10 @@ impl Model {
                 } else {
                     sum.strain += run.section.strain_energy(&ends);
                     sum.kinetic += quadratic(&run.section.mass, &ends);
+                }
+                if self.numbering.stiffened {
+                    let across = self.across_at(run, node);
+                    sum.strain += across.strain_energy(&motion.all_ends(node));
                 }
             }
         }
@@ -593,16 +713,16 @@ impl Model {
     /// Translation (0) or rotation (1) of the runs from `first` on, about the first one's left end.
     fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
         let mut motion = Motion {
-            nodes: vec![[0.0; 2]; self.numbering.nodes.len()],
+            nodes: vec![[0.0; 3]; self.numbering.nodes.len()],
             base: None,
         };
         for run in &self.runs[first..] {
             for index in 0..=run.elements {
                 let x = run.start + index as f64 * run.section.element.length;
                 motion.nodes[run.first_node + index] = if kind == 0 {
-                    [1.0, 0.0]
+                    [1.0, 0.0, 0.0]
                 } else {
-                    [x - self.runs[first].start, 1.0]
+                    [x - self.runs[first].start, 1.0, 0.0]
                 };
             }
         }

@@ -190,7 +190,7 @@ impl SpecimenModes {
             let energies = match (&model.base, motion.base) {
                 // The base that the other has moves as the joint's moment turns it.
                 (Some(base), None) => {
-                    let [w, theta] = motion.nodes[0];
+                    let [w, theta, _] = motion.nodes[0];
                     let moment = model.joint[1][0] * w + model.joint[1][1] * theta;
                     let dynamic = base.stiffness + model.joint[1][1] - mode.square * base.inertia;
                     model.energies(&Motion {

@@ -439,7 +439,7 @@ fn confirming(effect: EffectId) -> String {
             "free the beam of what pulls or presses it along its axis, or turn the set-up over, and tap again"
         }
         EffectId::ShearRotary => {
-            "describe the beam with shear and rotary inertia (beam = \"timoshenko\" in [joint]), and diagnose again"
+            "describe the beam with shear, rotary inertia and width (beam = \"timoshenko\" in [joint]), and diagnose again"
         }
         EffectId::Resolution => "read the frequencies by a curve fit, or on closer lines",
     };

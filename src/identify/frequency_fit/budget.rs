@@ -8,7 +8,7 @@ use super::Quantity;
 use super::estimate::Finished;
 use super::model::{PARAMETERS, Parameter, Point};
 use super::problem::{Covariance, along, value_along, whitened};
-use super::uncertainty::{Attached, LEAST_DISCREPANCY, whitening};
+use super::uncertainty::{LEAST_DISCREPANCY, whitening};
 use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -228,7 +228,7 @@ impl Finished<'_> {
             measures.push(Measure::Caliper);
         }
         let mut inputs = self.estimator.inputs.iter();
-        if inputs.any(|input| input.of == Attached::Mass && input.std > SMALL_BALANCE) {
+        if inputs.any(|input| input.is_mass && input.std > SMALL_BALANCE) {
             measures.push(Measure::WeighMasses);
         }
         let remedies = measures.into_iter().map(|measure| Remedy {
@@ -252,7 +252,7 @@ impl Finished<'_> {
         let mut inputs = self.estimator.standardised_inputs(&problem.data);
         if measure == Measure::WeighMasses {
             for (input, change) in self.estimator.inputs.iter().zip(&mut inputs) {
-                if input.of == Attached::Mass {
+                if input.is_mass {
                     *change *= (SMALL_BALANCE / input.std).min(1.0);
                 }
             }

@@ -7,6 +7,7 @@ use super::problem::{
 };
 use super::uncertainty::{
     LEAST_DISCREPANCY, UncertainInput, attachment_inputs, discrepancy, joint_near, whitening,
+    width_inputs,
 };
 use super::{ConsistentSettings, Goodness, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
@@ -245,7 +246,10 @@ impl ConsistentEstimator {
             let numbers: Vec<usize> = own.map(|(mode, _)| mode.mode).collect();
             let structure = model.structure();
             let joint = (structure.assembly != Assembly::Free).then(|| joint_near(point));
-            let found = attachment_inputs(structure, joint, &numbers, &self.settings.attachments);
+            let attachments = &self.settings.attachments;
+            let mut found = attachment_inputs(structure, joint, &numbers, attachments);
+            let poisson = self.settings.tolerances.poisson.unwrap_or(0.0);
+            found.extend(width_inputs(structure, joint, &numbers, poisson));
             // The same mass loads every structure that it sits on.
             let before: usize = self
                 .structures

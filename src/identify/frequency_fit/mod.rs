@@ -50,7 +50,7 @@ pub enum ResidualWeights {
     Relative,
 }
 
-/// Standard uncertainties of the beam's properties, all relative (1); `None` = taken as exact.
+/// Standard uncertainties of the beam's properties, all relative (1) but Poisson's ratio; `None` = taken as exact.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BeamTolerances {
     /// Standard uncertainty of the length.
@@ -63,6 +63,8 @@ pub struct BeamTolerances {
     pub modulus: Option<f64>,
     /// Standard uncertainty of the density.
     pub density: Option<f64>,
+    /// Standard uncertainty of Poisson's ratio, absolute. With it the hold of the joint across the width is uncertain too.
+    pub poisson: Option<f64>,
 }
 
 impl BeamTolerances {

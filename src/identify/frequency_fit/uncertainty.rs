@@ -21,6 +21,7 @@ use super::{Limit, Quantity, limit_of};
 use nalgebra::{DMatrix, DVector};
 use tapjoint_beam::Joint;
 use tapjoint_beam::specimen::Mesh;
+use tapjoint_beam::width::clamp_differences;
 use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail};
 
 /// Least discrepancy of any model (1, relative): what uniform bars of well-kept dimensions leave.
@@ -39,18 +40,11 @@ pub struct AttachmentTolerance {
     pub position: f64,
 }
 
-/// What is uncertain about something attached.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Attached {
-    Mass,
-    Position,
-}
-
 /// An input that the fit does not move.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct UncertainInput {
-    /// What it is.
-    pub(super) of: Attached,
+    /// True for a mass, which a balance tells.
+    pub(super) is_mass: bool,
     /// Name in the budget.
     pub(super) name: String,
     /// Value that the description states (SI).
@@ -94,16 +88,10 @@ pub(super) fn attachment_inputs(
         let there = at.position + inward * tolerance.position;
         moved.masses[index].position = there.clamp(0.0, length);
         let changed = [
-            (Attached::Mass, at.mass, tolerance.mass, 1.0, heavier),
-            (
-                Attached::Position,
-                at.position,
-                tolerance.position,
-                inward,
-                moved,
-            ),
+            (true, at.mass, tolerance.mass, 1.0, heavier),
+            (false, at.position, tolerance.position, inward, moved),
         ];
-        for (of, stated, std, sign, other) in changed {
+        for (is_mass, stated, std, sign, other) in changed {
             let Ok(frequencies) = shapes.rayleigh_frequencies(&other) else {
                 continue;
             };
@@ -111,13 +99,13 @@ pub(super) fn attachment_inputs(
                 .iter()
                 .map(|mode| sign * (frequencies[mode - 1] / shapes.frequencies()[mode - 1] - 1.0))
                 .collect();
-            let name = match of {
-                Attached::Mass => format!("mass of {}", tolerance.name),
-                Attached::Position => format!("position of {}", tolerance.name),
+            let name = match is_mass {
+                true => format!("mass of {}", tolerance.name),
+                false => format!("position of {}", tolerance.name),
             };
             if std > 0.0 && changes.iter().any(|change| *change != 0.0) {
                 inputs.push(UncertainInput {
-                    of,
+                    is_mass,
                     name,
                     stated,
                     std,
@@ -125,6 +113,62 @@ pub(super) fn attachment_inputs(
                 });
             }
         }
+    }
+    inputs
+}
+
+/// Returns the inputs that the width is: Poisson's ratio, and how the joint holds the section across the width. Empty where
+/// the model takes no notice of the width.
+///
+/// The model spreads the joint's springs over the width. A clamp that keeps the slope gives the frequencies of
+/// [`clamp_differences`]; the truth lies between both, so that half of the difference is one standard uncertainty.
+pub(super) fn width_inputs(
+    structure: &JointedStructure,
+    joint: Option<Joint>,
+    modes: &[usize],
+    poisson: f64,
+) -> Vec<UncertainInput> {
+    let specimen = structure.specimen(joint);
+    let count = modes.iter().copied().max().unwrap_or(0);
+    let mut inputs = Vec::new();
+    if poisson == 0.0 || !structure.beam.is_stiffened(structure.theory) {
+        return inputs;
+    }
+    let stated = structure.beam.poisson;
+    // No isotropic solid reaches 0.5.
+    let sign = if stated + poisson < 0.5 { 1.0 } else { -1.0 };
+    let mut other = specimen.clone();
+    for beam in other.body.beams_mut() {
+        beam.poisson += sign * poisson;
+    }
+    let both = [&specimen, &other].map(|specimen| specimen.modes(count, Mesh::DIAGNOSIS));
+    if let [Ok(own), Ok(other)] = &both {
+        let (own, other) = (own.frequencies(), other.frequencies());
+        let changes = modes
+            .iter()
+            .map(|mode| sign * (other[mode - 1] / own[mode - 1] - 1.0));
+        inputs.push(UncertainInput {
+            is_mass: false,
+            name: "poisson".to_owned(),
+            stated,
+            std: poisson,
+            changes: changes.collect(),
+        });
+    }
+    let differences = clamp_differences(&specimen, count, Mesh::DIAGNOSIS);
+    if let Ok(differences) = differences
+        && differences.iter().any(|difference| *difference != 0.0)
+    {
+        inputs.push(UncertainInput {
+            is_mass: false,
+            name: "hold of the width".to_owned(),
+            stated: 0.0,
+            std: 0.5,
+            changes: modes
+                .iter()
+                .map(|mode| 0.5 * differences[mode - 1])
+                .collect(),
+        });
     }
     inputs
 }

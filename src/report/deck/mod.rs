@@ -9,8 +9,8 @@ mod reported;
 use crate::text::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Body, Hinge, Joint, Specimen};
-use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
+use tapjoint_beam::specimen::{Body, Hinge, Joint, Mesh, Specimen};
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError, WidthStiffening};
 use tapjoint_description::TestDescription;
 use tapjoint_identify::consistent::JointedStructure;
 
@@ -51,6 +51,8 @@ pub struct Deck {
     pub springs: Vec<(usize, f64)>,
     /// Frequencies (Hz) that are predicted with what the deck says.
     pub frequencies: Vec<f64>,
+    /// By how much (1) the width would raise each of them: beam elements know nothing of it. Empty where it does not.
+    pub stiffening: Vec<f64>,
 }
 
 /// Nodes `first` to `last` of one beam.
@@ -182,6 +184,8 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     for mass in masses {
         deck.add_mass(mass.position, mass.mass, 0.0);
     }
+    let held = (structure.assembly != Assembly::Free).then(|| source.joint.in_si(&structure.beam));
+    deck.without_width(&structure.specimen(held))?;
     let node = match structure.assembly {
         Assembly::Free => return Ok(deck),
         Assembly::Cantilever => 0,
@@ -239,7 +243,30 @@ impl Deck {
             hinges: Vec::new(),
             springs: Vec::new(),
             frequencies: frequencies.to_vec(),
+            stiffening: Vec::new(),
         }
+    }
+
+    /// Takes the stiffening by the width out of the predicted frequencies of a specimen.
+    fn without_width(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
+        let mut beams = specimen.body.beams().iter();
+        let ignored = WidthStiffening::Ignored;
+        if specimen.width_stiffening == ignored || beams.all(|beam| beam.poisson == 0.0) {
+            return Ok(());
+        }
+        let plain = Specimen {
+            width_stiffening: ignored,
+            ..specimen.clone()
+        };
+        let count = self.frequencies.len();
+        let stiff = specimen.modes(count, Mesh::SIMULATION)?;
+        let plain = plain.modes(count, Mesh::SIMULATION)?;
+        let ratios = stiff.frequencies().iter().zip(plain.frequencies());
+        self.stiffening = ratios.map(|(stiff, plain)| stiff / plain - 1.0).collect();
+        for (frequency, more) in self.frequencies.iter_mut().zip(&self.stiffening) {
+            *frequency /= 1.0 + more;
+        }
+        Ok(())
     }
 
     /// Nodes at these places and at equal distances between them: a short element beside a node of a regular mesh
@@ -322,6 +349,21 @@ impl Deck {
             let some: Vec<String> = some.iter().map(|hz| format!("{hz:.6}")).collect();
             lines.push(format!("predicted frequencies (Hz): {}", some.join(" ")));
         }
+        if !self.stiffening.is_empty() {
+            lines.push(
+                "beam elements are not stiffened by the width, as in tapjoint's model:".to_owned(),
+            );
+        }
+        for some in self.stiffening.chunks(6) {
+            let some: Vec<String> = some
+                .iter()
+                .map(|one| format!("{:.3}", 100.0 * one))
+                .collect();
+            lines.push(format!(
+                "this would raise the frequencies by (%): {}",
+                some.join(" ")
+            ));
+        }
         let lines = lines.iter().map(|line| format!("{sign}{line}\n"));
         lines.collect()
     }
@@ -354,6 +396,7 @@ pub fn deck_with_effects(
     frequencies: &[f64],
 ) -> Result<Deck, DeckError> {
     let mut deck = Deck::new(name, origin, theory_of(specimen)?, frequencies);
+    deck.without_width(specimen)?;
     // Cracks that lie within a beam, from left to right.
     let beams = specimen.body.beams();
     let length: f64 = beams.iter().map(|beam| beam.length).sum();

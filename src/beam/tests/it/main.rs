@@ -1,0 +1,6 @@
+//! Tests of the theory alone: no recording, no estimate.
+
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
+
+mod plate;
+mod width;

@@ -54,7 +54,7 @@ pub(super) fn run(
     let mut gap = gap_section(diagnosis.as_ref());
     let name = arguments.model.as_deref().map(file_name);
     let text = add_model(&mut gap, &file, name, &analysis, diagnosis.as_ref().ok());
-    document.gap = Some(gap);
+    document.add_gap(gap);
     match (output, text) {
         (None, _) => {}
         (Some(output), Some(text)) => output.write(text.as_bytes())?,

@@ -166,7 +166,7 @@ pub(super) fn run(
         let mut gap = gap_section(diagnosis.as_ref());
         let name = Some(MODEL_FILE.to_owned());
         model = add_model(&mut gap, file, name, &analysis, diagnosis.as_ref().ok());
-        document.gap = Some(gap);
+        document.add_gap(gap);
     }
     drop(progress);
     if let Some(model) = model {

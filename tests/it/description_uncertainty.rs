@@ -245,14 +245,14 @@ fn val_what_a_measurement_would_bring_is_what_it_brings() {
     let estimator = ConsistentEstimator::of_lengths(&structure, &modes, &[test], &settings);
     let with_test = estimator.unwrap().settled().estimate().unwrap();
     let kt = relative_std(&with_test, Quantity::Kt);
-    // The free bar's length has a tolerance of its own, which the promise leaves out.
+    // Ten modes say better than five that the model misses little.
     assert_close(
         kt,
         promised(Measure::FreeTest, Quantity::Kt),
         0.15,
         "free test",
     );
-    assert!(kt < 0.8 * relative_std(&before, Quantity::Kt), "{kt}");
+    assert!(kt < 0.95 * relative_std(&before, Quantity::Kt), "{kt}");
 }
 
 #[test]

@@ -275,13 +275,13 @@ impl Finished<'_> {
                 }
                 rows.push(gradient);
             }
-            // f is proportional to h/L^2 sqrt(E/rho).
+            // f is proportional to h/L^2 sqrt(E/rho). The whole bar has a length of its own, as well known.
             Measure::FreeTest => {
-                let std = LEAST_DISCREPANCY / FREE_MODES.sqrt();
+                let length = self.estimator.settings.tolerances.length.unwrap_or(0.0);
+                let std = (LEAST_DISCREPANCY / FREE_MODES.sqrt()).hypot(2.0 * length);
                 let powers = [
                     (Parameter::Modulus, 0.5),
                     (Parameter::Density, -0.5),
-                    (Parameter::Length, -2.0),
                     (Parameter::Thickness, 1.0),
                 ];
                 for (parameter, power) in powers {

@@ -27,7 +27,7 @@ use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail};
 /// Least discrepancy of any model (1, relative): what uniform bars of well-kept dimensions leave.
 pub const LEAST_DISCREPANCY: f64 = 5e-4;
 /// Largest discrepancy that is still called an uncertainty: beyond it the model is another structure's.
-pub const MOST_DISCREPANCY: f64 = 0.05;
+pub const MOST_DISCREPANCY: f64 = 0.5;
 
 /// Standard uncertainties of an attached mass.
 #[derive(Debug, Clone, PartialEq)]

@@ -14,8 +14,9 @@ pub use measured::{
 };
 pub use model::{
     Baseline, BaselineSection, BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection,
-    FromReadings, GapPlaceSection, GapSection, IdentifiabilitySection, LengthSection,
-    MisfitSection, PairsSection, PredictionSection, UpdatedModelSection, gap_section,
+    FromReadings, GapPlaceSection, GapSection, HeadlineSection, IdentifiabilitySection,
+    LengthSection, MisfitSection, PairsSection, PredictionSection, UpdatedModelSection,
+    gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
@@ -66,6 +67,9 @@ pub struct Document {
     /// The joint; `Some(None)` = asked for, but without an answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate: Option<Option<EstimateSection>>,
+    /// The joint to go by: that of the described model, or that of the model with the effect that the diagnosis names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub headline: Option<HeadlineSection>,
     /// Why there is no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate_reason: Option<String>,
@@ -155,6 +159,12 @@ impl Document {
         reason.unwrap_or("no reason was recorded")
     }
 
+    /// Adds the diagnosis. The headline becomes the joint that belongs to what it names.
+    pub fn add_gap(&mut self, gap: GapSection) {
+        self.headline = HeadlineSection::with(&gap).or(self.headline.take());
+        self.gap = Some(gap);
+    }
+
     /// The warnings that concern the result itself.
     pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
         self.warnings.iter().filter(|warning| !warning.beside)
@@ -196,6 +206,8 @@ pub fn document_of(analysis: &Analysis) -> Document {
         warnings: warnings.collect(),
         ..Document::default()
     };
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    document.headline = estimate.and_then(HeadlineSection::described);
     let perturbations = identification.map(|found| &found.perturbations);
     if let Some(found) = perturbations.filter(|found| !found.is_empty()) {
         document.perturbation = Some(found.uniform.clone());

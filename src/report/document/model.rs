@@ -38,6 +38,68 @@ impl EstimatedValue {
     }
 }
 
+/// The joint to go by.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct HeadlineSection {
+    /// "described", or "with sensor-mass": the model with what the diagnosis names, if that is confirmed.
+    pub model: String,
+    /// Translational stiffness (N/m).
+    pub kt: Option<HeadlineValue>,
+    /// Rotational stiffness (N m/rad).
+    pub kr: Option<HeadlineValue>,
+}
+
+/// A value of the headline.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct HeadlineValue {
+    /// The value; null where it is infinite: rigid.
+    pub value: Option<f64>,
+    /// Lower 95 % limit; null where it is unknown or unbounded.
+    pub low: Option<f64>,
+    /// Upper 95 % limit, likewise.
+    pub high: Option<f64>,
+}
+
+impl HeadlineSection {
+    /// The joint of the described model; `None` where no stiffness was estimated.
+    pub(super) fn described(estimate: &EstimateSection) -> Option<Self> {
+        let value = |found: &Option<EstimatedValue>| {
+            let found = &found.as_ref()?.uncertain;
+            Some(HeadlineValue {
+                value: Some(found.value).filter(|value| value.is_finite()),
+                low: found.low,
+                high: found.high,
+            })
+        };
+        let (kt, kr) = (value(&estimate.kt), value(&estimate.kr));
+        (kt.is_some() || kr.is_some()).then(|| Self {
+            model: "described".to_owned(),
+            kt,
+            kr,
+        })
+    }
+
+    /// The joint of the model with what the diagnosis names; `None` where it names nothing.
+    pub(super) fn with(gap: &GapSection) -> Option<Self> {
+        let Verdict::Named(effects) = &gap.verdict else {
+            return None;
+        };
+        let found = gap.named()?;
+        let values = found.joint?.into_iter().zip(found.joint_intervals);
+        let mut values = values.map(|(value, interval)| HeadlineValue {
+            value: Some(value).filter(|value| value.is_finite()),
+            low: interval.map(|ends| ends[0]).filter(|end| end.is_finite()),
+            high: interval.map(|ends| ends[1]).filter(|end| end.is_finite()),
+        });
+        let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+        Some(Self {
+            model: format!("with {}", names.join(" and ")),
+            kt: values.next(),
+            kr: values.next(),
+        })
+    }
+}
+
 /// A value by the readings alone.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FromReadings {

@@ -271,7 +271,7 @@ fn price(gap: &GapSection) -> Option<String> {
         return None;
     }
     let moves = parts.join(", ");
-    Some(match joint(found, true) {
+    Some(match joint(found) {
         Some(joint) => {
             format!("With it the joint is {joint}. Against the joint without it: {moves}.")
         }
@@ -279,10 +279,10 @@ fn price(gap: &GapSection) -> Option<String> {
     })
 }
 
-/// "Kt = 168.2 kN/m, Kr = 205.4 N m/rad": the joint that is found together with what the verdict names; `None` where it
-/// names nothing.
+/// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with what the verdict names;
+/// `None` where it names nothing.
 pub(crate) fn joint_with(gap: &GapSection) -> Option<String> {
-    joint(cause(gap)?, false)
+    joint(cause(gap)?)
 }
 
 /// The effects that the verdict names.
@@ -307,7 +307,7 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
     let found = cause(gap).filter(|found| found.gap_after < found.gap_before);
     let shrink = found.map(|found| {
         let joint =
-            joint(found, true).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
+            joint(found).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
         format!(
             "With {} the errors of the frequencies shrink from {} to {} % (rms){joint}.",
             together(&found.hypothesis),
@@ -318,12 +318,10 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
     shrink.into_iter().chain(next_test(gap)).collect()
 }
 
-/// With 95 % intervals if these are wanted.
-fn joint(found: &HypothesisResult, intervals: bool) -> Option<String> {
+/// The joint with its 95 % intervals.
+fn joint(found: &HypothesisResult) -> Option<String> {
     let [kt, kr] = found.joint?;
-    let [of_kt, of_kr] = found
-        .joint_intervals
-        .map(|interval| interval.filter(|_| intervals));
+    let [of_kt, of_kr] = found.joint_intervals;
     let kr = stiffness(kr, of_kr, "N\u{a0}m/rad");
     let kt = stiffness(kt, of_kt, "N/m");
     // A value stays on the line of its name and unit.

@@ -17,9 +17,7 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
     });
     let model = most_missed(document).and_then(|worst| {
         let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
-            let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
-            let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
-            format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
+            format!("; {}", missing(&gap.verdict, shows_gap(gap)))
         });
         Some(format!(
             "largest frequency error of the model {} % (mode {}){gap}",
@@ -119,7 +117,21 @@ fn joint(document: &Document) -> Option<String> {
         true => "; untested: as many unknowns as frequencies",
         false => "",
     };
-    (!physical.is_empty()).then(|| physical.join(", ") + untested)
+    let described = (!physical.is_empty()).then(|| physical.join(", ") + untested)?;
+    // The joint that belongs to a named cause comes first.
+    let gap = document.gap.as_ref();
+    let named = gap.filter(|gap| matches!(gap.verdict, Verdict::Named(_)));
+    let with = named.and_then(joint_with);
+    let headline = document.headline.as_ref();
+    Some(match headline.zip(with) {
+        Some((headline, joint)) => {
+            format!(
+                "{joint} {}, if confirmed; as described {described}",
+                headline.model
+            )
+        }
+        None => described,
+    })
 }
 
 /// The parameters that have a unit, in words.

@@ -41,6 +41,7 @@ pub fn document() -> Document {
         ]),
         datasets: None,
         modes: Some(modes()),
+        headline: None,
         estimate: Some(Some(estimate())),
         estimate_reason: None,
         prediction: Some(prediction()),

@@ -15,7 +15,7 @@ use std::ops::{Add, Mul, Sub};
 /// frequencies at which compliance and receptance of those two motions cancel. The receptance is
 /// the sum over the lowest modes of the model without joint, and over motions that stand for all
 /// higher ones: nothing is truncated, and one decomposition serves every joint. What elements miss of their own inertia
-/// is added to second order among these motions ([`SecondOrder`]).
+/// is added to second order among these motions (`SecondOrder`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceModes {
     /// Squares of the natural frequencies, in units of lambda^4 (1), ascending.

@@ -190,7 +190,10 @@ impl BeamTolerance {
             ("masses", self.masses, percent(self.masses.std, 1.0)),
             ("positions", self.positions, millimetres(self.positions.std)),
         ];
-        let assumed = all.into_iter().filter(|(_, found, _)| !found.stated);
+        // A density that the weight alone tells has no tolerance of its own.
+        let assumed = all.into_iter().filter(|(name, found, _)| {
+            !found.stated && (*name != "density" || values.density_stated)
+        });
         let words: Vec<String> = assumed
             .map(|(name, _, std)| format!("{name} {std}"))
             .collect();

@@ -8,7 +8,6 @@
 //! them with a plate.
 
 use tapjoint::structure::specimen::{LapLayout, Mesh, Specimen};
-use tapjoint::structure::width::clamp_differences;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -30,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let joint = JointStiffness::two_parameter(kx, ky).in_si(&beam);
     let (theory, layout) = (BeamTheory::Timoshenko, LapLayout::default());
     let specimen = Specimen::jointed(theory, &beam, Assembly::Cantilever, &layout, Some(joint));
-    for difference in clamp_differences(&specimen, modes as usize, Mesh::SIMULATION)? {
+    for difference in specimen.clamp_differences(modes as usize, Mesh::SIMULATION)? {
         println!("{difference:e}");
     }
     Ok(())

@@ -14,7 +14,8 @@ Supports at the root:
   clamp     w = 0 and dw/dx = 0 over the whole width (tapjoint: examples/clamp_difference.rs)
 
 Exits with 1 where tapjoint's correction is wrong by more than 5 % of itself and by more than 0.005 % of the frequency,
-or where the plate has not converged to a fifth of that. `--table` prints the numbers in src/beam/tests/width.rs.
+or where the plate has not converged to a fifth of that. `--table` prints all
+corrections; src/beam/tests/it/plate.rs holds a part of them. Build the example first: `cargo build --example clamp_difference`.
 """
 
 import argparse

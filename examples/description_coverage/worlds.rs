@@ -115,6 +115,16 @@ pub struct Case {
     outlier: Option<usize>,
 }
 
+impl Case {
+    /// Settings of a fit that has to find the size of the discrepancies itself.
+    fn unknown_discrepancy(&self) -> ConsistentSettings {
+        ConsistentSettings {
+            discrepancy: true,
+            ..self.settings.clone()
+        }
+    }
+}
+
 /// Interval of one quantity.
 pub struct Answer {
     pub quantity: Quantity,
@@ -144,8 +154,7 @@ pub fn outlier_answers(
     let mut all = Vec::new();
     for _ in 0..count {
         let case = draw(kind, theory, world, &mut random);
-        let mut settings = case.settings.clone();
-        settings.discrepancy = true;
+        let settings = case.unknown_discrepancy();
         let estimator = ConsistentEstimator::new(&case.described, &case.modes, &settings);
         let Ok(estimator) = estimator.map(ConsistentEstimator::settled) else {
             continue;
@@ -181,8 +190,7 @@ pub fn answers(
     let mut all = Vec::new();
     for _ in 0..count {
         let case = draw(kind, theory, world, &mut random);
-        let mut settings = case.settings.clone();
-        settings.discrepancy = true;
+        let settings = case.unknown_discrepancy();
         let Some(own) = estimate(&case.described, &case.modes, &settings) else {
             continue;
         };

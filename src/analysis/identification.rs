@@ -137,7 +137,10 @@ pub fn identify(
         let exact = estimator_of_lengths(structure, &details.exact(), &used, &moved);
         let exact = exact.and_then(|exact| exact.estimate());
         // Its errors are those of the estimate itself.
-        from_readings = exact.ok().map(Box::new);
+        let exact = exact
+            .ok()
+            .filter(|exact| exact.goodness.chi_squared.is_some());
+        from_readings = exact.map(Box::new);
     }
     let closed = match structure.regression {
         Some(model) => estimate_joint(model, &structure.beam, &used)
@@ -155,11 +158,11 @@ pub fn identify(
         (None, None) => refused.or(missing),
     };
     let mut found = Identification {
+        assumed: assumed(consistent.as_deref(), &settings.details),
         consistent,
-        from_readings,
         left_out,
         better_numbers,
-        assumed: settings.details.assumed.clone(),
+        from_readings,
         estimate,
         reason,
         prediction: Vec::new(),
@@ -179,6 +182,24 @@ pub fn identify(
     }
     warnings.extend(of_prediction(&found.prediction, &measured));
     (found, warnings)
+}
+
+/// Returns the standard uncertainties that the description does not state and the estimate has used, in words.
+fn assumed(estimate: Option<&ConsistentEstimate>, details: &StructureDetails) -> String {
+    let moved = estimate.map_or(&[][..], |estimate| &estimate.description);
+    let is_used = |name: &str| {
+        moved.iter().any(|pull| {
+            let input = pull.input.name();
+            match name {
+                "masses" => input.starts_with("mass of "),
+                "positions" => input.starts_with("position of "),
+                _ => input == name,
+            }
+        })
+    };
+    let used = details.assumed.iter().filter(|(name, _)| is_used(name));
+    let words: Vec<String> = used.map(|(name, std)| format!("{name} {std}")).collect();
+    words.join(", ")
 }
 
 /// Returns the estimator that knows what is uncertain beside the readings, and its estimate.

@@ -34,8 +34,12 @@ const COMMON: f64 = 1.5e-5;
 /// Returns the observations of a test; none for a bare recording, whose peaks have no numbers of a model.
 pub fn observations(analysis: &Analysis) -> Observations {
     let mut configurations = Vec::new();
+    // What does not belong to the other modes explains nothing that they share.
+    let found = analysis.identification.as_ref();
+    let left_out = found.and_then(|found| Some(found.left_out.as_ref()?.found.mode));
     if analysis.structure.is_some() && analysis.recordings.is_empty() {
         let modes = analysis.modes.iter();
+        let modes = modes.filter(|mode| mode.mode != left_out);
         let modes = modes.filter_map(|mode| {
             Some(ObservedMode::read_elsewhere(
                 mode.mode?,
@@ -49,7 +53,7 @@ pub fn observations(analysis: &Analysis) -> Observations {
         let recordings = analysis.recordings.iter().enumerate();
         let described = recordings.filter(|(_, one)| one.conditions.free_length.is_none());
         for (index, recording) in described {
-            configurations.extend(of_recording(index, recording));
+            configurations.extend(of_recording(index, recording, left_out));
         }
     }
     let forces = configurations.iter().filter_map(|c| c.peak_force);
@@ -86,7 +90,11 @@ pub fn read_elsewhere(mut modes: Vec<ObservedMode>) -> Configuration {
 }
 
 /// The configurations of one recording, one for each tap level, the hardest first.
-fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration> {
+fn of_recording(
+    index: usize,
+    recording: &RecordingResult,
+    left_out: Option<usize>,
+) -> Vec<Configuration> {
     let Some(spectra) = &recording.measurement.spectra else {
         return Vec::new();
     };
@@ -95,6 +103,7 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
     let levels = levels(&peaks, has_forces);
     let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
     let mut numbered: Vec<(usize, &ModeReading)> = numbered
+        .filter(|(_, number)| **number != left_out)
         .filter_map(|(reading, number)| Some(((*number)?, reading)))
         .collect();
     numbered.sort_by_key(|(number, _)| *number);

@@ -105,8 +105,8 @@ pub struct StructureDetails {
     pub free: Option<MovedClamp>,
     /// True where the model itself may miss the frequencies.
     pub discrepancy: bool,
-    /// Standard uncertainties that the description does not state, in words; empty without any.
-    pub assumed: String,
+    /// Standard uncertainties that the description does not state: name and value in words.
+    pub assumed: Vec<(&'static str, String)>,
     /// Parameters that are estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
     pub fit: Option<Vec<FitParameter>>,
     /// Weights; `None` = measured where every uncertainty is known.
@@ -123,7 +123,7 @@ impl StructureDetails {
             weighed: None,
             free: None,
             discrepancy: false,
-            assumed: String::new(),
+            assumed: Vec::new(),
             ..self.clone()
         }
     }
@@ -172,7 +172,7 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
             .as_ref()
             .map(|free| free_bar(test, beam, free, bar_length)),
         discrepancy: true,
-        assumed: tolerance.assumed_words(&test.beam),
+        assumed: tolerance.assumed(&test.beam),
         fit: test.analysis.fit.clone(),
         weights: test.analysis.weights,
     }
@@ -321,8 +321,14 @@ pub(super) fn estimator_of_lengths(
     moved: &[MovedClamp],
 ) -> Result<ConsistentEstimator, IdentifyError> {
     let jointed = jointed(structure, details);
-    let moved = &[moved, details.free.as_slice()].concat();
     let mut settings = settings(structure, details, used, moved);
+    // Without uncertainties nothing of the beam is fitted along, and the free bar would tell nothing.
+    let free = details.free.as_slice();
+    let free = match settings.weights {
+        ResidualWeights::Measured => free,
+        ResidualWeights::Relative => &[],
+    };
+    let moved = &[moved, free].concat();
     hold_cross_stiffness(structure, &jointed, used, moved, &mut settings)?;
     ConsistentEstimator::of_lengths(&jointed, used, moved, &settings)
 }

@@ -16,12 +16,11 @@
 //!
 //! The first term is the beam's own. Of the plate's energy mu would be 1. But higher powers of y let the section give
 //! way: mu makes waves along a strip right to the fourth power of wave number times width (docs/theory.md). The inertia
-//! of the curling is beyond that order, so `a` has none.
+//! and the second derivative of the curling are of that order too. Both are in mu, so `a` has neither.
 //!
 //! At an end nothing holds `a`, and a' = 0 follows by itself. At a joint the springs decide.
 
-use super::specimen::{Mesh, Specimen};
-use super::{Beam, StructureError};
+use super::Beam;
 
 /// What a model knows of the width, and how the joint holds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,47 +57,4 @@ impl Curling {
             mean_square: width.powi(4) / 720.0,
         }
     }
-}
-
-/// What a clamp that keeps the slope across the width adds to each frequency, over what holding the end flat adds.
-///
-/// Near the clamp the section has more ways to give than `a`, and is forced to give up more than `a`. Fitted to
-/// `scripts/plate_width.py` for Poisson's ratios from 0.2 to 0.45, to 1 % of the correction.
-fn clamp_factor(poisson: f64) -> f64 {
-    1.15 + 0.47 * poisson
-}
-
-/// Returns by how much (1) each frequency of the lowest `count` modes would be higher in a rigid clamp, which keeps
-/// displacement and slope equal across the width, than with springs spread over the width.
-///
-/// How a joint holds the width is rarely known. The truth lies between 0 and these numbers. Of a free beam they are 0,
-/// and of a lap joint they hold for halves that curl alike at the joint.
-///
-/// # Errors
-/// As [`Specimen::modes`].
-pub fn clamp_differences(
-    specimen: &Specimen,
-    count: usize,
-    mesh: Mesh,
-) -> Result<Vec<f64>, StructureError> {
-    if specimen.width_stiffening == WidthStiffening::Ignored || specimen.joint.is_none() {
-        return Ok(vec![0.0; count]);
-    }
-    let with = |width_stiffening| {
-        let other = Specimen {
-            width_stiffening,
-            ..specimen.clone()
-        };
-        other.modes(count, mesh)
-    };
-    let nominal = specimen.modes(count, mesh)?;
-    let free = with(WidthStiffening::FreeAtJoint)?;
-    let held = with(WidthStiffening::HeldAtJoint)?;
-    let factor = clamp_factor(specimen.body.beams()[0].poisson);
-    let frequencies = nominal.frequencies().iter();
-    let others = free.frequencies().iter().zip(held.frequencies());
-    Ok(frequencies
-        .zip(others)
-        .map(|(nominal, (free, held))| (free + factor * (held - free)) / nominal - 1.0)
-        .collect())
 }

@@ -5,6 +5,7 @@
 
 mod keys;
 mod parse;
+mod property;
 mod reader;
 mod recordings;
 mod structure;

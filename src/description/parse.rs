@@ -1,17 +1,24 @@
 //! From text to [`TestDescription`]: the tables in their order, and the settings of the analysis.
 
-use super::reader::{DescriptionError, Entry, Limits, Source, Table};
+use super::property::{
+    DENSITY, LENGTH, MODULUS, POISSON, THICKNESS, WIDTH, needed, optional, read_free_length,
+};
+use super::reader::{DescriptionError, Entry, Limits, Source, Table, with_unit};
 use super::recordings::{
     check_lengths, check_places, read_hammer, read_measured, read_recording, read_sensors,
 };
-use super::structure::{read_beam, read_effect, read_joint};
+use super::structure::{read_effect, read_joint};
+use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
 use super::{
-    AnalysisDescription, Assembly, ChannelRef, FitParameter, JointDescription, JointModel,
-    ModeFile, RecordingDescription, SensorDescription, TestDescription, Weights, WindowKind, keys,
+    AnalysisDescription, Assembly, BeamDescription, ChannelRef, FitParameter, JointDescription,
+    JointModel, ModeFile, RecordingDescription, SensorDescription, TestDescription, Weights,
+    WindowKind, keys,
 };
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use tapjoint_beam::beam::DEFAULT_POISSON;
+use tapjoint_numerics::quantity::Dimension;
 use tapjoint_signal::modal::ReadBy;
 use toml::de::DeTable;
 
@@ -42,6 +49,7 @@ impl TestDescription {
         let joint_table = top
             .need("joint", "the kind of joint", example)?
             .table(&keys::JOINT)?;
+        check_bar(&beam_table, &joint_table)?;
         let joint = read_joint(&joint_table, beam_table.get("right"), beam.length)?;
         let hammer_table = top.optional("hammer", |entry| entry.table(&keys::HAMMER))?;
         let hammer = hammer_table.as_ref().map(read_hammer).transpose()?;
@@ -108,6 +116,81 @@ impl TestDescription {
 const MOST_SENSORS: usize = 128;
 const MOST_RECORDINGS: usize = 1000;
 const MOST_EFFECTS: usize = 100;
+
+/// Refuses keys of the bar without its joint where the beam is another: two halves, or free already.
+fn check_bar(beam: &Table<'_>, joint: &Table<'_>) -> Result<(), DescriptionError> {
+    let kind = joint.get("kind");
+    let kind = kind.as_ref().and_then(|kind| kind.as_text());
+    for key in ["bar_length", "free_frequencies"] {
+        if let Some(entry) = beam
+            .get(key)
+            .filter(|_| matches!(kind, Some("lap" | "free")))
+        {
+            return Err(entry.error(
+                "only the bar of a cantilever is known without its joint; remove this key, or set `kind = \"cantilever\"`",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Smallest length of a slender beam, in thicknesses.
+const STOCKY: f64 = 3.0;
+
+/// Reads `[beam]` without its right half.
+fn read_beam(table: &Table<'_>) -> Result<BeamDescription, DescriptionError> {
+    let length = needed(table, &LENGTH)?;
+    let width = needed(table, &WIDTH)?;
+    let thickness = needed(table, &THICKNESS)?;
+    let modulus = needed(table, &MODULUS)?;
+    let weighed = read_weighed(table)?;
+    let bar_length = table.optional("bar_length", read_free_length)?;
+    if let Some(entry) = table.get("bar_length")
+        && bar_length < Some(length)
+    {
+        return Err(entry.error(
+            "the whole bar is shorter than its free `length`; measure it from end to end, clamped part included",
+        ));
+    }
+    let density = match (optional(table, &DENSITY)?, weighed) {
+        (Some(density), _) => density,
+        // The weight says it: nothing else is known of it.
+        (None, Some(weighed)) if table.get("right").is_none() => {
+            weighed.mass / (bar_length.unwrap_or(length) * width * thickness)
+        }
+        (None, _) => needed(table, &DENSITY)?,
+    };
+    let described = [
+        (&LENGTH, length),
+        (&WIDTH, width),
+        (&THICKNESS, thickness),
+        (&MODULUS, modulus),
+        (&DENSITY, density),
+    ];
+    let described = described.map(|(property, value)| Described { property, value });
+    let poisson = table.within("poisson", Dimension::Ratio, &POISSON)?;
+    let beam = BeamDescription {
+        length,
+        width,
+        thickness,
+        modulus,
+        density,
+        poisson,
+        tolerance: BeamTolerance::read(table, described, poisson.unwrap_or(DEFAULT_POISSON))?,
+        weighed,
+        density_stated: table.get("density").is_some(),
+        free: read_free(table)?,
+        bar_length,
+    };
+    let stocky = beam.length < STOCKY * beam.thickness;
+    if let Some(entry) = table.get("thickness").filter(|_| stocky) {
+        let length = with_unit(beam.length, "m");
+        let usual = format!("less than a third of the length, {length}");
+        let question = "did you swap thickness and length, or mix units?";
+        entry.unusual(beam.thickness, "m", &usual, question);
+    }
+    Ok(beam)
+}
 
 fn array_of_tables<'t>(
     top: &Table<'t>,

@@ -1,10 +1,11 @@
 //! `[hammer]` and `[[sensor]]`: channels of the recordings and their scales. `[[recording]]`: files of the test, each
 //! with its own settings. `[measured]`: natural frequencies that were read elsewhere.
 
+use super::property::read_free_length;
 use super::reader::{
     DescriptionError, Entry, Limits, Table, did_you_mean, number, quoted, with_unit,
 };
-use super::structure::{along, read_free_length};
+use super::structure::along;
 use super::{
     Assembly, BeamDescription, ChannelPlace, ChannelRef, FirstNode, FunctionForm,
     HammerDescription, MeasuredFrequencies, ModeFile, PointMass, RecordingDescription,

@@ -23,11 +23,11 @@ density = 7850                 # kg/m3
 #   thickness 0.5 % or 0.02 mm, width 0.2 % or 0.05 mm, length 0.1 % or 0.5 mm (the larger), poisson 0.02, masses on the beam 2 %
 # position_tolerance = "1 mm"   # standard uncertainty of positions on the beam, default: 1 mm
 # mass = "830 g"                # the bare bar on a balance, good to 0.1 % or 0.5 g; density is then optional
-# bar_length = "450 mm"         # the whole bar as weighed and tested free, a clamped part included; default: length
-#   free_frequencies = [102.1, 281.5] and free_std = 0.02, both in Hz: modes 1, 2, ... of the same bar free at both ends
 "#;
 
-const CANTILEVER: &str = r#"
+const CANTILEVER: &str = r#"# bar_length = "450 mm"         # the whole bar as weighed and tested free, a clamped part included; default: length
+#   free_frequencies = [102.1, 281.5] and free_std = 0.02, both in Hz: modes 1, 2, ... of the same bar free at both ends
+
 [joint]
 kind = "cantilever"            # "cantilever": held at one end | "lap": two halves joined | "free": no joint
 model = "2p"                   # "2p" (default): translation and rotation | "3p": and their coupling

@@ -2,9 +2,9 @@
 //! free frequencies.
 
 use super::keys;
+use super::property::{LENGTH, Property};
 use super::reader::{DescriptionError, Entry, Limits, Table, number, with_unit};
 use super::recordings::read_free_frequencies;
-use super::structure::{LENGTH, Property};
 use tapjoint_numerics::quantity::Dimension;
 
 /// One standard uncertainty.
@@ -111,6 +111,7 @@ impl BeamTolerance {
     pub(super) fn read(
         table: &Table<'_>,
         described: [Described<'_>; 5],
+        poisson: f64,
     ) -> Result<Self, DescriptionError> {
         let entry = table.get("tolerance");
         let is_exact = entry
@@ -163,14 +164,19 @@ impl BeamTolerance {
             thickness,
             modulus,
             density,
-            poisson: of("poisson", 0.3, Dimension::Ratio, assumed(ASSUMED_POISSON))?,
+            poisson: of(
+                "poisson",
+                poisson.abs(),
+                Dimension::Ratio,
+                assumed(ASSUMED_POISSON),
+            )?,
             masses: of("masses", 1.0, Dimension::Ratio, assumed(ASSUMED_MASSES))?,
             positions,
         })
     }
 
-    /// What is assumed, in words: "modulus 1 %, density 0.5 %". Empty where all is stated.
-    pub fn assumed_words(&self, values: &super::BeamDescription) -> String {
+    /// Names and values of what is assumed, in words: ("modulus", "1 %"), ("density", "0.5 %"). Empty where all is stated.
+    pub fn assumed(&self, values: &super::BeamDescription) -> Vec<(&'static str, String)> {
         let percent = |std: f64, value: f64| format!("{} %", number(1e2 * rounded(std / value)));
         let millimetres = |std: f64| with_unit(1e3 * rounded(std), "mm");
         let all = [
@@ -187,6 +193,7 @@ impl BeamTolerance {
             ("thickness", self.thickness, millimetres(self.thickness.std)),
             ("width", self.width, millimetres(self.width.std)),
             ("length", self.length, millimetres(self.length.std)),
+            ("poisson", self.poisson, number(rounded(self.poisson.std))),
             ("masses", self.masses, percent(self.masses.std, 1.0)),
             ("positions", self.positions, millimetres(self.positions.std)),
         ];
@@ -194,10 +201,7 @@ impl BeamTolerance {
         let assumed = all.into_iter().filter(|(name, found, _)| {
             !found.stated && (*name != "density" || values.density_stated)
         });
-        let words: Vec<String> = assumed
-            .map(|(name, _, std)| format!("{name} {std}"))
-            .collect();
-        words.join(", ")
+        assumed.map(|(name, _, std)| (name, std)).collect()
     }
 }
 

@@ -176,11 +176,14 @@ fn regress_defaults_of_a_minimal_description() {
         (None, None, None)
     );
     assert_eq!((test.hammer, test.beam.poisson), (None, None));
-    let words = test.beam.tolerance.assumed_words(&test.beam);
-    assert_eq!(
-        words,
-        "modulus 1 %, density 0.5 %, thickness 0.025 mm, width 0.1 mm, length 0.6 mm, masses 2 %, positions 1 mm"
-    );
+    let assumed = test.beam.tolerance.assumed(&test.beam);
+    let words: Vec<String> = assumed
+        .iter()
+        .map(|(name, std)| format!("{name} {std}"))
+        .collect();
+    let expected = "modulus 1 %, density 0.5 %, thickness 0.025 mm, width 0.1 mm, length 0.6 mm, poisson 0.02, masses 2 %, \
+                    positions 1 mm";
+    assert_eq!(words.join(", "), expected);
     let analysis = test.analysis;
     assert_eq!(
         (analysis.window, analysis.fit_modes, analysis.weights),

@@ -7,6 +7,7 @@
 #[path = "../../examples/description_coverage/worlds.rs"]
 mod worlds;
 
+use crate::shared::steel_strip;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{
@@ -15,26 +16,16 @@ use tapjoint::identify::consistent::{
     Parameter, Quantity, WeighedBeam,
 };
 use tapjoint::structure::specimen::PointMass;
-use tapjoint::structure::{Assembly, Beam, BeamTheory};
+use tapjoint::structure::{Assembly, BeamTheory};
 use worlds::{Answer, Kind, World, answers, outlier_answers};
 
 /// Chance at which a test fails although the intervals are true.
 const CHANCE: f64 = 1e-3;
 
-fn strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
-
 /// The strip on a joint, with a sensor of 24 g.
 fn loaded() -> JointedStructure {
-    let mut structure = JointedStructure::new(BeamTheory::Euler, strip(), Assembly::Cantilever);
+    let mut structure =
+        JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Cantilever);
     structure.masses = vec![PointMass::new(0.338, 0.024)];
     structure
 }
@@ -205,9 +196,9 @@ fn val_what_a_measurement_would_bring_is_what_it_brings() {
     };
     let mut weighed = settings.clone();
     weighed.weighed = Some(WeighedBeam {
-        mass: strip().mass(),
-        std: 1e-3 * strip().mass(),
-        length: strip().length,
+        mass: steel_strip().mass(),
+        std: 1e-3 * steel_strip().mass(),
+        length: steel_strip().length,
     });
     let mut calipered = settings.clone();
     calipered.tolerances.thickness = Some(1e-5 / 0.005);
@@ -231,7 +222,7 @@ fn val_what_a_measurement_would_bring_is_what_it_brings() {
         );
     }
     // Five modes of the free bar, right to the least discrepancy.
-    let free = JointedStructure::new(BeamTheory::Euler, strip(), Assembly::Free);
+    let free = JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Free);
     let test = MovedClamp {
         modes: modes_of(&free, 5)
             .into_iter()
@@ -268,6 +259,17 @@ fn recover_a_wrong_modulus_is_pulled_and_the_joint_is_right() {
     // Three standard uncertainties, of which thickness, density and length take a share.
     let pull = pull.unwrap().pull;
     assert!((-3.0..-1.0).contains(&pull), "{pull}");
+}
+
+#[test]
+fn regress_a_description_far_off_is_pulled_however_large_the_discrepancy() {
+    let mut soft = loaded();
+    soft.beam.modulus *= 0.85;
+    let estimate = estimated(&loaded(), &modes_of(&soft, 7), &uncertain());
+    let pulls = estimate.description.iter().map(|pull| pull.pull.abs());
+    // Fifteen standard uncertainties, shared by modulus, thickness, density and length.
+    let largest = pulls.fold(0.0, f64::max);
+    assert!(largest > 5.0, "{largest}");
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn regress_a_deck_of_a_model_that_misses_says_so() {
     let head = head.join(" ").replace(" $ ", " ");
     for told in [&error, &head] {
         assert!(
-            told.contains("the model misses the frequencies by 0.11 % rms"),
+            told.contains("the model misses the frequencies by 0.20 % rms"),
             "{told}"
         );
         assert!(told.contains("95 % limits: kt 1.5"), "{told}");

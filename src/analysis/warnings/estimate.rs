@@ -279,7 +279,8 @@ fn left_out(left_out: &LeftOutMode) -> Warning {
     let found = &left_out.found;
     let mut with_all = Vec::new();
     for quantity in [Quantity::Kt, Quantity::Kr, Quantity::Modulus] {
-        let own = left_out.with_all.quantity(quantity);
+        let is_asked = left_out.with_all.fit.contains(&quantity.lead());
+        let own = left_out.with_all.quantity(quantity).filter(|_| is_asked);
         if let Some(value) = own.and_then(|own| own.value) {
             with_all.push(format!("{} {value:.4e}", quantity.name()));
         }
@@ -287,8 +288,8 @@ fn left_out(left_out: &LeftOutMode) -> Warning {
     Warning::new(
         "outlying-mode",
         format!(
-            "mode {} lies {:+.2} % from what the other modes predict ({} standard deviations) and is left out; without it \
-             the model explains the rest (goodness of fit {}); with it the best fit has {}; look at its peak and its number",
+            "mode {} is left out: it lies {:+.2} % from what the other modes predict ({} standard deviations). Without it \
+             the model explains the rest (goodness of fit {}). With it the best fit has {}. Look at its peak and its number",
             found.mode,
             found.percent,
             times(found.deviations.abs()),
@@ -304,8 +305,8 @@ fn better_numbers(numbers: &[usize]) -> Warning {
     Warning::new(
         "other-numbers",
         format!(
-            "the model does not explain the modes as they are numbered; it would with the numbers {}: a mode was missed, or \
-             a peak is none; check, and state `modes` in [measured]",
+            "the model does not explain the modes as they are numbered. It would with the numbers {}. Check whether a mode \
+             was missed, or a peak is none",
             numbers.join(", ")
         ),
     )

@@ -9,6 +9,7 @@
 //! shape, and what the static shapes miss is added to second order (`element.rs`). So frequencies
 //! are smooth in every position and good on a coarse mesh.
 
+mod clamp;
 mod element;
 pub(crate) mod model;
 pub(crate) mod modes;

@@ -6,8 +6,9 @@
 
 use super::Quantity;
 use super::estimate::Finished;
+use super::estimator::ConsistentEstimator;
 use super::model::{PARAMETERS, Parameter, Point};
-use super::problem::{Covariance, along, value_along, whitened};
+use super::problem::{Covariance, Evaluation, Problem, along, value_along, whitened};
 use super::uncertainty::{LEAST_DISCREPANCY, whitening};
 use nalgebra::DVector;
 use schemars::JsonSchema;
@@ -172,38 +173,6 @@ impl Finished<'_> {
         entries
     }
 
-    /// Returns where the fit moved what the description states.
-    pub(super) fn description(&self) -> Vec<DescriptionPull> {
-        let count = self.problem.data.len();
-        let state = &self.best.state;
-        let mut pulls = Vec::new();
-        let nuisances = self.estimator.nuisances.iter();
-        for ((parameter, _), pull) in nuisances.zip(&state.residuals[count..]) {
-            pulls.push(DescriptionPull {
-                input: BudgetInput::Property(*parameter),
-                stated: self.estimator.base[parameter.index()].exp(),
-                fitted: state.point[parameter.index()].exp(),
-                pull: *pull,
-            });
-        }
-        let inputs = self.estimator.standardised_inputs(&self.problem.data);
-        let residuals = DVector::from_column_slice(&state.residuals[..count]);
-        for (input, change) in self.estimator.inputs.iter().zip(inputs) {
-            let Some(triangle) = &self.problem.whitening else {
-                continue;
-            };
-            // A residual is predicted less measured: an input that raises the frequencies lowers it.
-            let pull = -(triangle * change).dot(&residuals);
-            pulls.push(DescriptionPull {
-                input: BudgetInput::Attachment(input.name.clone()),
-                stated: input.stated,
-                fitted: input.stated + pull * input.std,
-                pull,
-            });
-        }
-        pulls
-    }
-
     /// Returns what further measurements would make of the estimate; none where the description is exact.
     pub(super) fn remedies(&self) -> Vec<Remedy> {
         let settings = &self.estimator.settings;
@@ -264,13 +233,7 @@ impl Finished<'_> {
         let mut gradient = [0.0; PARAMETERS];
         match measure {
             Measure::WeighBeam => {
-                let properties = [
-                    Parameter::Density,
-                    Parameter::Length,
-                    Parameter::Width,
-                    Parameter::Thickness,
-                ];
-                for parameter in properties {
+                for parameter in Parameter::OF_MASS {
                     gradient[parameter.index()] = 1.0 / BALANCE;
                 }
                 rows.push(gradient);
@@ -306,5 +269,42 @@ impl Finished<'_> {
                 Some((quantity, covariance.std(&gradient)?.hypot(scatter)))
             });
         stds.collect()
+    }
+}
+
+impl ConsistentEstimator {
+    /// Returns where the fit moved what the description states.
+    pub(super) fn description(
+        &self,
+        problem: &Problem<'_>,
+        state: &Evaluation,
+    ) -> Vec<DescriptionPull> {
+        let count = problem.data.len();
+        let mut pulls = Vec::new();
+        let nuisances = self.nuisances.iter();
+        for ((parameter, _), pull) in nuisances.zip(&state.residuals[count..]) {
+            pulls.push(DescriptionPull {
+                input: BudgetInput::Property(*parameter),
+                stated: self.base[parameter.index()].exp(),
+                fitted: state.point[parameter.index()].exp(),
+                pull: *pull,
+            });
+        }
+        let inputs = self.standardised_inputs(&problem.data);
+        let residuals = DVector::from_column_slice(&state.residuals[..count]);
+        for (input, change) in self.inputs.iter().zip(inputs) {
+            let Some(triangle) = &problem.whitening else {
+                continue;
+            };
+            // A residual is predicted less measured: an input that raises the frequencies lowers it.
+            let pull = -(triangle * change).dot(&residuals);
+            pulls.push(DescriptionPull {
+                input: BudgetInput::Attachment(input.name.clone()),
+                stated: input.stated,
+                fitted: input.stated + pull * input.std,
+                pull,
+            });
+        }
+        pulls
     }
 }

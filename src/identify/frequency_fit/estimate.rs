@@ -58,9 +58,7 @@ impl ConsistentEstimator {
         let finished = Finished {
             estimator: self,
             covariance: Covariance::new(&best.state.jacobian, &directions),
-            goodness: self
-                .goodness
-                .unwrap_or_else(|| self.goodness(&problem, &best, directions.len())),
+            goodness: self.tested(&problem, &best, directions.len()),
             set_ups,
             problem,
             best,
@@ -80,7 +78,10 @@ impl ConsistentEstimator {
             other_minima: minima.map(|other| finished.other(&other)).collect(),
             discrepancy: self.discrepancy,
             budget: finished.budget(),
-            description: finished.description(),
+            description: match self.goodness {
+                Some(_) => self.pulls.clone(),
+                None => self.description(&finished.problem, &best.state),
+            },
             remedies: finished.remedies(),
             set_ups: set_ups.len(),
             stop: best.stop,
@@ -88,6 +89,17 @@ impl ConsistentEstimator {
             joint: joint_at(&best.state.point),
             beam: beam_at(&self.models[0].structure().beam, &best.state.point),
         })
+    }
+
+    /// Returns the test of the model by the least discrepancy, where that was found, with the misfit of this fit.
+    fn tested(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {
+        let own = self.goodness(problem, best, free);
+        let tested = self.goodness.unwrap_or(own);
+        Goodness {
+            relative_misfit: own.relative_misfit,
+            misfit_per_freedom: own.misfit_per_freedom,
+            ..tested
+        }
     }
 
     pub(super) fn goodness(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {

@@ -1,5 +1,6 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
+use super::budget::DescriptionPull;
 use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
 use super::problem::{
     Covariance, Datum, Evaluation, FOLLOWED, FULL, MISFIT, Minimum, Prior, Problem, REPEATED,
@@ -41,6 +42,8 @@ pub struct ConsistentEstimator {
     pub(super) discrepancy: f64,
     /// The test of the model with the least discrepancy; found by [`Self::settled`].
     pub(super) goodness: Option<Goodness>,
+    /// Where that fit moved the description; found by [`Self::settled`].
+    pub(super) pulls: Vec<DescriptionPull>,
 }
 
 /// A fit without its intervals.
@@ -188,6 +191,7 @@ impl ConsistentEstimator {
             inputs: Vec::new(),
             discrepancy: 0.0,
             goodness: None,
+            pulls: Vec::new(),
         })
     }
 
@@ -218,6 +222,7 @@ impl ConsistentEstimator {
         let problem = self.problem(&models, &frequencies);
         let directions = self.directions();
         let goodness = self.goodness(&problem, &best, directions.len());
+        let pulls = self.description(&problem, &best.state);
         if self.settings.discrepancy {
             let modes = self.modes.iter();
             let readings: Vec<f64> = modes
@@ -228,6 +233,7 @@ impl ConsistentEstimator {
             self.discrepancy = discrepancy(&problem, state, &directions, &readings, &inputs);
         }
         self.goodness = Some(goodness);
+        self.pulls = pulls;
         self
     }
 
@@ -354,13 +360,7 @@ impl ConsistentEstimator {
         let mass: f64 = body.beams().iter().map(Beam::mass).sum();
         let mass = mass * weighed.length / structure.beam.length;
         let mut gradient = [0.0; PARAMETERS];
-        let properties = [
-            Parameter::Density,
-            Parameter::Length,
-            Parameter::Width,
-            Parameter::Thickness,
-        ];
-        for parameter in properties {
+        for parameter in Parameter::OF_MASS {
             gradient[parameter.index()] = 1.0;
         }
         Some(Prior {

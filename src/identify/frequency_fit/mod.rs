@@ -240,7 +240,8 @@ pub struct ConsistentEstimate {
     pub discrepancy: f64,
     /// What each input contributes to the standard deviation of each quantity.
     pub budget: Vec<BudgetEntry>,
-    /// Where the fit moved the uncertain properties of the description.
+    /// Where the fit with the least discrepancy moved the uncertain properties of the description. A larger discrepancy would
+    /// hide a wrong one.
     pub description: Vec<DescriptionPull>,
     /// What further measurements would make of the standard deviations, where the description is uncertain.
     pub remedies: Vec<Remedy>,
@@ -327,7 +328,7 @@ impl Quantity {
     }
 
     /// Returns the coordinate of a point that it is first of all about.
-    pub(super) fn lead(self) -> Parameter {
+    pub fn lead(self) -> Parameter {
         match self {
             Self::Kx | Self::Kt => Parameter::Kt,
             Self::Ky | Self::Kr => Parameter::Kr,

@@ -212,6 +212,10 @@ impl Parameter {
         Self::FifthLength,
     ];
 
+    /// Properties whose product the mass of the beam is, but for a constant.
+    pub(super) const OF_MASS: [Self; 4] =
+        [Self::Density, Self::Length, Self::Width, Self::Thickness];
+
     pub(super) fn index(self) -> usize {
         self as usize
     }

@@ -102,10 +102,14 @@ impl ConsistentEstimator {
         })
     }
 
-    /// Returns the estimator without one of its modes.
+    /// Returns the estimator without one of its modes, counted from 0. It is to be [`Self::settled`] anew.
+    ///
+    /// # Panics
+    /// Where there is no such mode.
     #[must_use]
     pub fn without(&self, index: usize) -> Self {
         let mut rest = self.clone();
+        rest.goodness = None;
         rest.modes.remove(index);
         rest.structures.remove(index);
         for input in &mut rest.inputs {

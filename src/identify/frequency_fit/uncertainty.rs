@@ -21,7 +21,6 @@ use super::{Limit, Quantity, limit_of};
 use nalgebra::{DMatrix, DVector};
 use tapjoint_beam::Joint;
 use tapjoint_beam::specimen::Mesh;
-use tapjoint_beam::width::clamp_differences;
 use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail};
 
 /// Least discrepancy of any model (1, relative): what uniform bars of well-kept dimensions leave.
@@ -121,7 +120,8 @@ pub(super) fn attachment_inputs(
 /// the model takes no notice of the width.
 ///
 /// The model spreads the joint's springs over the width. A clamp that keeps the slope gives the frequencies of
-/// [`clamp_differences`]; the truth lies between both, so that half of the difference is one standard uncertainty.
+/// `Specimen::clamp_differences`; a joint that grips the whole width lies between both. Half of the difference is one standard
+/// uncertainty.
 pub(super) fn width_inputs(
     structure: &JointedStructure,
     joint: Option<Joint>,
@@ -155,7 +155,7 @@ pub(super) fn width_inputs(
             changes: changes.collect(),
         });
     }
-    let differences = clamp_differences(&specimen, count, Mesh::DIAGNOSIS);
+    let differences = specimen.clamp_differences(count, Mesh::DIAGNOSIS);
     if let Ok(differences) = differences
         && differences.iter().any(|difference| *difference != 0.0)
     {

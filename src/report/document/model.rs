@@ -402,7 +402,9 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
         assumed: Some(found.assumed.clone()).filter(|assumed| !assumed.is_empty()),
         left_out: found.left_out.as_ref().map(|left_out| {
             let with_all = |quantity: Quantity| {
-                let found = value(&left_out.with_all, None, quantity);
+                let all = &left_out.with_all;
+                let found =
+                    value(all, None, quantity).filter(|_| all.fit.contains(&quantity.lead()));
                 found.map(|found| found.uncertain)
             };
             LeftOutRow {

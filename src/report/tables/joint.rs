@@ -189,6 +189,9 @@ pub fn parameters(document: &Document) -> Option<Table> {
     })
 }
 
+/// Share of the largest contribution below which an input has no row: its square is a millionth.
+const NEGLIGIBLE_SHARE: f64 = 1e-3;
+
 /// What each input contributes to the standard deviations; `None` without a budget.
 pub fn budget(document: &Document) -> Option<Table> {
     let estimate = document.estimate.as_ref()?.as_ref()?;
@@ -197,13 +200,26 @@ pub fn budget(document: &Document) -> Option<Table> {
         .iter()
         .filter(|one| !one.budget.is_empty() && !matches!(one.name, "kx" | "ky"))
         .collect();
-    let first = columns.first()?;
+    // The inputs of all columns, in the order of the first; what is nothing beside the rest is left out.
+    let mut inputs: Vec<&str> = Vec::new();
+    for column in &columns {
+        let most = column.budget.first().map_or(0.0, |own| own.std_percent);
+        let seen = column.budget.iter();
+        for own in seen.filter(|own| own.std_percent > NEGLIGIBLE_SHARE * most) {
+            if !inputs.contains(&&*own.input) {
+                inputs.push(&own.input);
+            }
+        }
+    }
+    if inputs.is_empty() {
+        return None;
+    }
     let mut rows = Vec::new();
-    for input in first.budget {
-        let mut row = vec![input_words(&input.input)];
+    for input in inputs {
+        let mut row = vec![input_words(input)];
         row.extend(columns.iter().map(|column| {
             let mut budget = column.budget.iter();
-            let own = budget.find(|own| own.input == input.input);
+            let own = budget.find(|own| own.input == input);
             or_missing(own.map(|own| significant(own.std_percent, 2)))
         }));
         rows.push(row);

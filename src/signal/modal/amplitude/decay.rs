@@ -3,8 +3,7 @@
 //! Models of the whole decay are compared by Schwarz's criterion 2N ln(R/2N) + k ln(2N) (N complex
 //! values, R sum of squared residuals, k real parameters): the mode with a pole that does not change
 //! or with one that drifts, each with the listed neighbours and, one by one, with the strongest line
-//! in what is left. The segments follow until the mode falls into the noise. In each the mode's pole is
-//! fitted, with everything else held near what the whole decay says.
+//! in what is left.
 
 use std::f64::consts::TAU;
 

@@ -10,7 +10,7 @@
 //! 3. *Whole decay* (`decay`): fits to it find everything else in the band (neighbouring modes, hum,
 //!    unlisted lines). The same fits say whether poles that do not change explain the decay as well as
 //!    one pole that does. Two close modes beat, and a beat is no amplitude dependence.
-//! 4. *Segments* (`decay`): pieces that do not overlap, each fitted by the mode's pole with everything
+//! 4. *Segments* (`segments`): pieces that do not overlap, each fitted by the mode's pole with everything
 //!    else held near the model of the whole decay.
 //! 5. *Trend* ([`Trend`]): points of all segments and taps against log amplitude.
 //!

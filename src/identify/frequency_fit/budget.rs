@@ -6,44 +6,12 @@
 
 use super::Quantity;
 use super::estimate::Finished;
-use super::estimator::ConsistentEstimator;
 use super::model::{PARAMETERS, Parameter, Point};
-use super::problem::{Covariance, Evaluation, Problem, along, value_along, whitened};
-use super::uncertainty::{LEAST_DISCREPANCY, whitening};
+use super::problem::{Covariance, along, value_along, whitened};
+use super::uncertainty::{BudgetInput, LEAST_DISCREPANCY, whitening};
 use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
-
-/// What contributes to the uncertainty of an estimate.
-#[derive(Debug, Clone, PartialEq)]
-pub enum BudgetInput {
-    /// The readings of the frequencies.
-    Readings,
-    /// What the model itself misses.
-    Discrepancy,
-    /// A stated property of the beam.
-    Property(Parameter),
-    /// The mass of the beam by a balance.
-    Weighing,
-    /// Mass or place of something attached, by name.
-    Attachment(String),
-    /// Differences between set-ups.
-    SetUps,
-}
-
-impl BudgetInput {
-    /// Name as in reports.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Readings => "readings",
-            Self::Discrepancy => "discrepancy",
-            Self::Property(parameter) => parameter.name(),
-            Self::Weighing => "weighing",
-            Self::Attachment(name) => name,
-            Self::SetUps => "set-ups",
-        }
-    }
-}
 
 /// Contribution of an input.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,19 +20,6 @@ pub struct BudgetEntry {
     pub input: BudgetInput,
     /// Its part in the standard deviation of each quantity's logarithm (1); the squares of all inputs add up.
     pub stds: Vec<(Quantity, f64)>,
-}
-
-/// An uncertain property of the description after the fit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DescriptionPull {
-    /// The property.
-    pub input: BudgetInput,
-    /// Value that the description states (SI).
-    pub stated: f64,
-    /// Value that the fit gives it (SI).
-    pub fitted: f64,
-    /// Their difference in standard uncertainties of the description.
-    pub pull: f64,
 }
 
 /// A measurement that makes the description more certain.
@@ -269,42 +224,5 @@ impl Finished<'_> {
                 Some((quantity, covariance.std(&gradient)?.hypot(scatter)))
             });
         stds.collect()
-    }
-}
-
-impl ConsistentEstimator {
-    /// Returns where the fit moved what the description states.
-    pub(super) fn description(
-        &self,
-        problem: &Problem<'_>,
-        state: &Evaluation,
-    ) -> Vec<DescriptionPull> {
-        let count = problem.data.len();
-        let mut pulls = Vec::new();
-        let nuisances = self.nuisances.iter();
-        for ((parameter, _), pull) in nuisances.zip(&state.residuals[count..]) {
-            pulls.push(DescriptionPull {
-                input: BudgetInput::Property(*parameter),
-                stated: self.base[parameter.index()].exp(),
-                fitted: state.point[parameter.index()].exp(),
-                pull: *pull,
-            });
-        }
-        let inputs = self.standardised_inputs(&problem.data);
-        let residuals = DVector::from_column_slice(&state.residuals[..count]);
-        for (input, change) in self.inputs.iter().zip(inputs) {
-            let Some(triangle) = &problem.whitening else {
-                continue;
-            };
-            // A residual is predicted less measured: an input that raises the frequencies lowers it.
-            let pull = -(triangle * change).dot(&residuals);
-            pulls.push(DescriptionPull {
-                input: BudgetInput::Attachment(input.name.clone()),
-                stated: input.stated,
-                fitted: input.stated + pull * input.std,
-                pull,
-            });
-        }
-        pulls
     }
 }

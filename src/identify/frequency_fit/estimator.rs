@@ -1,14 +1,13 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
-use super::budget::DescriptionPull;
 use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
 use super::problem::{
     Covariance, Datum, Evaluation, FOLLOWED, FULL, MISFIT, Minimum, Prior, Problem, REPEATED,
     ROUGH, along, everywhere, promising, value_along, within_bounds,
 };
 use super::uncertainty::{
-    LEAST_DISCREPANCY, UncertainInput, attachment_inputs, discrepancy, joint_near, whitening,
-    width_inputs,
+    BudgetInput, DescriptionPull, LEAST_DISCREPANCY, UncertainInput, attachment_inputs,
+    discrepancy, joint_near, whitening, width_inputs,
 };
 use super::{ConsistentSettings, Goodness, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
@@ -235,6 +234,41 @@ impl ConsistentEstimator {
         self.goodness = Some(goodness);
         self.pulls = pulls;
         self
+    }
+
+    /// Returns where the fit moved what the description states.
+    pub(super) fn description(
+        &self,
+        problem: &Problem<'_>,
+        state: &Evaluation,
+    ) -> Vec<DescriptionPull> {
+        let count = problem.data.len();
+        let mut pulls = Vec::new();
+        let nuisances = self.nuisances.iter();
+        for ((parameter, _), pull) in nuisances.zip(&state.residuals[count..]) {
+            pulls.push(DescriptionPull {
+                input: BudgetInput::Property(*parameter),
+                stated: self.base[parameter.index()].exp(),
+                fitted: state.point[parameter.index()].exp(),
+                pull: *pull,
+            });
+        }
+        let inputs = self.standardised_inputs(&problem.data);
+        let residuals = DVector::from_column_slice(&state.residuals[..count]);
+        for (input, change) in self.inputs.iter().zip(inputs) {
+            let Some(triangle) = &problem.whitening else {
+                continue;
+            };
+            // A residual is predicted less measured: an input that raises the frequencies lowers it.
+            let pull = -(triangle * change).dot(&residuals);
+            pulls.push(DescriptionPull {
+                input: BudgetInput::Attachment(input.name.clone()),
+                stated: input.stated,
+                fitted: input.stated + pull * input.std,
+                pull,
+            });
+        }
+        pulls
     }
 
     /// Returns true where frequencies of the beam without its joint are among the data.

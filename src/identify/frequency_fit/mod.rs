@@ -21,7 +21,7 @@ mod outlier;
 mod problem;
 mod uncertainty;
 
-pub use budget::{BudgetEntry, BudgetInput, DescriptionPull, Measure, Remedy};
+pub use budget::{BudgetEntry, Measure, Remedy};
 pub use estimator::{ConsistentEstimator, MovedClamp, Neighbourhood, PointFit};
 pub use model::{
     FrequencyModel, JointedStructure, ModeResponse, PARAMETERS, Parameter, Point, Route,
@@ -29,7 +29,9 @@ pub use model::{
 pub use outlier::OutlyingMode;
 pub use tapjoint_beam::specimen::LapLayout;
 pub use tapjoint_numerics::least_squares::StopReason;
-pub use uncertainty::{AttachmentTolerance, LEAST_DISCREPANCY, MOST_DISCREPANCY};
+pub use uncertainty::{
+    AttachmentTolerance, BudgetInput, DescriptionPull, LEAST_DISCREPANCY, MOST_DISCREPANCY,
+};
 
 use model::log_nondimensional;
 use problem::{LOG_STIFFNESS, along};

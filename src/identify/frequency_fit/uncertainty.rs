@@ -15,7 +15,7 @@
 //! The residuals give its posterior by the likelihood over all parameters (Laplace's approximation about the fit).
 //! The fit takes the one size whose normal distribution has the 95 % interval of the mixture over all sizes.
 
-use super::model::{JointedStructure, Point};
+use super::model::{JointedStructure, Parameter, Point};
 use super::problem::{Evaluation, Problem, dot};
 use super::{Limit, Quantity, limit_of};
 use nalgebra::{DMatrix, DVector};
@@ -27,6 +27,50 @@ use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail};
 pub const LEAST_DISCREPANCY: f64 = 5e-4;
 /// Largest discrepancy that is still called an uncertainty: beyond it the model is another structure's.
 pub const MOST_DISCREPANCY: f64 = 0.5;
+
+/// What contributes to the uncertainty of an estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BudgetInput {
+    /// The readings of the frequencies.
+    Readings,
+    /// What the model itself misses.
+    Discrepancy,
+    /// A stated property of the beam.
+    Property(Parameter),
+    /// The mass of the beam by a balance.
+    Weighing,
+    /// Mass or place of something attached, by name.
+    Attachment(String),
+    /// Differences between set-ups.
+    SetUps,
+}
+
+impl BudgetInput {
+    /// Name as in reports.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Readings => "readings",
+            Self::Discrepancy => "discrepancy",
+            Self::Property(parameter) => parameter.name(),
+            Self::Weighing => "weighing",
+            Self::Attachment(name) => name,
+            Self::SetUps => "set-ups",
+        }
+    }
+}
+
+/// An uncertain property of the description after the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DescriptionPull {
+    /// The property.
+    pub input: BudgetInput,
+    /// Value that the description states (SI).
+    pub stated: f64,
+    /// Value that the fit gives it (SI).
+    pub fitted: f64,
+    /// Their difference in standard uncertainties of the description.
+    pub pull: f64,
+}
 
 /// Standard uncertainties of an attached mass.
 #[derive(Debug, Clone, PartialEq)]

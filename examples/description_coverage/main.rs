@@ -8,14 +8,20 @@
 //! The second table counts the tests in which an outlying mode is named: rightly, among those where it lies beyond 5 standard
 //! deviations of what the others predict, and wrongly, among all.
 //!
+//! The third table (`--world effect`, cantilevers) is of descriptions that lack an effect of the catalogue: by effect and by how far
+//! it moves the frequencies, how often it is named, and how often the headline and the described model's interval hold Kt and Kr.
+//!
 //! `cargo run --release --example description_coverage -- [--tests N] [--seed S] [--world NAME] [--kind NAME]`
 //!
 //! `--tests`: tests of each cell (200; 1000 for a verdict).
 
 use rayon::prelude::*;
+use tapjoint::effects::EffectId;
 use tapjoint::structure::BeamTheory;
 
+mod effects;
 mod worlds;
+use effects::{EffectAnswer, Named, PLANTED, effect_answers};
 use worlds::{Answer, Kind, OutlierAnswer, World, answers, outlier_answers};
 
 const USAGE: &str =
@@ -49,6 +55,14 @@ fn main() -> Result<(), String> {
                     print_cell(of_world, of_kind, theory, tests, seed);
                 }
             }
+        }
+    }
+    if world.as_deref().is_none_or(|name| name == "effect") {
+        println!(
+            "\neffect          moves (%)     tests  named (%)  wrongly (%)  headline holds Kt, Kr (%)  described model (%)"
+        );
+        for planted in PLANTED {
+            print_effect(planted, tests, seed);
         }
     }
     println!("\nworld        kind  tests  beyond 5  found (%)  named wrongly (%)");
@@ -91,6 +105,47 @@ fn print_cell(world: World, kind: Kind, theory: BeamTheory, tests: usize, seed: 
             100.0 * holds as f64 / own.len().max(1) as f64,
             100.0 * low,
             100.0 * high,
+        );
+    }
+}
+
+/// Root mean squares of the changes of the frequencies (%) that part small, middle and large effects.
+const MOVES: [f64; 4] = [0.0, 0.1, 0.5, f64::INFINITY];
+
+fn print_effect(planted: Option<EffectId>, tests: usize, seed: u64) {
+    let chunks = (0..tests.div_ceil(CHUNK)).into_par_iter();
+    let chunks: Vec<Vec<EffectAnswer>> = chunks
+        .map(|chunk| {
+            let count = CHUNK.min(tests - chunk * CHUNK);
+            effect_answers(planted, count, seed * 1_000_003 + chunk as u64)
+        })
+        .collect();
+    for range in MOVES.windows(2) {
+        let all = chunks.iter().flatten();
+        let own: Vec<&EffectAnswer> = all
+            .filter(|answer| (range[0]..range[1]).contains(&answer.moved_percent))
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let share = |count: usize| 100.0 * count as f64 / own.len() as f64;
+        let of = |named: Named| share(own.iter().filter(|answer| answer.named == named).count());
+        let headline =
+            [0, 1].map(|k| share(own.iter().filter(|one| one.headline_holds[k]).count()));
+        let described =
+            [0, 1].map(|k| share(own.iter().filter(|one| one.described_holds[k]).count()));
+        println!(
+            "{:14}  {:4} to {:4}  {:5}  {:9.1}  {:11.1}  {:12.1} {:12.1}  {:9.1} {:9.1}",
+            planted.map_or("none", |planted| planted.name()),
+            range[0],
+            range[1],
+            own.len(),
+            of(Named::Rightly),
+            of(Named::Wrongly),
+            headline[0],
+            headline[1],
+            described[0],
+            described[1],
         );
     }
 }

@@ -238,11 +238,11 @@ fn estimate(
     estimator.settled().estimate().ok()
 }
 
-fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+pub fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     (low.ln() + random.random::<f64>() * (high / low).ln()).exp()
 }
 
-fn normal(random: &mut ChaCha8Rng) -> f64 {
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 

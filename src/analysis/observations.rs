@@ -9,14 +9,18 @@
 use super::Analysis;
 use super::observed_mode::{ModeSeen, SeenTaps, independent, judge_scatter, of_taps, shape_of};
 use super::recording_result::RecordingResult;
-use tapjoint_beam::JointStiffness;
+use super::structure::structure_details;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::Joint;
+use tapjoint_beam::specimen::{Joint, Mesh};
+use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
 use tapjoint_description::{coupling, described_beam, described_specimen};
-use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
+use tapjoint_diagnosis::{
+    DescriptionUncertainty, Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose,
+};
+use tapjoint_identify::consistent::{BeamTolerances, LEAST_DISCREPANCY, MovedClamp};
 use tapjoint_identify::observation::{
-    Configuration, ExtraPeak, Observations, ObservedMode, ObservedSensor, UNPAIRED,
+    Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, UNPAIRED,
 };
 use tapjoint_numerics::stats::median;
 use tapjoint_signal::modal::{ModeReading, PeakLabel};
@@ -205,10 +209,6 @@ fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
     peaks
 }
 
-/// Share of each of length, thickness, modulus and density in the uncertainty of all frequencies, where
-/// its own is not stated (1): all four together 0.2 %, as [`GapSettings::scale_std`].
-const USUAL_SHARE: f64 = 0.001;
-
 /// Start of the search for the joint if the frequencies gave no estimate: Kx and Ky (1) of the
 /// bolted cantilever of Ingole & Chatterjee.
 const USUAL_JOINT: [f64; 2] = [1400.0, 4.8];
@@ -264,7 +264,7 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
         specimen: described_specimen(test, joint(test, found)),
         sensors: sensors.collect(),
         joint_before: None,
-        scale_std: scale_std(test),
+        uncertainty: uncertainty(test),
         reading_bias: reading_bias(test),
     }
 }
@@ -296,23 +296,54 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> Option<Joint>
     Some(Joint { kt, kr, coupling })
 }
 
-/// f is proportional to h/L^2 sqrt(E/rho): the relative uncertainties that the description states, with
-/// these exponents, and a usual one of what it does not state. `None` where it states none of them.
-fn scale_std(test: &TestDescription) -> Option<f64> {
-    let (beam, tolerance) = (&test.beam, &test.beam.tolerance);
-    let shares = [
-        (tolerance.length, beam.length, 2.0),
-        (tolerance.thickness, beam.thickness, 1.0),
-        (tolerance.modulus, beam.modulus, 0.5),
-        (tolerance.density, beam.density, 0.5),
-    ];
-    let shares = shares.map(|(known, value, power)| (known.if_stated(), value, power));
-    let stated = shares.iter().any(|(std, ..)| std.is_some());
-    let squares = shares.iter().map(|(std, value, power)| {
-        let share = std.map_or(USUAL_SHARE, |std| power * std / value);
-        share.powi(2)
+/// How well the structure is described: as the estimate of the joint takes it.
+fn uncertainty(test: &TestDescription) -> DescriptionUncertainty {
+    let tolerance = &test.beam.tolerance;
+    let beam = described_beam(test);
+    let details = structure_details(test, &beam);
+    let halves = described_specimen(test, None);
+    let weighed = details.weighed.map(|weighed| {
+        // That of both halves of a lap joint.
+        let beams = halves.body.beams().iter();
+        let described = beams.map(Beam::mass).sum::<f64>() * weighed.length / beam.length;
+        Observed {
+            value: (weighed.mass / described).ln(),
+            std: weighed.std / weighed.mass,
+            freedom: None,
+        }
     });
-    stated.then(|| squares.sum::<f64>().sqrt())
+    DescriptionUncertainty {
+        beam: details.tolerances,
+        masses: tolerance.masses.std,
+        positions: tolerance.positions.std,
+        weighed,
+        free_scale: details
+            .free
+            .as_ref()
+            .and_then(|free| free_scale(free, &details.tolerances)),
+    }
+}
+
+/// Returns the mean of the free bar's frequencies over the described ones (logarithm); `None` where the bar has none.
+fn free_scale(free: &MovedClamp, tolerances: &BeamTolerances) -> Option<Observed> {
+    let count = free.modes.iter().map(|mode| mode.mode).max()?;
+    let specimen = free.structure.specimen(None);
+    let predicted = specimen.modes(count, Mesh::DIAGNOSIS).ok()?;
+    let (mut weights, mut sum) = (0.0, 0.0);
+    for mode in &free.modes {
+        let predicted = predicted.frequencies()[mode.mode - 1];
+        let reading = mode.std.unwrap_or(0.0) / mode.frequency;
+        let weight = (reading * reading + LEAST_DISCREPANCY * LEAST_DISCREPANCY).recip();
+        weights += weight;
+        sum += weight * (mode.frequency / predicted).ln();
+    }
+    // f is proportional to L^-2, and the length of the bar is known as well as that of the beam.
+    let of_length = 2.0 * tolerances.length.unwrap_or(0.0);
+    Some(Observed {
+        value: sum / weights,
+        std: weights.sqrt().recip().hypot(of_length),
+        freedom: None,
+    })
 }
 
 /// Frequencies read elsewhere may be off by half a line, all in one direction.

@@ -1,7 +1,7 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
 use crate::amplitude::set_joint_motions;
-use crate::dataset::{Dataset, ObservableKind};
+use crate::dataset::{Dataset, MORE_MODES, ObservableKind};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, add_by_multi_start, fit_nominal};
@@ -140,25 +140,20 @@ fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);
     let first = fit_nominal(&dataset)?;
     set_joint_motions(&mut dataset, test.observations, &first);
-    set_shear_slopes(&mut dataset, &first)?;
+    set_section_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
     let none = fit_nominal(&dataset)?;
     Some((dataset, none))
 }
 
-/// Number of modes that a next test may add.
-pub const MORE_MODES: usize = 2;
-
-/// Sets the slopes with respect to shear and rotary inertia at an optimum of the nominal model; none for Euler's beam.
+/// Sets the slopes with respect to what changes along the section, at an optimum of the nominal model.
 ///
 /// `None` where the model has no solution.
-pub fn set_shear_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
-    if dataset.nominal.specimen.shear_rotary > 0.0 {
-        let mut planned = dataset.clone();
-        planned.modes += MORE_MODES;
-        let models = Forward::new(&planned, &[]).solve(nominal.parameters())?;
-        dataset.shear_slopes = models.first()?.shear_slopes(planned.modes)?;
-    }
+pub fn set_section_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
+    let mut planned = dataset.clone();
+    planned.modes += MORE_MODES;
+    let models = Forward::new(&planned, &[]).solve(nominal.parameters())?;
+    dataset.section = models.first()?.section_slopes(planned.modes)?;
     Some(())
 }
 
@@ -268,8 +263,11 @@ fn is_described(nuisance: NuisanceParameter) -> bool {
 }
 
 fn is_geometry(nuisance: NuisanceParameter) -> bool {
-    use NuisanceParameter::{Scale, Shear};
-    matches!(nuisance, Scale | Shear)
+    use NuisanceParameter::{Discrepancy, Poisson, Property, Shear, WidthHold};
+    matches!(
+        nuisance,
+        Property { .. } | Poisson | WidthHold | Shear | Discrepancy { .. }
+    )
 }
 
 /// Spreads of a discrepancy that no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
@@ -297,6 +295,7 @@ fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
                 // Damping may be anything if the cause is not known.
                 ObservableKind::Damping => 50.0 * spread,
                 ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
+                ObservableKind::BeamMass | ObservableKind::FreeScale => 0.0,
             };
             datum.std = datum.std.hypot(extra);
         }

@@ -7,6 +7,7 @@
 //! are estimated from all of them, and each is moved towards the common value as far as its repeats allow.
 //! The remaining uncertainty makes the likelihood a Student t one, never a Gaussian.
 
+use crate::description::{PROPERTIES, SectionSlopes};
 use crate::observations::{
     UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
 };
@@ -17,7 +18,11 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
 use std::collections::{BTreeMap, BTreeSet};
-use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
+use tapjoint_beam::WidthStiffening;
+use tapjoint_identify::consistent::WIDTH_HOLD_STD;
+use tapjoint_identify::observation::{
+    Configuration, DecayVerdict, Observations, Observed, ObservedMode,
+};
 use tapjoint_numerics::stats::{self, root_mean_square};
 
 /// Quantity that is observed and predicted.
@@ -44,6 +49,10 @@ pub enum ObservableKind {
     Damping,
     /// Change of the logarithm of a frequency per e-fold of the amplitude along the decay (1).
     Slope,
+    /// Logarithm of the beam's mass by a balance over the described one.
+    BeamMass,
+    /// Logarithm of the free beam's frequencies over the described ones.
+    FreeScale,
 }
 
 impl Observable {
@@ -257,10 +266,8 @@ pub struct Dataset {
     /// Change of a frequency's logarithm for one standard deviation of the taps' common scatter, by configuration and
     /// mode.
     pub scatter: BTreeMap<(usize, usize), f64>,
-    /// Derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary inertia, by
-    /// mode, at the nominal optimum of the first configuration: what is fastened to the beam changes
-    /// them little. They include the modes that a next test may add.
-    pub shear_slopes: Vec<f64>,
+    /// Slopes with respect to what changes along the section.
+    pub section: SectionSlopes,
     /// Slopes of all observables but frequencies with respect to the joint's stiffnesses, at the
     /// nominal optimum: shapes depend little on the joint.
     pub shape_slopes: Option<DMatrix<f64>>,
@@ -278,6 +285,9 @@ const SLOPE_FLOOR: f64 = 5e-6;
 /// Standard deviation of the logarithm of the joint's amplitude about the one that follows from the sensors' amplitudes
 /// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
 const AMPLITUDE_STD: f64 = 0.25;
+
+/// Number of modes that a next test may add.
+pub const MORE_MODES: usize = 2;
 
 /// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
 const COUPLING_STD: f64 = 0.5;
@@ -309,7 +319,7 @@ impl Dataset {
             fitted_modes: highest.saturating_sub(held_out),
             holdout: Vec::new(),
             scatter: BTreeMap::new(),
-            shear_slopes: Vec::new(),
+            section: SectionSlopes::default(),
             shape_slopes: None,
             tilts: BTreeMap::new(),
             peaks: UnpairedPeaks::new(observations),
@@ -318,6 +328,7 @@ impl Dataset {
         dataset.add_shapes(observations);
         dataset.add_damping(observations);
         dataset.add_slopes(observations);
+        dataset.add_checks();
         dataset.add_nuisances(&inventory);
         dataset
     }
@@ -465,27 +476,72 @@ impl Dataset {
         }
     }
 
-    /// Adds a nuisance parameter.
+    /// Adds what a balance and a free test say of the beam.
+    fn add_checks(&mut self) {
+        let known = &self.nominal.uncertainty;
+        let checks = [
+            (ObservableKind::BeamMass, known.weighed),
+            (ObservableKind::FreeScale, known.free_scale),
+        ];
+        for (kind, check) in checks {
+            if let Some(Observed {
+                value,
+                std,
+                freedom,
+            }) = check
+            {
+                let observable = Observable {
+                    kind,
+                    ..Observable::frequency(0, 1)
+                };
+                self.push(observable, Datum::new(value, std, freedom));
+            }
+        }
+    }
+
+    /// Adds a nuisance parameter, unless it is known exactly.
     pub fn add_nuisance(&mut self, parameter: NuisanceParameter, centre: f64, std: f64) {
-        self.nuisances.push(Nuisance {
-            parameter,
-            centre,
-            std,
-        });
+        if std > 0.0 {
+            self.nuisances.push(Nuisance {
+                parameter,
+                centre,
+                std,
+            });
+        }
+    }
+
+    /// Adds the uncertain properties of the beam, and what the model misses of each mode.
+    fn add_description(&mut self) {
+        use NuisanceParameter::{Discrepancy, Poisson, Property, Shear, WidthHold};
+        let tolerances = self.nominal.uncertainty.beam;
+        for property in PROPERTIES {
+            let std = tolerances.of(property).unwrap_or(0.0);
+            self.add_nuisance(Property { property }, 0.0, std);
+        }
+        let specimen = &self.nominal.specimen;
+        let is_stiffened = specimen.width_stiffening != WidthStiffening::Ignored;
+        if specimen.shear_rotary > 0.0 {
+            self.add_nuisance(Shear, 0.0, self.settings.shear_std);
+        }
+        if let Some(poisson) = tolerances.poisson.filter(|_| is_stiffened) {
+            self.add_nuisance(Poisson, 0.0, poisson);
+            if self.nominal.has_joint() {
+                self.add_nuisance(WidthHold, 0.0, WIDTH_HOLD_STD);
+            }
+        }
+        for mode in 1..=self.modes + MORE_MODES {
+            self.add_nuisance(Discrepancy { mode }, 0.0, self.settings.discrepancy);
+        }
     }
 
     fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
-            AddedInertia, Amplitude, Damping, DampingTilt, Drift, Gain, Scale, Scatter,
-            SensorInertia, SensorMass, SensorPosition, Shear, TapPosition, Temperature,
+            AddedInertia, Amplitude, Damping, DampingTilt, Drift, Gain, Scatter, SensorInertia,
+            SensorMass, SensorPosition, TapPosition, Temperature,
         };
         let setups = self.setups();
-        let position_std = self.settings.position_std;
-        let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
-        self.add_nuisance(Scale, 0.0, scale);
-        if self.nominal.specimen.shear_rotary > 0.0 {
-            self.add_nuisance(Shear, 0.0, self.settings.shear_std);
-        }
+        let position_std = self.nominal.uncertainty.positions;
+        self.add_description();
         // The joint's stiffness and the temperature differ between set-ups.
         for &setup in setups.iter().filter(|_| setups.len() > 1) {
             for direction in self.nominal.fitted_springs() {
@@ -501,7 +557,7 @@ impl Dataset {
         }
         for (name, text) in inventory.names.iter().enumerate() {
             if self.nominal.mass_of(text) > 0.0 {
-                self.add_nuisance(SensorMass { name }, 0.0, self.settings.sensor_mass_std);
+                self.add_nuisance(SensorMass { name }, 0.0, self.nominal.uncertainty.masses);
             }
             self.add_nuisance(SensorInertia { name }, 0.0, 1.0);
         }
@@ -540,21 +596,20 @@ impl Dataset {
 
     /// Adds the mass and the position of a known added mass.
     pub fn add_fastened(&mut self, fastened: usize) {
-        let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
-        self.add_nuisance(NuisanceParameter::FastenedMass { fastened }, 0.0, mass);
+        let known = self.nominal.uncertainty;
+        self.add_nuisance(
+            NuisanceParameter::FastenedMass { fastened },
+            0.0,
+            known.masses,
+        );
         let parameter = NuisanceParameter::FastenedPosition { fastened };
-        self.add_nuisance(parameter, 0.0, position);
+        self.add_nuisance(parameter, 0.0, known.positions);
     }
 
     /// Numbers of the set-ups, ascending.
     pub fn setups(&self) -> Vec<usize> {
         let setups = self.arrangements.iter().map(|one| one.setup);
         setups.collect::<BTreeSet<_>>().into_iter().collect()
-    }
-
-    /// Returns the derivative of a frequency with respect to shear and rotary inertia; 0 before it is known.
-    pub fn shear_slope(&self, mode: usize) -> f64 {
-        self.shear_slopes.get(mode - 1).copied().unwrap_or(0.0)
     }
 
     /// Returns the logarithm of a mode's frequency over the geometric mean of all that have a damping ratio; 0 for others.

@@ -1,6 +1,7 @@
 //! Predictions of all observables under a hypothesis, with their slopes.
 
 use crate::dataset::{Dataset, Observable, ObservableKind};
+use crate::description::{SectionSlopes, free_slope, mass_slope};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
@@ -255,6 +256,12 @@ impl<'a> Forward<'a> {
                 ObservableKind::Ratio { sensor, reference } => {
                     Some(place.at_sensor(sensor) / place.at_sensor(reference))
                 }
+                // The bare beam knows of no effect but that of its material.
+                ObservableKind::BeamMass => Some(0.0),
+                ObservableKind::FreeScale => {
+                    let modulus = self.size_of(EffectId::Modulus, parameters);
+                    Some(0.5 * modulus.ln_1p())
+                }
                 ObservableKind::Slope | ObservableKind::Damping => {
                     let law = self.law(parameters);
                     Some(law.map_or(0.0, |law| {
@@ -313,6 +320,15 @@ impl<'a> Forward<'a> {
             let damping = self.damping(observable.mode, models, parameters);
             return damping.map_or(1.0, |damping| damping.nominal / damping.total) * tilt;
         }
+        match (observable.kind, nuisance) {
+            (ObservableKind::BeamMass, NuisanceParameter::Property { property }) => {
+                return mass_slope(property);
+            }
+            (ObservableKind::FreeScale, NuisanceParameter::Property { property }) => {
+                return free_slope(property);
+            }
+            _ => {}
+        }
         let Some(place) = ModeInPlace::new(self, observable, models) else {
             return 0.0;
         };
@@ -325,7 +341,10 @@ impl<'a> Forward<'a> {
                 let towards = place.relative_slope(sensor, nuisance);
                 predicted * (towards - place.relative_slope(reference, nuisance))
             }
-            ObservableKind::Slope | ObservableKind::Damping => 0.0,
+            ObservableKind::Slope
+            | ObservableKind::Damping
+            | ObservableKind::BeamMass
+            | ObservableKind::FreeScale => 0.0,
         }
     }
 
@@ -475,8 +494,13 @@ impl<'a> ModeInPlace<'a> {
         let (forward, arrangement) = (self.forward, self.arrangement);
         let (dataset, mode) = (forward.dataset, self.observable.mode);
         match nuisance {
-            NuisanceParameter::Scale => 1.0,
-            NuisanceParameter::Shear => dataset.shear_slope(mode),
+            NuisanceParameter::Property { property } => {
+                let shear = SectionSlopes::of(&dataset.section.shear, mode);
+                self.model.property_slope(self.index, property, shear)
+            }
+            NuisanceParameter::Shear => SectionSlopes::of(&dataset.section.shear, mode),
+            NuisanceParameter::Poisson => SectionSlopes::of(&dataset.section.poisson, mode),
+            NuisanceParameter::WidthHold => SectionSlopes::of(&dataset.section.hold, mode),
             NuisanceParameter::Temperature { setup } if setup == arrangement.setup => 1.0,
             NuisanceParameter::Discrepancy { mode: own } if own == mode => 1.0,
             NuisanceParameter::Scatter { configuration }

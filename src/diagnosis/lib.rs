@@ -4,6 +4,7 @@
 //! ```text
 //! Observations, Nominal -> observations   common modes, unpaired peaks, checks
 //!                          dataset        data with their uncertainties, nuisance parameters
+//!                          description    how well the beam is known, and what that does to frequencies
 //!                          structure      the described structure and its modal models
 //!                          parameters     effects, priors, order of the parameters
 //!                          forward        predictions of a hypothesis and their slopes
@@ -21,14 +22,15 @@
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
 //! Under each, the joint's stiffnesses and all nuisance parameters are fitted and integrated over. Nuisance
-//! parameters are the geometry's common scale, and drift of the joint and temperature between set-ups. So are masses,
-//! inertias and positions of sensors, and calibration. The uncertainty of the data comes from the measurement, never
+//! parameters are the beam's properties, what the model misses of each mode, and drift of the joint and temperature
+//! between set-ups. So are masses, inertias and positions of sensors, and calibration. The uncertainty of the data comes from the measurement, never
 //! from a residual. This crate cannot reach the simulator, so that its answers to virtual tests are independent of
 //! it.
 
 mod amplitude;
 mod compare;
 mod dataset;
+mod description;
 mod effect_pairs;
 mod evidence;
 mod fit;
@@ -49,10 +51,12 @@ mod tests;
 mod validate;
 mod verdict;
 
+pub use description::DescriptionUncertainty;
 pub use result::{
     AmplitudeDependence, Block, Closure, CrossValidation, DecidedBy, Diagnosis, FrequencyChange,
     Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
-    Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
+    Misfit, NextTest, ParameterValue, PropertyChange, Proposal, Residual, UnlocatedSensors,
+    Verdict,
 };
 pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
 pub use structure::{Nominal, NominalSensor};

@@ -11,12 +11,17 @@
 use crate::result::LARGEST_STIFFNESS_CHANGE;
 use crate::structure::{Arrangement, COUPLING, Nominal, ROTATION};
 use tapjoint_beam::effects::{Effect, EffectId};
+use tapjoint_identify::consistent::Parameter;
 
 /// Nuisance parameter: small, unknown, and shared by all hypotheses. Its influence is linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NuisanceParameter {
-    /// Common factor on all frequencies (logarithm).
-    Scale,
+    /// Property of the beam over its described value (logarithm).
+    Property { property: Parameter },
+    /// Poisson's ratio less the described one (1).
+    Poisson,
+    /// How the joint holds the width: 0 for springs spread over it, 1 for a clamp that keeps the slope across it.
+    WidthHold,
     /// Shear flexibility and rotary inertia of a Timoshenko beam over the nominal ones (1).
     Shear,
     /// Stiffness of the joint in one set-up (logarithm): direction 0 translation, 1 rotation.
@@ -48,7 +53,7 @@ pub enum NuisanceParameter {
     Amplitude,
     /// Common scatter of the taps of one configuration (standard deviations).
     Scatter { configuration: usize },
-    /// Discrepancy that no effect explains in one mode, common to all configurations (logarithm).
+    /// What the model misses of one mode's frequency, in all configurations alike (logarithm).
     Discrepancy { mode: usize },
 }
 

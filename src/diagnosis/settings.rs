@@ -1,6 +1,7 @@
 //! Settings of the diagnosis, its errors, and the thresholds of all its decisions.
 
 use tapjoint_identify::FREQUENCY_FLOOR;
+use tapjoint_identify::consistent::LEAST_DISCREPANCY;
 
 /// Reasons why a diagnosis has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -91,10 +92,8 @@ pub struct GapSettings {
     /// Standard deviations that the joint's stiffnesses may have between set-ups (1), equally
     /// probable: 0.2 %, untouched; 1 %, usual; 2 %, a joint that was re-tightened.
     pub drift_stds: Vec<f64>,
-    /// Standard uncertainty of a common factor on all frequencies where no tolerance is stated (1):
-    /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. A larger error counts as a gap
-    /// that has a name (`modulus`, `length`, `timebase`); state a tolerance if the geometry is known less well.
-    pub scale_std: f64,
+    /// What the model misses of each frequency at least (1, relative), whatever else explains it: [`LEAST_DISCREPANCY`].
+    pub discrepancy: f64,
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
     /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.
     pub shear_std: f64,
@@ -103,15 +102,8 @@ pub struct GapSettings {
     pub temperature_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,
-    /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
-    pub sensor_mass_std: f64,
     /// Radius of gyration of a sensor about the beam's axis (m): 8 mm, of one some 12 mm high on a beam 5 mm thick.
     pub sensor_radius: f64,
-    /// Relative standard uncertainty of a known added mass: 1 %, a kitchen scale's 0.1 g
-    /// of 10 g, and the wax under it.
-    pub fastened_mass_std: f64,
-    /// Standard uncertainty of the places of sensors, fastened masses and taps (m): 1 mm.
-    pub position_std: f64,
     /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every set-up: 3 %,
     /// since a sensor that is mounted again is not aligned as before.
     pub gain_std: f64,
@@ -140,7 +132,7 @@ impl GapSettings {
     /// Refuses settings out of their range.
     pub(crate) fn check(&self) -> Result<(), GapError> {
         let stds = [
-            self.scale_std,
+            self.discrepancy,
             self.shear_std,
             self.temperature_std,
             self.damping_tilt,
@@ -150,7 +142,7 @@ impl GapSettings {
         } else if self.withheld_modes >= self.withhold_from {
             "withheld_modes must be less than withhold_from"
         } else if !are_positive(&stds) {
-            "scale_std, shear_std, temperature_std and damping_tilt must be finite and above 0"
+            "discrepancy, shear_std, temperature_std and damping_tilt must be finite and above 0"
         } else if !(0.0..f64::INFINITY).contains(&self.frequency_floor) {
             "frequency_floor must be finite and not below 0"
         } else if !(0.0..f64::INFINITY).contains(&self.sensor_radius) {
@@ -174,14 +166,11 @@ impl Default for GapSettings {
     fn default() -> Self {
         GapSettings {
             drift_stds: vec![0.002, 0.01, 0.02],
-            scale_std: 0.002,
+            discrepancy: LEAST_DISCREPANCY,
             shear_std: 0.02,
             temperature_std: 2e-4,
             frequency_floor: FREQUENCY_FLOOR,
-            sensor_mass_std: 0.1,
             sensor_radius: 0.008,
-            fastened_mass_std: 0.01,
-            position_std: 0.001,
             gain_std: 0.03,
             damping_scatter: 0.4,
             damping_tilt: 0.5,

@@ -2,6 +2,7 @@
 //!
 //! This chapter and [`forward`](crate::forward) alone know that the structure is a beam on a joint.
 
+use crate::description::DescriptionUncertainty;
 use crate::joint_motion::{
     JointMotion, ModeAmplitude, StiffnessChanges, initial_amplitude, log_stiffness,
 };
@@ -37,9 +38,8 @@ pub struct Nominal {
     /// The joint's stiffnesses (N/m, N m/rad) as estimated from the same frequencies without any effect,
     /// to state how far an effect moves them; `None` to take those of the nominal model's own fit.
     pub joint_before: Option<[f64; 2]>,
-    /// Standard uncertainty of the one factor that beam length, thickness, modulus and density put on
-    /// all frequencies (1); `None` where the description states no tolerance.
-    pub scale_std: Option<f64>,
+    /// How well all this is known.
+    pub uncertainty: DescriptionUncertainty,
     /// Largest bias of frequencies that are read on lines (Hz); `None` for fitted ones, which
     /// have none.
     pub reading_bias: Option<f64>,
@@ -466,22 +466,6 @@ impl ModalModel {
             return 0.0;
         };
         self.rotation_sensitivity(index) * (log_stiffness(own) - log_stiffness(changes.mean))
-    }
-
-    /// Returns derivatives (1) of the frequencies' logarithms with respect to the relative size of shear and rotary
-    /// inertia. They follow from Rayleigh's quotient of a beam that has a little less of both.
-    pub fn shear_slopes(&self, modes: usize) -> Option<Vec<f64>> {
-        const STEP: f64 = 1e-3;
-        let mut less = self.seen.specimen.clone();
-        less.shear_rotary -= STEP * less.shear_rotary;
-        let moved = self.modes().rayleigh_frequencies(&less).ok()?;
-        let numbers = (1..=modes).map_while(|mode| self.index(mode));
-        let own = self.modes().frequencies();
-        Some(
-            numbers
-                .map(|index| (own[index] / moved[index]).ln() / STEP)
-                .collect(),
-        )
     }
 
     /// Returns the motion of the joint from the amplitudes that were observed at the sensors; `None`

@@ -10,7 +10,7 @@ use crate::optimum::{LinearModel, Optimum, maximise};
 use crate::parameters::{LocationKind, NuisanceParameter, Prior};
 use crate::result::{
     CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LocationMap,
-    ParameterValue, UnlocatedSensors, Verdict,
+    ParameterValue, PropertyChange, UnlocatedSensors, Verdict,
 };
 use crate::settings::{
     CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, LEAST_MAP_DATA, MISFIT, SEPARATE,
@@ -132,7 +132,6 @@ impl<'a> Reference<'a> {
         let before = self.before.as_ref();
         let layout = dataset.layout(&candidate.fit.effects);
         let parameters = candidate.fit.parameters();
-        let scale = dataset.nuisance_index(NuisanceParameter::Scale);
         let mut joint_parameters = dataset.nominal.joint_parameters().into_iter();
         let coupling = joint_parameters.position(|(direction, _)| direction == COUPLING);
         let mut result = HypothesisResult {
@@ -155,7 +154,7 @@ impl<'a> Reference<'a> {
             misfit: residuals.as_ref().map(Residuals::misfit),
             effects: layout.effects_at(parameters).unwrap_or_default(),
             coupling: coupling.map_or(0.0, |k| parameters[k]),
-            scale: scale.map_or(0.0, |k| parameters[layout.first_nuisance() + k]),
+            beam: property_changes(dataset, &parameters[layout.first_nuisance()..]),
             ..HypothesisResult::default()
         };
         if !candidate.is_unknown() {
@@ -247,6 +246,16 @@ impl<'a> Reference<'a> {
             .fold(f64::INFINITY, f64::min);
         (nearest > 0.0 && nearest.is_finite()).then(|| size.abs() * (SEPARATE / nearest).sqrt())
     }
+}
+
+/// Returns where the values of the nuisance parameters move the beam's properties.
+fn property_changes(dataset: &Dataset, values: &[f64]) -> Vec<PropertyChange> {
+    let nuisances = dataset.nuisances.iter().zip(values);
+    let changes = nuisances.filter_map(|(nuisance, &change)| match nuisance.parameter {
+        NuisanceParameter::Property { property } => Some(PropertyChange { property, change }),
+        _ => None,
+    });
+    changes.collect()
 }
 
 /// Returns a parameter with its value and standard uncertainty.

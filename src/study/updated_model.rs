@@ -1,6 +1,6 @@
 //! The described model brought up to date by a diagnosis: as a description for predictions, and its natural
-//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open have no place in a description and
-//! are left out.
+//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open, and what the model may miss of
+//! each mode, have no place in a description and are left out.
 
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;
@@ -8,6 +8,7 @@ use tapjoint_beam::effects::{Circumstances, Effect, EffectError, EffectId, Seen,
 use tapjoint_beam::specimen::{Mesh, PointMass};
 use tapjoint_description::{Assembly, BeamTheory, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
+use tapjoint_identify::consistent::Parameter;
 use tapjoint_identify::observation::effective_share;
 use toml::Value;
 
@@ -119,35 +120,35 @@ fn line(key: &str, value: f64) -> String {
 fn described(test: &TestDescription, found: &HypothesisResult) -> String {
     let beam = &test.beam;
     let mut text = format!("name = {}\n\n[beam]\n", quoted(&test.name));
-    text.push_str(&line("length", beam.length));
-    text.push_str(&line("width", beam.width));
-    text.push_str(&line("thickness", beam.thickness));
-    text.push_str(&line("modulus", beam.modulus));
-    // The common factor s on all frequencies that the geometry's tolerance left open: f ~ rho^-1/2.
-    if found.scale != 0.0 {
-        text.push_str(&format!(
-            "# Described: {}. What the dimensions' tolerance leaves open moves all frequencies by a common\n\
-             # factor, here {:+.2e} % as the readings ask for; a description says that by its density.\n",
-            beam.density,
-            100.0 * found.scale.exp_m1()
-        ));
+    let properties = [
+        ("length", beam.length, Parameter::Length),
+        ("width", beam.width, Parameter::Width),
+        ("thickness", beam.thickness, Parameter::Thickness),
+        ("modulus", beam.modulus, Parameter::Modulus),
+        ("density", beam.density, Parameter::Density),
+    ];
+    // Within its tolerance the fit moves each property to where the readings ask for it.
+    for (key, described, property) in properties {
+        let factor = factor_of(found, property);
+        if factor != 1.0 {
+            text.push_str(&format!("# Described: {described}.\n"));
+        }
+        text.push_str(&line(key, factor * described));
     }
-    text.push_str(&line("density", beam.density * (-2.0 * found.scale).exp()));
     text.extend(beam.poisson.map(|poisson| line("poisson", poisson)));
     if let Some(right) = &test.joint.right {
         text.push_str("\n[beam.right]\n");
-        let density = right.density.map(|own| own * (-2.0 * found.scale).exp());
         let own = [
-            ("width", right.width),
-            ("thickness", right.thickness),
-            ("modulus", right.modulus),
-            ("density", density),
-            ("poisson", right.poisson),
+            ("width", right.width, Some(Parameter::Width)),
+            ("thickness", right.thickness, Some(Parameter::Thickness)),
+            ("modulus", right.modulus, Some(Parameter::Modulus)),
+            ("density", right.density, Some(Parameter::Density)),
+            ("poisson", right.poisson, None),
         ];
-        text.extend(
-            own.iter()
-                .filter_map(|(key, value)| Some(line(key, (*value)?))),
-        );
+        for (key, described, property) in own {
+            let factor = property.map_or(1.0, |property| factor_of(found, property));
+            text.extend(described.map(|described| line(key, factor * described)));
+        }
     }
     text.push_str(&joint(test, found));
     text.push_str(&sensors(test));
@@ -156,6 +157,13 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
     text
+}
+
+/// Returns the fitted value of a property over the described one.
+fn factor_of(found: &HypothesisResult, property: Parameter) -> f64 {
+    let mut all = found.beam.iter();
+    let own = all.find(|one| one.property == property);
+    own.map_or(1.0, |own| own.change.exp())
 }
 
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {

@@ -1,9 +1,11 @@
 //! What several modules begin with: a beam, its tests, and the real recordings where they are at hand.
 
 use std::path::PathBuf;
-use tapjoint::gap::{Nominal, NominalSensor, PlannedConfiguration, TestPlan};
+use tapjoint::gap::{
+    DescriptionUncertainty, Nominal, NominalSensor, PlannedConfiguration, TestPlan,
+};
 use tapjoint::identify::consistent::{
-    ConsistentEstimate, ConsistentEstimator, ConsistentSettings, JointedStructure,
+    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, JointedStructure,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
 use tapjoint::structure::Beam;
@@ -83,11 +85,27 @@ pub fn strip_on_springs(off: f64, mass: Option<f64>) -> Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
         sensors: vec![sensor],
         joint_before: None,
-        scale_std: None,
+        uncertainty: well_known(),
         reading_bias: None,
     }
 }
 
+/// How well a carefully measured bar is known: its properties together to 0.2 % of the frequencies.
+pub fn well_known() -> DescriptionUncertainty {
+    DescriptionUncertainty {
+        beam: BeamTolerances {
+            length: Some(5e-4),
+            width: Some(1e-3),
+            thickness: Some(1e-3),
+            modulus: Some(2e-3),
+            density: Some(1e-3),
+            poisson: Some(0.02),
+        },
+        masses: 0.02,
+        positions: 1e-3,
+        ..DescriptionUncertainty::default()
+    }
+}
 /// A planned recording of sensor A, places as shares of the length.
 pub fn planned(sensor: f64, tap: f64, level: f64) -> PlannedConfiguration {
     let length = steel_strip().length;

@@ -2,6 +2,7 @@
 
 use super::proposals::{PlannedTests, TestedStructure};
 use crate::dataset::{Dataset, Observable};
+use crate::description::{PROPERTIES, mass_slope};
 use crate::forward::Forward;
 use crate::optimum::{Model, Optimum, log_determinant};
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
@@ -9,6 +10,7 @@ use crate::result::Proposal;
 use crate::verdict::Candidate;
 use nalgebra::{DMatrix, DVector};
 use tapjoint_beam::effects::EffectId;
+use tapjoint_identify::consistent::Parameter;
 
 /// Data that one hypothesis predicts for a test: a normal distribution.
 #[derive(Debug, Clone)]
@@ -267,14 +269,24 @@ impl Posterior {
             ),
             Proposal::Calipers => {
                 let per_mass = 1.0 / nominal.beam_mass();
-                let mass = EffectId::AddedMass;
+                let mass = self.described(
+                    dataset,
+                    &PROPERTIES.map(|property| (property, mass_slope(property))),
+                );
+                let thickness = self.described(dataset, &[(Parameter::Thickness, 1.0)]);
+                let length = self.described(dataset, &[(Parameter::Length, 1.0)]);
+                let beam = &nominal.specimen.body.beams()[0];
                 (
                     vec![
-                        self.scale_by_calipers(dataset),
-                        self.size_or_usual(dataset, EffectId::Length, 1.0, USUAL_LENGTH_ERROR),
-                        self.size_or_usual(dataset, mass, per_mass, USUAL_MASS_ERROR),
+                        mass.and(self.size(dataset, EffectId::AddedMass), per_mass, self),
+                        thickness,
+                        length.and(self.size(dataset, EffectId::Length), 1.0, self),
                     ],
-                    vec![SCALE_STD, TAPE_STD / nominal.length(), BEAM_MASS_STD],
+                    vec![
+                        BEAM_MASS_STD,
+                        CALIPER_STD / beam.thickness,
+                        TAPE_STD / nominal.length(),
+                    ],
                 )
             }
             Proposal::ReferenceTone => (
@@ -319,30 +331,20 @@ impl Posterior {
         }
     }
 
-    /// Predicts the factor on all frequencies that calipers and scale show: thickness and density, not the modulus. Half
-    /// of a common factor is expected to be theirs, and no less uncertain than that.
-    fn scale_by_calipers(&self, dataset: &Dataset) -> DirectQuantity {
-        let mut value = 0.0;
-        let mut slopes = Vec::new();
-        if let Some(k) = dataset.nuisance_index(NuisanceParameter::Scale) {
-            let column = dataset.layout(&self.effects).first_nuisance() + k;
-            value += 0.5 * self.parameters[column];
-            slopes.push((column, 0.5));
+    /// Predicts a sum of what differs from the description of the beam, each property with its factor.
+    fn described(&self, dataset: &Dataset, sum: &[(Parameter, f64)]) -> DirectQuantity {
+        let first = dataset.layout(&self.effects).first_nuisance();
+        let mut expected = DirectQuantity::default();
+        for &(property, factor) in sum {
+            let index = dataset.nuisance_index(NuisanceParameter::Property { property });
+            expected = expected.and(index.map(|index| first + index), factor, self);
         }
-        if let Some(column) = self.size(dataset, EffectId::Modulus) {
-            // f grows as the square root of E/rho.
-            value += 0.25 * self.parameters[column];
-            slopes.push((column, 0.25));
-        }
-        DirectQuantity {
-            value,
-            slopes,
-            std: value.abs(),
-        }
+        expected
     }
 }
 
 /// Prediction of one quantity that is measured directly.
+#[derive(Default)]
 struct DirectQuantity {
     value: f64,
     /// Slopes with respect to the parameters of the hypothesis.
@@ -351,18 +353,25 @@ struct DirectQuantity {
     std: f64,
 }
 
+impl DirectQuantity {
+    /// Returns it with one more parameter of the hypothesis, times a factor; the same where it has no such parameter.
+    fn and(mut self, column: Option<usize>, factor: f64, of: &Posterior) -> Self {
+        if let Some(column) = column {
+            self.value += factor * of.parameters[column];
+            self.slopes.push((column, factor));
+        }
+        self
+    }
+}
+
 /// Standard uncertainty of a sensor's mass on a kitchen scale with its share of the cable (kg).
 const SENSOR_MASS_STD: f64 = 5e-4;
 /// Standard uncertainty of the beam's free length by a tape (m).
 const TAPE_STD: f64 = 2e-4;
-/// Usual relative error of the length (1).
-const USUAL_LENGTH_ERROR: f64 = 1e-3;
-/// Standard uncertainty of the factor that thickness and mass put on frequencies, by calipers and scale (1).
-const SCALE_STD: f64 = 1.5e-3;
+/// Standard uncertainty of the beam's thickness by a caliper (m).
+const CALIPER_STD: f64 = 1e-5;
 /// Relative standard uncertainty of the beam's mass on a scale (1).
 const BEAM_MASS_STD: f64 = 1e-3;
-/// Usual difference of stock to its nominal mass (1).
-const USUAL_MASS_ERROR: f64 = 3e-3;
 /// Relative standard uncertainty of a clock that is compared with a reference (1).
 const CLOCK_STD: f64 = 2e-5;
 /// Usual relative error of clocks (1).

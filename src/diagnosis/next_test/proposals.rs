@@ -1,7 +1,6 @@
 //! Tests that are compared, as configurations that the model can predict, and their description in words.
 
-use crate::compare::MORE_MODES;
-use crate::dataset::{Dataset, Observable};
+use crate::dataset::{Dataset, MORE_MODES, Observable};
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
 use crate::settings::MOVED_SENSOR;
@@ -218,7 +217,7 @@ impl PlannedTests {
             let index = used.map_or(0, |most| most + 1);
             let parameter = NuisanceParameter::SensorPosition { position: index };
             self.whole
-                .add_nuisance(parameter, 0.0, dataset.settings.position_std);
+                .add_nuisance(parameter, 0.0, dataset.nominal.uncertainty.positions);
             let mut moved = dataset.arrangements[0].clone();
             moved.move_sensor(position, index);
             let planned = self.new_setup(dataset, moved, 0.0);

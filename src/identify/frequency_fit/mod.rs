@@ -31,6 +31,7 @@ pub use tapjoint_beam::specimen::LapLayout;
 pub use tapjoint_numerics::least_squares::StopReason;
 pub use uncertainty::{
     AttachmentTolerance, BudgetInput, DescriptionPull, LEAST_DISCREPANCY, MOST_DISCREPANCY,
+    WIDTH_HOLD_STD,
 };
 
 use model::log_nondimensional;
@@ -70,7 +71,8 @@ pub struct BeamTolerances {
 }
 
 impl BeamTolerances {
-    pub(super) fn of(&self, parameter: Parameter) -> Option<f64> {
+    /// Returns the standard uncertainty of a property; `None` for an exact one, and for what is no property.
+    pub fn of(&self, parameter: Parameter) -> Option<f64> {
         match parameter {
             Parameter::Length => self.length,
             Parameter::Width => self.width,

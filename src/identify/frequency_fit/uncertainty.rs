@@ -28,6 +28,10 @@ pub const LEAST_DISCREPANCY: f64 = 5e-4;
 /// Largest discrepancy that is still called an uncertainty: beyond it the model is another structure's.
 pub const MOST_DISCREPANCY: f64 = 0.5;
 
+/// Standard uncertainty of how a joint holds the width, between 0 for springs spread over it and 1 for a clamp that keeps the
+/// slope across it.
+pub const WIDTH_HOLD_STD: f64 = 0.5;
+
 /// What contributes to the uncertainty of an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BudgetInput {
@@ -207,10 +211,10 @@ pub(super) fn width_inputs(
             is_mass: false,
             name: "hold of the width".to_owned(),
             stated: 0.0,
-            std: 0.5,
+            std: WIDTH_HOLD_STD,
             changes: modes
                 .iter()
-                .map(|mode| 0.5 * differences[mode - 1])
+                .map(|mode| WIDTH_HOLD_STD * differences[mode - 1])
                 .collect(),
         });
     }

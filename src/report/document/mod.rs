@@ -14,9 +14,9 @@ pub use measured::{
 };
 pub use model::{
     Baseline, BaselineSection, BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection,
-    FromReadings, GapPlaceSection, GapSection, HeadlineSection, IdentifiabilitySection,
-    LengthSection, MisfitSection, PairsSection, PredictionSection, UpdatedModelSection,
-    gap_section,
+    FromReadings, GapPlaceSection, GapSection, HeadlineSection, HeadlineValue,
+    IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
+    UpdatedModelSection, gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{

@@ -74,10 +74,10 @@ fn note(document: &Document, gap: &GapSection) -> String {
         .map_or_else(String::new, |last| format!(" (modes up to {last})"));
     let mut note = format!(
         "Fitted, withheld: rms errors that are left at the frequencies that were fitted, and at those withheld from the \
-         fit. The described model leaves {described} %{withheld}. {one_joint}Its geometry, shear and masses are exactly as \
-         described. Every hypothesis, also none, lets {drift}geometry, masses and the inertia of sensors move within their \
-         uncertainty. So it usually leaves less. The fit weighs each reading by its uncertainty, so a plain rms may also be \
-         larger. The errors are those of the diagnosis{part}. The estimate uses all modes and can leave other errors. Size \
+         fit. The described model leaves {described} %{withheld}. {one_joint}Its beam and masses are exactly as \
+         described. Every hypothesis, also none, lets {drift}the beam's properties, masses and the inertia of sensors move within \
+         their uncertainty. So it usually leaves less. The fit weighs each reading by its uncertainty and lets the model miss \
+         each mode by 0.05 %, so a plain rms may also be larger. The errors are those of the diagnosis{part}. The estimate uses all modes and can leave other errors. Size \
          \u{b1} one standard deviation."
     );
     if let Some(scale) = gap.baselines.iter().find(|one| one.name == Baseline::Scale) {

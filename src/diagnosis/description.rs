@@ -1,0 +1,168 @@
+//! How well the structure is described, and what an error of the description does to the frequencies.
+//!
+//! Each uncertain property is a nuisance parameter with its standard uncertainty as the prior, as in the estimate of the
+//! joint. The joint's stiffnesses stay in SI while the beam under them changes. With the shares t and r of the joint's
+//! springs in the strain energy of a mode, and the shape phi of unit modal mass, Rayleigh's quotient gives
+//!
+//! ```text
+//! d ln f/d ln E = (1 - t - r)/2                      d ln f/d ln rho = -(1 - sum m phi^2)/2
+//! d ln f/d ln L = -2 + 3 t/2 + r/2 + sum (m phi^2/2 + m x phi phi')
+//! ```
+//!
+//! since f L^2 (rho A/E I)^1/2 depends on K_t L^3/E I, K_r L/E I, m/(rho A L), and x/L alone. Thickness and width follow
+//! from E I and rho A. Rotary inertias and other springs enter in the same way.
+
+use crate::structure::ModalModel;
+use tapjoint_beam::WidthStiffening;
+use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen};
+use tapjoint_identify::consistent::{BeamTolerances, Parameter};
+use tapjoint_identify::observation::Observed;
+
+/// Standard uncertainties of a description; those of zero are exact.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DescriptionUncertainty {
+    /// Properties of the beam.
+    pub beam: BeamTolerances,
+    /// Masses of sensors and of what is fastened (1, relative).
+    pub masses: f64,
+    /// Positions of sensors, fastened masses and taps (m).
+    pub positions: f64,
+    /// Logarithm of the beam's mass by a balance over the described one; `None` where it was not weighed.
+    pub weighed: Option<Observed>,
+    /// Logarithm of the free beam's frequencies over the described ones, on average; `None` without a free test.
+    pub free_scale: Option<Observed>,
+}
+
+/// Properties of the beam that are nuisance parameters.
+pub const PROPERTIES: [Parameter; 5] = [
+    Parameter::Modulus,
+    Parameter::Density,
+    Parameter::Thickness,
+    Parameter::Width,
+    Parameter::Length,
+];
+
+/// Returns the derivative of the logarithm of the beam's mass with respect to that of a property.
+pub fn mass_slope(property: Parameter) -> f64 {
+    match property {
+        Parameter::Modulus => 0.0,
+        _ => 1.0,
+    }
+}
+
+/// Returns the derivative of the logarithm of a free beam's frequencies with respect to that of a property. The length of
+/// the bar is another one; its uncertainty belongs to the datum.
+pub fn free_slope(property: Parameter) -> f64 {
+    match property {
+        Parameter::Modulus => 0.5,
+        Parameter::Density => -0.5,
+        Parameter::Thickness => 1.0,
+        _ => 0.0,
+    }
+}
+
+/// Derivatives of the frequencies' logarithms, by mode, with respect to what changes along the section. They are taken at
+/// the nominal optimum of the first configuration: what is fastened to the beam changes them little. They include the modes that
+/// a next test may add.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SectionSlopes {
+    /// By the relative size of shear and rotary inertia (1); empty for Euler's beam.
+    pub shear: Vec<f64>,
+    /// By Poisson's ratio (1); empty where the width does not count.
+    pub poisson: Vec<f64>,
+    /// By the hold of the width: 0 for springs spread over the width, 1 for a clamp that keeps the slope across it.
+    pub hold: Vec<f64>,
+}
+
+impl SectionSlopes {
+    /// Returns the slope of a mode by its number; 0 before it is known.
+    pub fn of(slopes: &[f64], mode: usize) -> f64 {
+        slopes.get(mode - 1).copied().unwrap_or(0.0)
+    }
+}
+
+/// Step of the differences along the section (1).
+const STEP: f64 = 1e-3;
+
+impl ModalModel {
+    /// Returns d ln f/d ln p of a mode by its index, for a property p of the beam; `shear_slope` is that of its shear and rotary
+    /// inertia, which are proportional to (h/L)^2.
+    pub fn property_slope(&self, index: usize, property: Parameter, shear_slope: f64) -> f64 {
+        let specimen = &self.seen.specimen;
+        let omega_square = self.omega(index).powi(2);
+        let [translation, rotation] = self.joint_shares(index);
+        // Shares of what does not belong to the beam: of the strain energy, and of the kinetic energy.
+        let (mut springs, mut masses) = (translation + rotation, 0.0);
+        // Change with the length, all in proportion to it but the positions.
+        let mut by_length = -2.0 + 1.5 * translation + 0.5 * rotation - 2.0 * shear_slope;
+        for spring in &specimen.springs {
+            let phi = self.modes().displacement(index, spring.position);
+            let slope = self.modes().slope(index, spring.position);
+            let share = spring.stiffness * phi * phi / omega_square;
+            springs += share;
+            by_length +=
+                1.5 * share - spring.stiffness * spring.position * phi * slope / omega_square;
+        }
+        let joint = match &specimen.body {
+            Body::One(_) => 0.0,
+            Body::Joined([left, _]) => left.length,
+        };
+        let at_joint = PointMass {
+            position: joint,
+            mass: specimen.joint_mass.mass + specimen.overlap.map_or(0.0, |overlap| overlap.mass),
+            inertia: specimen.joint_mass.inertia,
+        };
+        for mass in specimen.masses.iter().chain([&at_joint]) {
+            let phi = self.modes().displacement(index, mass.position);
+            let slope = self.modes().slope(index, mass.position);
+            let (own, turning) = (mass.mass * phi * phi, mass.inertia * slope * slope);
+            masses += own + turning;
+            by_length += 0.5 * own + 1.5 * turning + mass.mass * mass.position * phi * slope;
+        }
+        let (stiffness, inertia) = (0.5 * (1.0 - springs), -0.5 * (1.0 - masses));
+        match property {
+            Parameter::Modulus => stiffness,
+            Parameter::Density => inertia,
+            Parameter::Thickness => 3.0 * stiffness + inertia + 2.0 * shear_slope,
+            Parameter::Width => stiffness + inertia,
+            Parameter::Length => by_length,
+            _ => 0.0,
+        }
+    }
+
+    /// Returns the slopes of the first modes along the section; `None` where a beam next to this one has no solution.
+    pub fn section_slopes(&self, modes: usize) -> Option<SectionSlopes> {
+        let specimen = &self.seen.specimen;
+        let mut slopes = SectionSlopes::default();
+        if specimen.shear_rotary > 0.0 {
+            let mut less = specimen.clone();
+            less.shear_rotary -= STEP * specimen.shear_rotary;
+            slopes.shear = self.slopes_towards(&less, -STEP, modes)?;
+        }
+        if specimen.width_stiffening != WidthStiffening::Ignored {
+            let mut other = specimen.clone();
+            // No isotropic solid reaches 0.5.
+            let step = if specimen.body.beams()[0].poisson < 0.49 {
+                STEP
+            } else {
+                -STEP
+            };
+            for beam in other.body.beams_mut() {
+                beam.poisson += step;
+            }
+            slopes.poisson = self.slopes_towards(&other, step, modes)?;
+            slopes.hold = specimen.clamp_differences(modes, Mesh::DIAGNOSIS).ok()?;
+        }
+        Some(slopes)
+    }
+
+    /// Returns the derivatives of the first modes' frequencies (logarithms) by Rayleigh's quotient of a specimen that lies a step
+    /// away.
+    fn slopes_towards(&self, other: &Specimen, step: f64, modes: usize) -> Option<Vec<f64>> {
+        let moved = self.modes().rayleigh_frequencies(other).ok()?;
+        let own = self.modes().frequencies();
+        let numbers = (1..=modes).map_while(|mode| self.index(mode));
+        let slopes = numbers.map(|index| (moved[index] / own[index]).ln() / step);
+        Some(slopes.collect())
+    }
+}

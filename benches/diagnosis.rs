@@ -8,7 +8,8 @@ use std::hint::black_box;
 use std::time::Duration;
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
-    GapSettings, Nominal, NominalSensor, PlannedConfiguration, TestPlan, diagnose, observe,
+    DescriptionUncertainty, GapSettings, Nominal, NominalSensor, PlannedConfiguration, TestPlan,
+    diagnose, observe,
 };
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
@@ -39,7 +40,7 @@ fn strip(held: bool) -> Nominal {
             position: None,
         }],
         joint_before: None,
-        scale_std: None,
+        uncertainty: DescriptionUncertainty::default(),
         reading_bias: None,
     }
 }

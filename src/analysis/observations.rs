@@ -18,7 +18,9 @@ use tapjoint_description::{coupling, described_beam, described_specimen};
 use tapjoint_diagnosis::{
     DescriptionUncertainty, Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose,
 };
-use tapjoint_identify::consistent::{BeamTolerances, LEAST_DISCREPANCY, MovedClamp};
+use tapjoint_identify::consistent::{
+    BeamTolerances, ConsistentEstimate, LEAST_DISCREPANCY, MovedClamp, Parameter,
+};
 use tapjoint_identify::observation::{
     Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, UNPAIRED,
 };
@@ -239,9 +241,38 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
         let joint = estimate.joint.in_si(&estimate.beam);
         [joint.kt, joint.kr]
     });
-    Nominal {
+    let mut nominal = Nominal {
         joint_before: joint_before.filter(|joint| joint.iter().all(|k| *k > 0.0 && k.is_finite())),
         ..nominal_with(test, estimate.map(|estimate| estimate.joint))
+    };
+    if let Some(estimate) = estimate {
+        take_estimated_properties(&mut nominal, estimate);
+    }
+    nominal
+}
+
+/// Spread of a property that is estimated (1): it has no prior, and what the description says of it is a guess.
+const ESTIMATED: f64 = 0.3;
+
+/// Takes the modulus or the density from the estimate, where that estimates it.
+fn take_estimated_properties(nominal: &mut Nominal, estimate: &ConsistentEstimate) {
+    let described = nominal.specimen.body.beams()[0];
+    for parameter in &estimate.fit {
+        let tolerances = &mut nominal.uncertainty.beam;
+        let beams = nominal.specimen.body.beams_mut().iter_mut();
+        match parameter {
+            Parameter::Modulus => {
+                tolerances.modulus = Some(ESTIMATED);
+                let factor = estimate.beam.modulus / described.modulus;
+                beams.for_each(|beam| beam.modulus *= factor);
+            }
+            Parameter::Density => {
+                tolerances.density = Some(ESTIMATED);
+                let factor = estimate.beam.density / described.density;
+                beams.for_each(|beam| beam.density *= factor);
+            }
+            _ => {}
+        }
     }
 }
 

@@ -34,7 +34,7 @@ pub const PLANTED: [Option<EffectId>; 13] = [
 /// What the diagnosis made of the planted effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Named {
-    /// The planted effect, or its group.
+    /// The planted effect, or effects that hold it.
     Rightly,
     /// Another effect.
     Wrongly,
@@ -83,13 +83,16 @@ fn answer(planted: Option<EffectId>, random: &mut ChaCha8Rng) -> Option<EffectAn
 }
 
 fn named(found: &Diagnosis, planted: Option<EffectId>) -> Named {
-    let effects = match &found.verdict {
-        Verdict::Named(effects) | Verdict::Group(effects) => effects,
+    let is_planted = |one: &EffectId| planted.is_some_and(|planted| one.group() == planted.group());
+    let is_right = match &found.verdict {
+        Verdict::Named(effects) => effects.iter().all(is_planted),
+        Verdict::Group(effects) => effects.iter().any(is_planted),
         _ => return Named::Nothing,
     };
-    match planted {
-        Some(planted) if effects.iter().all(|one| one.group() == planted.group()) => Named::Rightly,
-        _ => Named::Wrongly,
+    if is_right {
+        Named::Rightly
+    } else {
+        Named::Wrongly
     }
 }
 

@@ -12,7 +12,8 @@
 //!
 //! G is linear in each of the compliances but one square, so that d lambda/da = -(bP + Y)/G' and
 //! the like are exact. One beam, two beams joined end to end and finite elements differ in these
-//! five functions only.
+//! five functions only. A joint whose springs also resist curling across the width has a third spring, in a fixed
+//! proportion to Kx. It brings five functions more ([`AcrossFunctions`]).
 
 pub use super::modal_interface::InterfaceModes;
 use super::receptance::{EndFunctions, EndSlopes};

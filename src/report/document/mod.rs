@@ -161,7 +161,8 @@ impl Document {
 
     /// Adds the diagnosis. The headline becomes the joint that belongs to what it names.
     pub fn add_gap(&mut self, gap: GapSection) {
-        self.headline = HeadlineSection::with(&gap).or(self.headline.take());
+        let described = self.headline.take();
+        self.headline = HeadlineSection::with(&gap, described.as_ref()).or(described);
         self.gap = Some(gap);
     }
 

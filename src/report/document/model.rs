@@ -41,7 +41,8 @@ impl EstimatedValue {
 /// The joint to go by.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct HeadlineSection {
-    /// "described", or "with sensor-mass": the model with what the diagnosis names, if that is confirmed.
+    /// "described"; "with sensor-mass": the model with what the diagnosis names, if that is confirmed; "with modulus or
+    /// length": the models with each of what it lists, whose limits hold those of all.
     pub model: String,
     /// Translational stiffness (N/m).
     pub kt: Option<HeadlineValue>,
@@ -73,32 +74,75 @@ impl HeadlineSection {
         };
         let (kt, kr) = (value(&estimate.kt), value(&estimate.kr));
         (kt.is_some() || kr.is_some()).then(|| Self {
-            model: "described".to_owned(),
+            model: DESCRIBED.to_owned(),
             kt,
             kr,
         })
     }
 
-    /// The joint of the model with what the diagnosis names; `None` where it names nothing.
-    pub(super) fn with(gap: &GapSection) -> Option<Self> {
-        let Verdict::Named(effects) = &gap.verdict else {
-            return None;
-        };
-        let found = gap.named()?;
+    /// Returns whether it is the joint of the described model.
+    pub fn is_described(&self) -> bool {
+        self.model == DESCRIBED
+    }
+
+    /// The joint of the model with what the diagnosis names or lists; `None` where that is nothing. `described` is the joint of
+    /// the described model.
+    pub(super) fn with(gap: &GapSection, described: Option<&Self>) -> Option<Self> {
+        let listed = gap.verdict.hypotheses();
+        let mut found: Option<Self> = None;
+        let mut names = Vec::with_capacity(listed.len());
+        for hypothesis in &listed {
+            names.push(hypothesis.name());
+            let own = match hypothesis {
+                Hypothesis::None => described.cloned(),
+                _ => gap.result(hypothesis).and_then(Self::of_hypothesis),
+            };
+            // Without one of the joints no limits hold all.
+            let own = own?;
+            found = Some(match found {
+                Some(first) => first.spanning(&own),
+                None => own,
+            });
+        }
+        let model = format!("with {}", names.join(" or ").replace('+', " and "));
+        Some(Self { model, ..found? })
+    }
+
+    /// The joint of one hypothesis; `None` where there is none.
+    fn of_hypothesis(found: &HypothesisResult) -> Option<Self> {
         let values = found.joint?.into_iter().zip(found.joint_intervals);
         let mut values = values.map(|(value, interval)| HeadlineValue {
             value: Some(value).filter(|value| value.is_finite()),
             low: interval.map(|ends| ends[0]).filter(|end| end.is_finite()),
             high: interval.map(|ends| ends[1]).filter(|end| end.is_finite()),
         });
-        let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
         Some(Self {
-            model: format!("with {}", names.join(" and ")),
+            model: String::new(),
             kt: values.next(),
             kr: values.next(),
         })
     }
+
+    /// Returns these values with limits that hold those of another joint too.
+    fn spanning(self, other: &Self) -> Self {
+        let value = |own: Option<HeadlineValue>, other: Option<HeadlineValue>| {
+            let (own, other) = own.zip(other)?;
+            Some(HeadlineValue {
+                low: own.low.zip(other.low).map(|(a, b)| a.min(b)),
+                high: own.high.zip(other.high).map(|(a, b)| a.max(b)),
+                ..own
+            })
+        };
+        Self {
+            kt: value(self.kt, other.kt),
+            kr: value(self.kr, other.kr),
+            model: self.model,
+        }
+    }
 }
+
+/// Model of a headline that is not the diagnosis' own.
+const DESCRIBED: &str = "described";
 
 /// A value by the readings alone.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]

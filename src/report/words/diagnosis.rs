@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::document::{Document, GapSection};
+use crate::document::{Document, GapSection, HeadlineSection, HeadlineValue};
 use crate::format::{
     RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
@@ -279,10 +279,22 @@ fn price(gap: &GapSection) -> Option<String> {
     })
 }
 
-/// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with what the verdict names;
-/// `None` where it names nothing.
-pub(crate) fn joint_with(gap: &GapSection) -> Option<String> {
-    joint(cause(gap)?)
+/// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with the cause, or with each of
+/// several; `None` where the headline is the described model's.
+pub(crate) fn joint_with(headline: &HeadlineSection) -> Option<String> {
+    let value = |found: &HeadlineValue, unit| {
+        let interval = found.low.zip(found.high).map(|(low, high)| [low, high]);
+        stiffness(found.value.unwrap_or(f64::INFINITY), interval, unit)
+    };
+    if headline.is_described() {
+        return None;
+    }
+    let (kt, kr) = (headline.kt.as_ref()?, headline.kr.as_ref()?);
+    Some(format!(
+        "Kt\u{a0}=\u{a0}{}, Kr\u{a0}=\u{a0}{}",
+        value(kt, "N/m"),
+        value(kr, "N\u{a0}m/rad")
+    ))
 }
 
 /// The effects that the verdict names.

@@ -5,7 +5,6 @@ use crate::document::{Document, EstimateSection, PredictionSection, ReadBy};
 use crate::format::{bound_percent, capital, signed_or_below, significant, trimmed};
 use crate::picture::extent;
 use crate::tables::{Parameter, estimated, quality_count, reading_bound};
-use tapjoint_diagnosis::Verdict;
 use tapjoint_identify::observation::UNPAIRED;
 
 /// At most five lines, each with what it is about; what was not computed has none.
@@ -119,11 +118,9 @@ fn joint(document: &Document) -> Option<String> {
     };
     let described = (!physical.is_empty()).then(|| physical.join(", ") + untested)?;
     // The joint that belongs to a named cause comes first.
-    let gap = document.gap.as_ref();
-    let named = gap.filter(|gap| matches!(gap.verdict, Verdict::Named(_)));
-    let with = named.and_then(joint_with);
     let headline = document.headline.as_ref();
-    Some(match headline.zip(with) {
+    let with = headline.and_then(|headline| Some((headline, joint_with(headline)?)));
+    Some(match with {
         Some((headline, joint)) => {
             format!(
                 "{joint} {}, if confirmed; as described {described}",

@@ -66,7 +66,8 @@ impl HeadlineSection {
     pub(super) fn described(estimate: &EstimateSection) -> Option<Self> {
         let value = |found: &Option<EstimatedValue>| {
             let found = &found.as_ref()?.uncertain;
-            Some(HeadlineValue {
+            // The pair regression may find what no spring can be; that is no joint to go by.
+            (found.value > 0.0).then(|| HeadlineValue {
                 value: Some(found.value).filter(|value| value.is_finite()),
                 low: found.low,
                 high: found.high,

@@ -5,7 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 use tapjoint::description::{FreeTestFile, TestDescription};
-use tapjoint::pipeline::{Analysis, IdentifySettings, measure_free_test, run_test};
+use tapjoint::pipeline::{Analysis, FreeTest, IdentifySettings, measure_free_test, run_test};
 use tapjoint::study::updated_model::DescribedEffectError;
 
 /// No description of a free bar is larger (bytes).
@@ -85,16 +85,27 @@ impl TestFile {
     /// # Errors
     /// Those of [`measure_free_test`] and [`run_test`].
     pub(super) fn analyse(&self, settings: &IdentifySettings) -> anyhow::Result<Analysis> {
-        let mut settings = settings.clone();
-        if let Some(named) = &self.test.beam.free_test {
-            let free = self.free_test(named)?;
-            let place = (free.folder.as_path(), free.name.as_str());
-            let measured = measure_free_test(&self.test, &free.test, place);
-            let measured = measured.map_err(|cause| named.error(&self.name, cause.to_string()))?;
-            settings.free_test = Some(measured);
-        }
+        let settings = IdentifySettings {
+            free_test: self.measured_free_test()?,
+            ..settings.clone()
+        };
         let place = (self.folder.as_path(), self.name.as_str());
         Ok(run_test(&self.test, place, &settings)?)
+    }
+
+    /// Measures the free bar; `None` where the description names no test of it.
+    ///
+    /// # Errors
+    /// Those of [`measure_free_test`], and of a description that is none of the same bar.
+    pub(super) fn measured_free_test(&self) -> anyhow::Result<Option<FreeTest>> {
+        let Some(named) = &self.test.beam.free_test else {
+            return Ok(None);
+        };
+        let free = self.free_test(named)?;
+        let place = (free.folder.as_path(), free.name.as_str());
+        let measured = measure_free_test(&self.test, &free.test, place);
+        let measured = measured.map_err(|cause| named.error(&self.name, cause.to_string()))?;
+        Ok(Some(measured))
     }
 
     /// Reads the description of the free bar's test.

@@ -83,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let start = Instant::now();
         let found = pool.install(|| {
             let near = estimator.neighbourhood();
-            estimator.monte_carlo(&near, REPETITIONS, 1)
+            estimator.monte_carlo(&near, &[], REPETITIONS, 1)
         })?;
         let kx = found.kx.ok_or("no repetition has an estimate")?;
         println!(

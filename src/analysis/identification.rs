@@ -1,10 +1,11 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::Analysis;
+use super::free_test::FreeTest;
 use super::results::{
-    AverageSection, Estimate, EstimateMethod, Identification, LeftOutMode, ModeResult,
-    MonteCarloSection, MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection,
-    SensitivitySection, measured_modes, scatter_of, set_ups,
+    AverageSection, CommonScaleSection, Estimate, EstimateMethod, Identification, LeftOutMode,
+    ModeResult, MonteCarloSection, MovedLength, PerturbationSection, Perturbations,
+    ResolutionSpanSection, SensitivitySection, measured_modes, scatter_of, set_ups,
 };
 use super::structure::{
     StructureDetails, TestedStructure, estimator_of_lengths, fitted, frequencies_of, jointed,
@@ -18,8 +19,8 @@ use tapjoint_identify::consistent::{
     ConsistentEstimate, ConsistentEstimator, MovedClamp, PointFit,
 };
 use tapjoint_identify::perturbation::{
-    SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly,
-    sign_pattern_estimates, spans_of,
+    ReadingError, SIGN_PATTERN_MODES, average_errors, common_sensitivity, mode_sensitivities,
+    perturb_uniformly, sign_pattern_estimates, spans_of,
 };
 use tapjoint_identify::{
     FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PredictedMode, Spread, Stiffnesses,
@@ -36,6 +37,8 @@ pub struct IdentifySettings {
     pub details: StructureDetails,
     /// The beam at its other free lengths: its modes enter the main estimate; none.
     pub lengths: Vec<MovedLength>,
+    /// The test of the same bar without its joint: its modes enter the main estimate; none.
+    pub free_test: Option<FreeTest>,
     /// The first so many modes of each length enter; `None` = all.
     pub fit_modes: Option<usize>,
     /// Relative standard uncertainty that a frequency read from recordings has beside that of its reading (1):
@@ -55,6 +58,7 @@ impl Default for IdentifySettings {
             method: EstimateMethod::Consistent,
             details: StructureDetails::default(),
             lengths: Vec::new(),
+            free_test: None,
             fit_modes: None,
             frequency_floor: FREQUENCY_FLOOR,
             perturbed: vec![EstimateMethod::Pairs, EstimateMethod::Consistent],
@@ -105,6 +109,7 @@ pub fn identify(
         moved.push(MovedClamp {
             structure: length.structure.clone(),
             modes: own,
+            attachments: settings.details.attachments.clone(),
         });
     }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
@@ -403,9 +408,9 @@ pub(super) fn perturbations(
         && settings.perturbed.contains(&EstimateMethod::Pairs)
         && let Ok(estimator) = pairs_estimator(model, &structure.beam, &frequencies.numbers)
     {
-        let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
-        let random = random.and_then(|((samples, seed), stds)| {
-            monte_carlo(&frequencies.values, stds, samples, seed, &estimator).ok()
+        let random = settings.monte_carlo.zip(frequencies.errors.as_deref());
+        let random = random.and_then(|((samples, seed), errors)| {
+            monte_carlo(&frequencies.values, errors, samples, seed, &estimator).ok()
         });
         add(
             &mut found,
@@ -413,8 +418,10 @@ pub(super) fn perturbations(
             random,
             &frequencies,
             percents,
-            estimator,
+            &estimator,
         );
+        let of_scale = common_scale(&frequencies.values, settings, &estimator);
+        set_common_scale(&mut found, EstimateMethod::Pairs, of_scale);
     }
     if let Some(estimator) = consistent
         && settings.perturbed.contains(&EstimateMethod::Consistent)
@@ -422,9 +429,11 @@ pub(super) fn perturbations(
     {
         let near = estimator.neighbourhood();
         // Without the uncertainties of all modes there is nothing to draw from.
-        let random = settings.monte_carlo;
-        let random =
-            random.and_then(|(samples, seed)| estimator.monte_carlo(&near, samples, seed).ok());
+        let half_widths = half_widths(&frequencies.half_widths, settings);
+        let random = settings.monte_carlo.and_then(|(samples, seed)| {
+            let repeated = estimator.monte_carlo(&near, &half_widths, samples, seed);
+            repeated.ok()
+        });
         // The frequencies of other free lengths stay as they are.
         let all = estimator.frequencies();
         let of_lengths = all.get(used.len()..).unwrap_or_default();
@@ -437,8 +446,63 @@ pub(super) fn perturbations(
             percents,
             |frequencies: &[f64]| stiffnesses(&[frequencies, of_lengths].concat()),
         );
+        // The bar is the same at all lengths, and without its joint.
+        let of_scale = common_scale(&all, settings, &stiffnesses);
+        set_common_scale(&mut found, EstimateMethod::Consistent, of_scale);
     }
     found
+}
+
+/// Returns the effect of the description's uncertain frequency scale on an estimate; `None` of an exact description.
+fn common_scale(
+    frequencies: &[f64],
+    settings: &IdentifySettings,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Option<CommonScaleSection> {
+    let scale_percent = 100.0 * settings.details.scale_std()?;
+    let found = common_sensitivity(frequencies, scale_percent, estimator);
+    let (change, slope) = (found.percent_per_bound, found.percent_per_percent);
+    Some(CommonScaleSection {
+        scale_percent,
+        kx_percent: change.and_then(|change| finite(change.kx)),
+        ky_percent: change.and_then(|change| finite(change.ky)),
+        kz_percent: change.and_then(|change| finite(change.kz?)),
+        kx_percent_per_percent: slope.and_then(|slope| finite(slope.kx)),
+        ky_percent_per_percent: slope.and_then(|slope| finite(slope.ky)),
+        kz_percent_per_percent: slope.and_then(|slope| finite(slope.kz?)),
+    })
+}
+
+/// Puts the effect of the frequency scale beside those of the modes, where there are any.
+fn set_common_scale(
+    found: &mut Perturbations,
+    method: EstimateMethod,
+    of_scale: Option<CommonScaleSection>,
+) {
+    let mut spans = found.spans.iter_mut();
+    if let Some(span) = spans.find(|span| span.method == method) {
+        span.common_scale = of_scale;
+    }
+}
+
+/// Returns the half widths (Hz) of the uniform errors of all frequencies of the estimate: those of the described length, then
+/// those of other lengths, then those of the free bar.
+fn half_widths(of_described: &[f64], settings: &IdentifySettings) -> Vec<f64> {
+    let mut all = of_described.to_vec();
+    for length in &settings.lengths {
+        let numbered = length.modes.iter().filter(|mode| mode.mode.is_some());
+        let numbered = numbered.take(settings.fit_modes.unwrap_or(usize::MAX));
+        all.extend(numbered.map(ModeResult::half_width));
+    }
+    if let Some(free) = &settings.free_test {
+        let used = free.bar.modes.iter().map(|used| {
+            let mut modes = free.modes.iter();
+            let found = modes.find(|mode| mode.mode == Some(used.mode));
+            found.map_or(0.0, ModeResult::half_width)
+        });
+        all.extend(used);
+    }
+    all
 }
 
 /// Adds the perturbations of one method, if it has an estimate.
@@ -495,23 +559,34 @@ struct Frequencies {
     values: Vec<f64>,
     /// Half lines (Hz), where every mode has one.
     bounds: Option<Vec<f64>>,
-    /// Standard uncertainties (Hz), where every mode has one.
-    stds: Option<Vec<f64>>,
+    /// Half widths (Hz) of the uniform parts of their errors.
+    half_widths: Vec<f64>,
+    /// Random errors, where every mode has a standard uncertainty.
+    errors: Option<Vec<ReadingError>>,
     /// Seed of the sign patterns, where these are drawn.
     seed: u64,
 }
 
 impl Frequencies {
     fn new(modes: &[ModeResult], used: &[MeasuredMode], seed: u64) -> Self {
-        let listed = used.iter().map(|measured| {
-            let mut modes = modes.iter();
-            modes.find(|mode| mode.mode == Some(measured.mode))
-        });
+        let listed: Vec<Option<&ModeResult>> = used
+            .iter()
+            .map(|measured| {
+                let mut modes = modes.iter();
+                modes.find(|mode| mode.mode == Some(measured.mode))
+            })
+            .collect();
+        let half_widths = listed.iter();
+        let half_widths = half_widths.map(|mode| mode.map_or(0.0, ModeResult::half_width));
+        let half_widths: Vec<f64> = half_widths.collect();
+        let errors = used.iter().zip(&half_widths);
+        let errors = errors.map(|(mode, width)| Some(ReadingError::new(mode.std?, *width)));
         Self {
             numbers: used.iter().map(|mode| mode.mode).collect(),
             values: used.iter().map(|mode| mode.frequency).collect(),
-            bounds: listed.map(|mode| mode?.half_line).collect(),
-            stds: used.iter().map(|mode| mode.std).collect(),
+            bounds: listed.iter().map(|mode| (*mode)?.half_line).collect(),
+            errors: errors.collect(),
+            half_widths,
             seed,
         }
     }

@@ -1,14 +1,18 @@
-//! The recordings of each free length: where the clamp was moved the beam has other modes, on the same joint.
+//! The numbered modes of a test: its recordings of each free length, or its frequencies read elsewhere. Where the clamp was
+//! moved the beam has other modes, on the same joint.
 //!
 //! Each length is numbered as a test of its own. The frequencies of all lengths enter one estimate.
 
-use super::modes::{modes_of_test, set_aside};
+use super::mode_file::read_modes;
+use super::modes::{modes_of_file, modes_of_measured, modes_of_test, set_aside};
 use super::recording_result::RecordingResult;
 use super::results::{ModeResult, MovedLength};
 use super::structure::{
     StructureDetails, TestedStructure, jointed, structure_details, tested_structure,
 };
 use super::warnings::Warning;
+use super::wiring::{PipelineError, measure_test};
+use std::path::Path;
 use tapjoint_description::TestDescription;
 
 /// A free length (m) in words, to the micrometre.
@@ -28,8 +32,51 @@ pub(super) struct NumberedTest {
     pub(super) warnings: Vec<Warning>,
 }
 
+/// Everything that is measured of a test: its recordings, or the frequencies that it or its file of modes gives.
+pub(super) struct MeasuredTest {
+    /// Recordings, in the order of the description.
+    pub(super) recordings: Vec<RecordingResult>,
+    /// The numbered modes.
+    pub(super) numbered: NumberedTest,
+    /// Doubts about description, recordings and numbers.
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// Measures the recordings of a described test, or reads its frequencies, and numbers the modes. `place` is the folder in
+/// which files are looked for and the description's own name, for messages.
+pub(super) fn measured_modes_of(
+    test: &TestDescription,
+    place: (&Path, &str),
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> Result<MeasuredTest, PipelineError> {
+    let mut recordings = measure_test(test, place.0, place.1)?;
+    let doubts = test.warnings.iter();
+    let mut warnings: Vec<Warning> = doubts.map(Warning::of_description).collect();
+    for recording in &recordings {
+        warnings.extend_from_slice(&recording.measurement.warnings);
+    }
+    let mut found = numbered(test, &mut recordings, structure, details);
+    if let Some(measured) = &test.measured {
+        match &measured.file {
+            Some(file) => {
+                let read = read_modes(test, measured, file, place.0, place.1)?;
+                (found.modes, found.warnings) = modes_of_file(&read, structure, details);
+                warnings.extend(read.warnings);
+            }
+            None => found.modes = modes_of_measured(measured, structure),
+        }
+    }
+    warnings.append(&mut found.warnings);
+    Ok(MeasuredTest {
+        recordings,
+        numbered: found,
+        warnings,
+    })
+}
+
 /// Merges and numbers the readings of the recordings, those of each free length apart from the others.
-pub(super) fn numbered(
+fn numbered(
     test: &TestDescription,
     recordings: &mut Vec<RecordingResult>,
     structure: &TestedStructure,
@@ -57,7 +104,7 @@ pub(super) fn numbered(
             let details = structure_details(&own_test, &structure.beam);
             let (modes, doubts) = modes_of_test(&own_test, &mut own, &aside, &structure, &details);
             let doubts = doubts.into_iter();
-            let doubts = doubts.map(|doubt| doubt.of_length(&length_words(length)));
+            let doubts = doubts.map(|doubt| doubt.of_part(&length_words(length)));
             found.warnings.extend(doubts);
             let used = own.iter().zip(&aside).filter(|(_, aside)| aside.is_none());
             found.lengths.push(MovedLength {

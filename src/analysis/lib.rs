@@ -14,6 +14,7 @@ mod checks;
 mod explained;
 mod fits;
 mod found;
+mod free_test;
 mod frf;
 mod function_file;
 mod function_fits;
@@ -35,24 +36,24 @@ pub use amplitude::AmplitudeChange;
 use checks::judge;
 pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
+pub use free_test::{FreeTest, FreeTestError, measure_free_test};
 pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
-use lengths::numbered;
+use lengths::measured_modes_of;
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };
-use mode_file::read_modes;
-use modes::{modes_of_bare, modes_of_file};
+use modes::modes_of_bare;
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
 use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{
-    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
-    MonteCarloSection, MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection,
-    SensitivitySection,
+    AverageSection, BetweenRecordings, CommonScaleSection, Estimate, EstimateMethod,
+    Identification, ModeResult, MonteCarloSection, MovedLength, PerturbationSection, Perturbations,
+    ResolutionSpanSection, SensitivitySection,
 };
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
@@ -60,8 +61,8 @@ pub use structure::{
 };
 pub use warnings::{WARNING_CODES, Warning, together};
 use warnings::{neglected_effects, of_amplitude};
+use wiring::finish;
 pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
-use wiring::{finish, measure_test};
 
 use std::path::Path;
 use std::slice::from_ref;
@@ -86,6 +87,8 @@ pub struct Analysis {
     pub modes: Vec<ModeResult>,
     /// Resonances of the beam at its other free lengths, where the clamp was moved.
     pub lengths: Vec<MovedLength>,
+    /// The test of the same bar without its joint; `None` where the description names none.
+    pub free_test: Option<FreeTest>,
     /// The joint or the material by the modes; `None` for a bare recording.
     pub identification: Option<Identification>,
     /// Quality of the test: good practice, check by check.
@@ -98,7 +101,8 @@ pub struct Analysis {
 ///
 /// `place` is the folder in which files are looked for and the description's own name, for
 /// messages. `settings.fit_modes` yields to the description's, `settings.details` are the
-/// description's.
+/// description's. The caller reads the description that `free_test` names, and has it measured
+/// by [`measure_free_test`] for `settings.free_test`.
 ///
 /// # Errors
 /// Recordings that cannot be read or analysed. Too few taps or modes are no errors: the analysis
@@ -109,25 +113,14 @@ pub fn run_test(
     settings: &IdentifySettings,
 ) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
-    let details = structure_details(test, &structure.beam);
-    let mut recordings = measure_test(test, place.0, place.1)?;
-    let doubts = test.warnings.iter();
-    let mut warnings: Vec<Warning> = doubts.map(Warning::of_description).collect();
-    for recording in &recordings {
-        warnings.extend_from_slice(&recording.measurement.warnings);
+    let mut details = structure_details(test, &structure.beam);
+    let measured = measured_modes_of(test, place, &structure, &details)?;
+    let (recordings, found) = (measured.recordings, measured.numbered);
+    let mut warnings = measured.warnings;
+    if let Some(free) = &settings.free_test {
+        details.free = Some(free.bar.clone());
+        warnings.extend_from_slice(&free.warnings);
     }
-    let mut found = numbered(test, &mut recordings, &structure, &details);
-    if let Some(measured) = &test.measured {
-        match &measured.file {
-            Some(file) => {
-                let read = read_modes(test, measured, file, place.0, place.1)?;
-                (found.modes, found.warnings) = modes_of_file(&read, &structure, &details);
-                warnings.extend(read.warnings);
-            }
-            None => found.modes = modes_of_measured(measured, &structure),
-        }
-    }
-    warnings.extend(found.warnings);
     warnings.extend(of_amplitude(amplitude_changes(&recordings)));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
@@ -149,6 +142,7 @@ pub fn run_test(
         recordings,
         modes: found.modes,
         lengths: settings.lengths,
+        free_test: settings.free_test,
         identification: Some(identification),
         verdicts,
         warnings: together(warnings),
@@ -215,6 +209,7 @@ fn analysis_of(mut recording: RecordingResult) -> Analysis {
         warnings: together(warnings),
         modes,
         lengths: Vec::new(),
+        free_test: None,
         identification: None,
         recordings: vec![recording],
     }

@@ -16,7 +16,8 @@ use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
 use tapjoint_description::{coupling, described_beam, described_specimen};
 use tapjoint_diagnosis::{
-    DescriptionUncertainty, Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose,
+    DescriptionUncertainty, Diagnosis, GapError, GapSettings, Nominal, NominalSensor, Proposal,
+    diagnose,
 };
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimate, LEAST_DISCREPANCY, MovedClamp, Parameter,
@@ -229,7 +230,13 @@ pub fn diagnose_test(
     analysis: &Analysis,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
-    diagnose(&observations(analysis), &nominal(test, analysis), settings)
+    let mut found = diagnose(&observations(analysis), &nominal(test, analysis), settings)?;
+    // What has been done is no next test.
+    if test.beam.free.is_some() || test.beam.free_test.is_some() {
+        let next = &mut found.next_tests;
+        next.retain(|next| next.proposal != Proposal::BareBeam);
+    }
+    Ok(found)
 }
 
 /// The structure as described, with the joint as estimated: where the diagnosis begins.

@@ -11,7 +11,7 @@ use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure, Outlyi
 use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MeasuredMode, PredictedMode, Uncertain};
 use tapjoint_numerics::stats::chi_square_quantile;
-use tapjoint_signal::modal::ModeReading;
+use tapjoint_signal::modal::{ModeReading, ReadBy};
 
 /// Method by which a joint or a beam is estimated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -79,6 +79,18 @@ impl ModeResult {
             recording: Some(recording.to_owned()),
             lambda: None,
             reading: Some(reading),
+        }
+    }
+
+    /// Returns the half width (Hz) of the uniform part of its error: half a line where it was read on one, 0 where its errors
+    /// are normal.
+    pub(super) fn half_width(&self) -> f64 {
+        match &self.reading {
+            Some(reading) if reading.source == ReadBy::Line => {
+                0.5 * (reading.interval.1 - reading.interval.0)
+            }
+            Some(_) => 0.0,
+            None => self.half_line.unwrap_or(0.0),
         }
     }
 
@@ -442,6 +454,28 @@ pub struct ResolutionSpanSection {
     pub cloud: Vec<[f64; 2]>,
     /// Change of each parameter (%) when one mode moves by its own bound.
     pub sensitivity: Vec<SensitivitySection>,
+    /// Change of each parameter when all modes move by one factor; null of an exact description.
+    pub common_scale: Option<CommonScaleSection>,
+}
+
+/// Change of the estimate when all frequencies are off by one factor, as where modulus, density, thickness or length of the
+/// bar are not as stated.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct CommonScaleSection {
+    /// Standard uncertainty of this factor by the description (%): that of h/L^2 sqrt(E/rho).
+    pub scale_percent: f64,
+    /// Change of Kx (%) by it.
+    pub kx_percent: Option<f64>,
+    /// Change of Ky (%).
+    pub ky_percent: Option<f64>,
+    /// Change of Kz (%).
+    pub kz_percent: Option<f64>,
+    /// Change of Kx (%) per change of all frequencies (%), for small changes.
+    pub kx_percent_per_percent: Option<f64>,
+    /// Change of Ky (%) per change of all frequencies (%).
+    pub ky_percent_per_percent: Option<f64>,
+    /// Change of Kz (%) per change of all frequencies (%).
+    pub kz_percent_per_percent: Option<f64>,
 }
 
 /// Change of the estimate by one mode's bound.

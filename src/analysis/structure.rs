@@ -127,6 +127,36 @@ impl StructureDetails {
             ..self.clone()
         }
     }
+
+    /// Returns the relative standard uncertainty of all frequencies by that of the beam; `None` of an exact description.
+    ///
+    /// f is proportional to h/L^2 sqrt(E/rho). A density that the weight m tells is m/(L b h), so that f goes with
+    /// h^1.5 L^-1.5 sqrt(E b/m).
+    pub fn scale_std(&self) -> Option<f64> {
+        let known = &self.tolerances;
+        let weighed = self
+            .weighed
+            .filter(|_| known.density == Some(UNKNOWN_DENSITY));
+        let shares = match weighed {
+            None => [
+                (known.modulus, 0.5),
+                (known.density, 0.5),
+                (known.thickness, 1.0),
+                (known.length, 2.0),
+                (None, 0.0),
+            ],
+            Some(weighed) => [
+                (known.modulus, 0.5),
+                (Some(weighed.std / weighed.mass), 0.5),
+                (known.thickness, 1.5),
+                (known.length, 1.5),
+                (known.width, 0.5),
+            ],
+        };
+        let shares = shares.map(|(share, power)| (power * share.unwrap_or(0.0)).powi(2));
+        let std = shares.iter().sum::<f64>().sqrt();
+        (std > 0.0).then_some(std)
+    }
 }
 
 /// The details of a described test.
@@ -196,6 +226,7 @@ fn free_bar(
                 std: Some(*std),
             })
             .collect(),
+        attachments: Vec::new(),
     }
 }
 

@@ -73,14 +73,18 @@ impl InterfaceModes {
         // The lowest mode left out then has about four times the highest frequency.
         let count = 2 * highest + 10;
         let forces = [0, 1].map(|component| model.joint_load(component));
+        let rigid = model.locked_motions();
         let mut pairs = pairs_for_forces(
             [&stiffness, &mass],
             SHIFT,
             model.highest_square(),
-            &model.locked_motions(),
+            &rigid,
             count,
             &forces,
         )?;
+        // The shift leaves some 1e-9 of itself, beside which a weak spring would be nothing.
+        let rigid = rigid.len().min(pairs.values.len());
+        pairs.values[..rigid].fill(0.0);
         // Motions that only rounding gives an inertia.
         let most = 1e3 * model.highest_square();
         let moving = pairs.values.partition_point(|square| *square < most);
@@ -105,7 +109,8 @@ impl InterfaceModes {
                 }
             }
         }
-        let squares = second_order.squares.clone();
+        let mut squares = second_order.squares.clone();
+        squares[..rigid].fill(0.0);
         let joint: Vec<[f64; 3]> = (0..squares.len())
             .map(|index| [0, 1, 2].map(|i| second_order.moving(index, |row| joint[row][i])))
             .collect();

@@ -4,9 +4,12 @@ use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
-use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{Analysis, IdentifySettings, PipelineError, run_test};
+use tapjoint::description::{FreeTestFile, TestDescription};
+use tapjoint::pipeline::{Analysis, FreeTest, IdentifySettings, measure_free_test, run_test};
 use tapjoint::study::updated_model::DescribedEffectError;
+
+/// No description of a free bar is larger (bytes).
+const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
 /// A test description and where it was found.
 #[derive(Debug)]
@@ -45,20 +48,27 @@ pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<Tes
     let remedy = "give the path of a test description; `tapjoint init` prints one";
     let bytes =
         fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
+    let test = parse(bytes, &name)?;
+    for warning in &test.warnings {
+        terminal.warn(&warning.to_string());
+    }
+    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+    Ok(TestFile { test, name, folder })
+}
+
+/// Returns the description in the bytes of a file of this name.
+fn parse(bytes: Vec<u8>, name: &str) -> anyhow::Result<TestDescription> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let good = error
             .as_bytes()
             .get(..error.utf8_error().valid_up_to())
             .unwrap_or_default();
         let line = 1 + good.iter().filter(|byte| **byte == b'\n').count();
-        anyhow!("{name}:{line}: not UTF-8 text; a test description is a text file; {remedy}")
+        anyhow!(
+            "{name}:{line}: not UTF-8 text; a test description is a text file; give the path of one; `tapjoint init` prints one"
+        )
     })?;
-    let test = TestDescription::parse(&text, &name)?;
-    for warning in &test.warnings {
-        terminal.warn(&warning.to_string());
-    }
-    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    Ok(TestFile { test, name, folder })
+    Ok(TestDescription::parse(&text, name)?)
 }
 
 /// Returns the error of a described effect with its file and line.
@@ -70,12 +80,59 @@ pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Err
 }
 
 impl TestFile {
-    /// Runs the described test.
+    /// Runs the described test, and before it that of the free bar where the description names one.
     ///
     /// # Errors
-    /// Those of [`run_test`].
-    pub(super) fn analyse(&self, settings: &IdentifySettings) -> Result<Analysis, PipelineError> {
-        run_test(&self.test, (&self.folder, &self.name), settings)
+    /// Those of [`measure_free_test`] and [`run_test`].
+    pub(super) fn analyse(&self, settings: &IdentifySettings) -> anyhow::Result<Analysis> {
+        let settings = IdentifySettings {
+            free_test: self.measured_free_test()?,
+            ..settings.clone()
+        };
+        let place = (self.folder.as_path(), self.name.as_str());
+        Ok(run_test(&self.test, place, &settings)?)
+    }
+
+    /// Measures the free bar; `None` where the description names no test of it.
+    ///
+    /// # Errors
+    /// Those of [`measure_free_test`], and of a description that is none of the same bar.
+    pub(super) fn measured_free_test(&self) -> anyhow::Result<Option<FreeTest>> {
+        let Some(named) = &self.test.beam.free_test else {
+            return Ok(None);
+        };
+        let free = self.free_test(named)?;
+        let place = (free.folder.as_path(), free.name.as_str());
+        let measured = measure_free_test(&self.test, &free.test, place);
+        let measured = measured.map_err(|cause| named.error(&self.name, cause.to_string()))?;
+        Ok(Some(measured))
+    }
+
+    /// Reads the description of the free bar's test.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no valid description, or describes another bar.
+    fn free_test(&self, named: &FreeTestFile) -> anyhow::Result<TestFile> {
+        let path = self.path_of(&named.path);
+        let unreadable = |cause: String| {
+            let problem = format!(
+                "{} cannot be read: {cause}; name a test description with `kind = \"free\"`, seen from the folder of this description",
+                path.display()
+            );
+            named.error(&self.name, problem)
+        };
+        readable_file(&path).map_err(&unreadable)?;
+        let found = fs::metadata(&path).map_err(|cause| unreadable(cause.to_string()))?;
+        if !found.is_file() || found.len() > LARGEST_DESCRIPTION {
+            return Err(unreadable("it is not a regular file of at most 16 MB".to_owned()).into());
+        }
+        let bytes = fs::read(&path).map_err(|cause| unreadable(cause.to_string()))?;
+        let name = path.display().to_string();
+        let test = parse(bytes, &name)?;
+        named.check(&self.name, &self.test, &test)?;
+        test.check_has_data(&name)?;
+        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        Ok(TestFile { test, name, folder })
     }
 
     /// Returns the path of a recording that the description names.
@@ -83,7 +140,8 @@ impl TestFile {
         self.folder.join(file)
     }
 
-    /// Makes sure that every recording and the file of modes can be opened, before any work.
+    /// Makes sure that every recording and the file of modes can be opened, and those of the free bar's test, before any
+    /// work.
     ///
     /// # Errors
     /// The first file that cannot be opened, with its line in the description.
@@ -106,7 +164,11 @@ impl TestFile {
                 file.error(&self.name, "file", problem)
             })?;
         }
-        Ok(())
+        match &self.test.beam.free_test {
+            // A free bar has no free test of its own.
+            Some(named) => self.free_test(named)?.check_recordings(),
+            None => Ok(()),
+        }
     }
 }
 

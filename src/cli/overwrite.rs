@@ -66,11 +66,11 @@ impl Files {
         let tests: Vec<PathBuf> = tests.filter(|path| path.is_file()).collect();
         for path in tests {
             let test = described(&path);
-            inputs.extend(test.iter().flat_map(|test| recordings_of(&path, test)));
+            inputs.extend(test.iter().flat_map(|test| files_of(&path, test)));
             inputs.push(path);
         }
         if let Some((path, test)) = test {
-            inputs.extend(recordings_of(path, test));
+            inputs.extend(files_of(path, test));
         }
         Self {
             inputs: inputs.iter().filter_map(|path| Place::of(path)).collect(),
@@ -180,15 +180,23 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
     }
 }
 
-fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
+/// Returns the files that a description names: recordings, modes, and the free bar's test with its own.
+fn files_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let recordings = test.recordings.iter();
     let modes = test.measured.iter().filter_map(|one| one.file.as_ref());
-    recordings
+    let named = recordings
         .flat_map(|recording| recording.files())
         .chain(modes.map(|file| &file.path))
-        .map(|file| folder.join(file))
-        .collect()
+        .chain(test.beam.free_test.iter().map(|free| &free.path));
+    let mut files: Vec<PathBuf> = named.map(|file| folder.join(file)).collect();
+    if let Some(free) = &test.beam.free_test {
+        let path = folder.join(&free.path);
+        // A free bar has no free test of its own.
+        let free = described(&path).filter(|free| free.beam.free_test.is_none());
+        files.extend(free.iter().flat_map(|free| files_of(&path, free)));
+    }
+    files
 }
 
 /// Reads a test description for the names in it; `None` if it is not one. The command reads it again and

@@ -181,7 +181,10 @@ pub(super) fn run(
         Some(given) => given,
         None => described_joint(&file, &structure)?,
     };
-    let test = StudiedTest::of_description(&file.test, &structure, joint, &arguments.bands);
+    let mut test = StudiedTest::of_description(&file.test, &structure, joint, &arguments.bands);
+    if let Some(free) = file.measured_free_test()? {
+        test.details.free = Some(free.bar);
+    }
     let study = study_resolution(&test, &settings(arguments, seed), &|done, of| {
         terminal.count("virtual tests", done, of);
     })?;

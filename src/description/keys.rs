@@ -37,7 +37,7 @@ pub(super) const TOP: KnownTable = KnownTable::new(
 pub(super) const BEAM: KnownTable = KnownTable::new(
     "[beam]",
     "length width thickness modulus density poisson tolerance position_tolerance mass bar_length \
-     free_frequencies free_std right",
+     free_test free_frequencies free_std right",
 );
 pub(super) const TOLERANCE: KnownTable = KnownTable::new(
     "beam.tolerance",

@@ -3,6 +3,7 @@
 //! [`TestDescription::parse`] takes text and returns validated data in SI units. It opens no files: the caller reads
 //! them. A [`DescriptionError`] names the line, the key, the allowed values and the nearest known key.
 
+mod free_test;
 mod keys;
 mod parse;
 mod property;
@@ -12,6 +13,7 @@ mod structure;
 mod template;
 mod tolerance;
 
+pub use free_test::FreeTestFile;
 pub use parse::{ChannelRefError, READINGS, WINDOWS};
 pub use reader::DescriptionError;
 pub use recordings::{FORMS, OVERLOADS, SENSOR_KINDS};
@@ -123,6 +125,8 @@ pub struct BeamDescription {
     pub density_stated: bool,
     /// Frequencies of the whole bar without its joint; `None` when the file is silent.
     pub free: Option<FreeFrequencies>,
+    /// The description of the whole bar's test without its joint; `None` when the file is silent.
+    pub free_test: Option<FreeTestFile>,
 }
 
 /// Number of stiffnesses that describe the joint.

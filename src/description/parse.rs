@@ -1,5 +1,6 @@
 //! From text to [`TestDescription`]: the tables in their order, and the settings of the analysis.
 
+use super::free_test::read_free_test;
 use super::property::{
     DENSITY, LENGTH, MODULUS, POISSON, THICKNESS, WIDTH, needed, optional, read_free_length,
 };
@@ -121,7 +122,7 @@ const MOST_EFFECTS: usize = 100;
 fn check_bar(beam: &Table<'_>, joint: &Table<'_>) -> Result<(), DescriptionError> {
     let kind = joint.get("kind");
     let kind = kind.as_ref().and_then(|kind| kind.as_text());
-    for key in ["bar_length", "free_frequencies"] {
+    for key in ["bar_length", "free_frequencies", "free_test"] {
         if let Some(entry) = beam
             .get(key)
             .filter(|_| matches!(kind, Some("lap" | "free")))
@@ -152,6 +153,7 @@ fn read_beam(table: &Table<'_>) -> Result<BeamDescription, DescriptionError> {
             "the whole bar is shorter than its free `length`; measure it from end to end, clamped part included",
         ));
     }
+    let free_test = read_free_test(table)?;
     let density = match (optional(table, &DENSITY)?, weighed) {
         (Some(density), _) => density,
         // The weight says it: nothing else is known of it.
@@ -180,6 +182,7 @@ fn read_beam(table: &Table<'_>) -> Result<BeamDescription, DescriptionError> {
         weighed,
         density_stated: table.get("density").is_some(),
         free: read_free(table)?,
+        free_test,
         bar_length,
     };
     let stocky = beam.length < STOCKY * beam.thickness;

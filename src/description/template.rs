@@ -26,7 +26,8 @@ density = 7850                 # kg/m3
 "#;
 
 const CANTILEVER: &str = r#"# bar_length = "450 mm"         # the whole bar as weighed and tested free, a clamped part included; default: length
-#   free_frequencies = [102.1, 281.5] and free_std = 0.02, both in Hz: modes 1, 2, ... of the same bar free at both ends
+# free_test = "free.toml"        # the test of the same bar free at both ends, a description with kind = "free"; default: none
+#   free_frequencies = [102.1, 281.5] and free_std = 0.02 instead, both in Hz: modes 1, 2, ... of the free bar
 
 [joint]
 kind = "cantilever"            # "cantilever": held at one end | "lap": two halves joined | "free": no joint

@@ -5,7 +5,7 @@
 //! resolution bound, and sign patterns of all bounds.
 
 use super::IdentifyError;
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -126,32 +126,76 @@ pub fn mode_sensitivities(
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Result<Vec<ModeSensitivity>, IdentifyError> {
     check_bounds(frequencies, bounds)?;
-    // A step of 1e-5: small enough to be a derivative (what it neglects is some 1e-10 of it), large enough
-    // for six digits of it where a search ends within 1e-11 of its goal; the closed form, which has but
-    // rounding, gives ten.
-    const SMALL_PERCENT: f64 = 1e-3;
     let nominal = estimator(frequencies);
     let mut sensitivities = Vec::with_capacity(frequencies.len());
     for (index, (frequency, &bound)) in frequencies.iter().zip(bounds).enumerate() {
         let small = SMALL_PERCENT / 100.0 * frequency;
         let [by_small, by_bound] = [small, bound].map(|step| {
-            let [high, low] = [step, -step].map(|step| {
-                let mut shifted = frequencies.to_vec();
-                shifted[index] += step;
-                estimator(&shifted)
-            });
-            // Half of the difference between the estimates with this frequency a step higher and lower.
-            let change = high?.combined(&low?, |high, low| 0.5 * (high - low));
-            Some(change.combined(&nominal?, |change, nominal| 100.0 * change / nominal))
+            let mut steps = vec![0.0; frequencies.len()];
+            steps[index] = step;
+            half_difference(frequencies, &steps, nominal.as_ref(), &estimator)
         });
         sensitivities.push(ModeSensitivity {
             index,
             percent_per_bound: by_bound,
-            percent_per_percent: by_small
-                .map(|change| change.combined(&change, |change, _| change / SMALL_PERCENT)),
+            percent_per_percent: by_small.map(per_percent),
         });
     }
     Ok(sensitivities)
+}
+
+/// A step of 1e-5: small enough to be a derivative (what it neglects is some 1e-10 of it), large enough
+/// for six digits of it where a search ends within 1e-11 of its goal; the closed form, which has but
+/// rounding, gives ten.
+const SMALL_PERCENT: f64 = 1e-3;
+
+/// Change per percent from that by [`SMALL_PERCENT`].
+fn per_percent(change: Stiffnesses) -> Stiffnesses {
+    change.combined(&change, |change, _| change / SMALL_PERCENT)
+}
+
+/// Returns half of the difference (%) between the estimates with the frequencies these steps (Hz) higher and lower.
+fn half_difference(
+    frequencies: &[f64],
+    steps: &[f64],
+    nominal: Option<&Stiffnesses>,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Option<Stiffnesses> {
+    let [high, low] = [1.0, -1.0].map(|sign| {
+        let moved = frequencies.iter().zip(steps);
+        let moved: Vec<f64> = moved
+            .map(|(frequency, step)| frequency + sign * step)
+            .collect();
+        estimator(&moved)
+    });
+    let change = high?.combined(&low?, |high, low| 0.5 * (high - low));
+    Some(change.combined(nominal?, |change, nominal| 100.0 * change / nominal))
+}
+
+/// Effect of one factor on all frequencies, as of a bar that is not as described.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonSensitivity {
+    /// Half of the difference (%) between the estimates with the factor one bound high and low.
+    pub percent_per_bound: Option<Stiffnesses>,
+    /// Change of the estimate (%) per change of all frequencies (%), for small changes.
+    pub percent_per_percent: Option<Stiffnesses>,
+}
+
+/// Returns the effect of one factor on all frequencies, known to `percent` (%).
+pub fn common_sensitivity(
+    frequencies: &[f64],
+    percent: f64,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> CommonSensitivity {
+    let nominal = estimator(frequencies);
+    let [by_small, by_bound] = [SMALL_PERCENT, percent].map(|percent| {
+        let steps: Vec<f64> = frequencies.iter().map(|f| percent / 100.0 * f).collect();
+        half_difference(frequencies, &steps, nominal.as_ref(), &estimator)
+    });
+    CommonSensitivity {
+        percent_per_bound: by_bound,
+        percent_per_percent: by_small.map(per_percent),
+    }
 }
 
 /// Smallest and largest value of a parameter.
@@ -261,7 +305,7 @@ fn widen(span: &mut Option<Span>, value: f64) {
     });
 }
 
-fn check_bounds(frequencies: &[f64], bounds: &[f64]) -> Result<(), IdentifyError> {
+fn check_bounds<T>(frequencies: &[f64], bounds: &[T]) -> Result<(), IdentifyError> {
     if frequencies.len() == bounds.len() {
         Ok(())
     } else {
@@ -273,6 +317,50 @@ fn check_bounds(frequencies: &[f64], bounds: &[f64]) -> Result<(), IdentifyError
 }
 
 // Random errors of the frequencies, carried through an estimator by repetition.
+
+/// Random error of a frequency: the sum of a uniform and of a normal part.
+///
+/// A frequency that was read on a spectral line lies anywhere within half a line. Its scatter is normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadingError {
+    /// Half width of the uniform part (Hz); 0 without one.
+    half_width: f64,
+    /// Standard deviation of the normal part (Hz).
+    normal: f64,
+}
+
+impl ReadingError {
+    /// Returns the error of this standard deviation (Hz) whose uniform part has this half width (Hz). A uniform part that
+    /// is larger than the whole is cut to it.
+    pub fn new(std: f64, half_width: f64) -> Self {
+        let half_width = half_width.clamp(0.0, 3f64.sqrt() * std);
+        let normal = std * std - half_width * half_width / 3.0;
+        Self {
+            half_width,
+            normal: normal.max(0.0).sqrt(),
+        }
+    }
+
+    /// Returns the error with another normal part (Hz) in addition.
+    #[must_use]
+    pub fn with_normal(self, std: f64) -> Self {
+        Self {
+            normal: self.normal.hypot(std),
+            ..self
+        }
+    }
+
+    /// Returns a draw (Hz).
+    pub fn draw(&self, random: &mut impl Rng) -> f64 {
+        let normal: f64 = StandardNormal.sample(random);
+        // An error without a uniform part takes no further number.
+        let uniform = match self.half_width > 0.0 {
+            true => random.random_range(-1.0..=1.0),
+            false => 0.0,
+        };
+        self.normal * normal + self.half_width * uniform
+    }
+}
 
 /// Middle and 95 % interval of a parameter over the repetitions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -337,29 +425,26 @@ impl MonteCarlo {
     }
 }
 
-/// Repeats the estimate `samples` times with independent normal errors of the frequencies (Hz) of
-/// these standard deviations (Hz). The same seed gives the same answer.
+/// Repeats the estimate `samples` times with independent errors of the frequencies (Hz). The same seed gives the same
+/// answer.
 ///
 /// # Errors
-/// [`IdentifyError::Bounds`] unless there is one standard deviation for each frequency.
+/// [`IdentifyError::Bounds`] unless there is one error for each frequency.
 pub fn monte_carlo(
     frequencies: &[f64],
-    stds: &[f64],
+    errors: &[ReadingError],
     samples: usize,
     seed: u64,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Result<MonteCarlo, IdentifyError> {
-    check_bounds(frequencies, stds)?;
+    check_bounds(frequencies, errors)?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut found = Vec::with_capacity(samples);
     for _ in 0..samples {
         let disturbed: Vec<f64> = frequencies
             .iter()
-            .zip(stds)
-            .map(|(frequency, std)| {
-                let normal: f64 = StandardNormal.sample(&mut random);
-                frequency + std * normal
-            })
+            .zip(errors)
+            .map(|(frequency, error)| frequency + error.draw(&mut random))
             .collect();
         found.extend(estimator(&disturbed));
     }

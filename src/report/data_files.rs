@@ -195,6 +195,24 @@ pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportErro
             }
         }
     }
+    for found in document.resolution_span.iter().flatten() {
+        let Some(scale) = &found.common_scale else {
+            continue;
+        };
+        let percent = Some(scale.scale_percent);
+        let change = [scale.kx_percent, scale.ky_percent, scale.kz_percent];
+        let slope = [
+            scale.kx_percent_per_percent,
+            scale.ky_percent_per_percent,
+            scale.kz_percent_per_percent,
+        ];
+        for (name, values) in [
+            ("change by the tolerance (%)", change),
+            ("change per percent (%)", slope),
+        ] {
+            rows.push((found.method, "all modes", percent, None, name, values));
+        }
+    }
     for found in document.monte_carlo.iter().flatten() {
         let values = [found.kx, found.ky, found.kz];
         for (name, values) in [

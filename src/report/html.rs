@@ -184,6 +184,7 @@ fn model_sections<'a>(document: &Document) -> Vec<Section<'a>> {
                 tables::methods(document),
                 tables::prediction(document),
                 tables::lengths(document),
+                tables::free_test(document),
                 tables::pairs(document),
             ]),
             ..Section::default()

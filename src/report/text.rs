@@ -35,6 +35,7 @@ pub fn render_text(document: &Document) -> String {
         estimate(document),
         plain(tables::prediction(document)),
         noted(tables::lengths(document)),
+        noted(tables::free_test(document)),
         gap(document),
         joined([
             plain(tables::perturbation(document)),

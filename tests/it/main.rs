@@ -16,6 +16,7 @@ mod description_uncertainty;
 mod effects;
 mod errors;
 mod fastened;
+mod free_test;
 mod function_modes;
 mod gap;
 mod gap_advice;

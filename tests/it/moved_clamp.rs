@@ -168,6 +168,7 @@ fn read(length: f64, off: f64, count: usize, random: &mut ChaCha8Rng) -> Vec<Mea
 
 fn moved(length: f64, modes: Vec<MeasuredMode>) -> MovedClamp {
     MovedClamp {
+        attachments: Vec::new(),
         structure: strip(length),
         modes,
     }

@@ -103,6 +103,7 @@ fn observed(recordings: Vec<RecordingResult>) -> Observations {
         recordings,
         modes: Vec::new(),
         lengths: Vec::new(),
+        free_test: None,
         identification: None,
         verdicts: Vec::new(),
         warnings: Vec::new(),

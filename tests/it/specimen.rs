@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use std::f64::consts::PI;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{
-    Base, Body, Hinge, Joint, LapOverlap, Mesh, PointInertia, PointMass, PointSpring, Specimen,
-    SpecimenModes,
+    Base, Body, Hinge, Joint, LapLayout, LapOverlap, Mesh, PointInertia, PointMass, PointSpring,
+    Specimen, SpecimenModes,
 };
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, StructureError, mode_shapes, natural_frequencies,
@@ -398,6 +398,34 @@ fn limit_a_crack_at_the_root_softens_the_joint() {
         1e-6,
         "root",
     );
+}
+
+#[test]
+fn limit_masses_between_nodes_of_a_stocky_beam_are_right_to_one_in_ten_thousand() {
+    let strip = steel_strip();
+    let stocky = Beam {
+        thickness: 0.08 * strip.length,
+        ..strip
+    };
+    let units = StiffnessUnits::of(&stocky);
+    let joint = Joint {
+        kt: 1400.0 * units.kt,
+        kr: 5.0 * units.kr,
+        coupling: 0.0,
+    };
+    for share in [0.03, 0.1] {
+        // In the middle of an element, where the error is largest, and at the free end.
+        for place in [6.5 / 60.0, 30.5 / 60.0, 48.5 / 60.0, 59.5 / 60.0, 1.0] {
+            let (theory, layout) = (BeamTheory::Timoshenko, LapLayout::default());
+            let mut loaded =
+                Specimen::jointed(theory, &stocky, Assembly::Cantilever, &layout, Some(joint));
+            loaded.masses = vec![PointMass::new(place * stocky.length, share * stocky.mass())];
+            // Of so many elements this one has a node at each of these places.
+            let exact = frequencies(&loaded, 7, 480);
+            let found = frequencies(&loaded, 7, Mesh::DIAGNOSIS.elements);
+            assert_close(&found, &exact, 1e-4, &format!("{share} at {place}"));
+        }
+    }
 }
 
 #[test]

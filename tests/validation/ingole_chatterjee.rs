@@ -147,6 +147,49 @@ fn val_table_7_from_table_4() {
     );
 }
 
+/// What `reproduce` remarks on table 5: no lambda of mode 1 gives both of its stiffnesses.
+#[test]
+fn regress_no_first_lambda_gives_both_stiffnesses_of_table_5() {
+    let (kx, ky) = (969.8064, 1.2723);
+    let printed = [4.2335, 7.1398, 9.7724];
+    let estimate = |first: f64, others: [f64; 3]| {
+        let modes = ModeLambda::numbered(&[first, others[0], others[1], others[2]]);
+        let found = estimate_pairs(PairsModel::TwoParameter, &modes).unwrap();
+        (found.kx.unwrap(), found.ky.unwrap())
+    };
+    // The lambda that gives one of them, to seven digits, and what it makes of the other. Ky grows 64 times as fast as lambda.
+    let (found_kx, found_ky) = estimate(1.606_622, printed);
+    assert!((found_kx / kx - 1.0).abs() < 1e-4 && (found_ky - 1.241).abs() < 5e-4);
+    let (found_kx, found_ky) = estimate(1.607_254, printed);
+    assert!((found_ky / ky - 1.0).abs() < 1e-4 && (found_kx - 972.4).abs() < 0.1);
+    // From 1.55 to 1.66, 0.001 % apart: one of both is always off by 0.2 %, 20 times what a step moves.
+    for step in 0..11_000 {
+        let (found_kx, found_ky) = estimate(1.55 + 1e-5 * f64::from(step), printed);
+        let off = [found_kx / kx - 1.0, found_ky / ky - 1.0].map(f64::abs);
+        assert!(off[0].max(off[1]) > 2e-3, "{step}: {off:?}");
+    }
+    // Nor with the others at any end of their last digits: where Ky is as printed, Kx is not.
+    let half = 5e-5;
+    for pattern in 0..8 {
+        let others = [0, 1, 2].map(|index| {
+            let sign = if pattern >> index & 1 == 1 { 1.0 } else { -1.0 };
+            printed[index] + sign * half
+        });
+        // Ky rises with lambda.
+        let (mut low, mut high) = (1.60, 1.62);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            match estimate(middle, others).1 < ky {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let (found_kx, found_ky) = estimate(low, others);
+        assert!((found_ky - ky).abs() < 1e-9);
+        assert!((972.2..972.7).contains(&found_kx), "{found_kx}");
+    }
+}
+
 #[test]
 fn val_estimated_joints_put_back_into_the_exact_equation() {
     let beam = Beam {

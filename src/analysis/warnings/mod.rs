@@ -254,9 +254,9 @@ impl Warning {
         }
     }
 
-    /// The doubt about the beam where its clamp was moved, in these words: "free length 0.2 m".
+    /// The doubt about a part of the test, in these words: "free length 0.2 m", "free test free.toml".
     #[must_use]
-    pub(super) fn of_length(self, words: &str) -> Self {
+    pub(super) fn of_part(self, words: &str) -> Self {
         Warning {
             sentence: format!("{words}: {}", self.sentence),
             ..self

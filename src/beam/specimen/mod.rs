@@ -147,7 +147,8 @@ pub struct Mesh {
 
 impl Mesh {
     /// For repeated solutions: with 60 elements seven frequencies are right to 1e-6, of a beam that its width stiffens
-    /// to 4e-6.
+    /// to 4e-6. A mass of a tenth of the beam, between nodes of a stocky beam (thickness 0.08 of the length), leaves 5e-5 in the
+    /// seventh mode, of half the beam 3e-4. Nodes stay where they are, so that frequencies are smooth in the place of a mass.
     pub const DIAGNOSIS: Self = Self { elements: 60 };
     /// For a reference: with 200 elements the first seven frequencies are right to 1e-8, beyond
     /// which rounding takes over; of a beam that its width stiffens to 2e-7.

@@ -412,6 +412,13 @@ impl Model {
         2 * (self.runs.len() - 1) + loose
     }
 
+    /// Returns true where the joint hardly withstands rigid motions: the lowest eigenvalue is then so far below the others that
+    /// rounding spoils them.
+    pub(super) fn is_weakly_held(&self) -> bool {
+        const WEAK: f64 = 1e-2;
+        (0..2).any(|i| self.joint[i][i] < WEAK)
+    }
+
     /// Returns true where something beside the joint withstands rigid motions.
     pub(super) fn is_supported(&self) -> bool {
         !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)

@@ -3,13 +3,17 @@
 use super::model::{Energies, Model, Motion};
 use super::{Mesh, Specimen};
 use crate::StructureError;
-use crate::eigen::{Eigenpairs, dot, lowest_pairs};
+use crate::eigen::{BandedMatrix, Eigenpairs, dot, lowest_pairs};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::f64::consts::PI;
 
 /// Added to a singular stiffness matrix, in units of mass: about the first elastic eigenvalue of a
 /// free beam, lambda^4 = 500.
 pub(crate) const SHIFT: f64 = 500.0;
+
+/// Added where the joint is so weak that rounding would spoil what it leaves of the stiffness matrix: its motions have
+/// eigenvalues below this one.
+const SMALL_SHIFT: f64 = 1.0;
 
 /// Below this eigenvalue (the first elastic one of a free beam is 500) nothing withstands a motion.
 const NO_STIFFNESS: f64 = 1e-6;
@@ -54,6 +58,50 @@ impl Mode {
     }
 }
 
+/// Makes the motions of a weak joint anew from their span: one inverse iteration frees them from what is left of elastic
+/// motions, whose energy would hide that of the joint, and Ritz's method separates them from each other. They stay as they
+/// are where either fails.
+fn refine(model: &Model, [stiffness, mass]: [&BandedMatrix; 2], vectors: &mut [Vec<f64>]) {
+    if vectors.is_empty() {
+        return;
+    }
+    let Some(factor) = stiffness.plus(SMALL_SHIFT, mass).cholesky() else {
+        return;
+    };
+    let mut motions = Vec::with_capacity(vectors.len());
+    for vector in vectors.iter() {
+        let mut answer = mass.times(vector);
+        factor.solve_lower(&mut answer);
+        factor.solve_upper(&mut answer);
+        motions.push(model.motion(&answer));
+    }
+    let count = motions.len();
+    let (mut strain, mut kinetic) = (DMatrix::zeros(count, count), DMatrix::zeros(count, count));
+    for (row, a) in motions.iter().enumerate() {
+        for (column, b) in motions.iter().enumerate() {
+            [strain[(row, column)], kinetic[(row, column)]] = model.products(a, b);
+        }
+    }
+    let lower = kinetic.cholesky().map(|factor| factor.l());
+    let Some(inverse) = lower.and_then(|lower| lower.try_inverse()) else {
+        return;
+    };
+    let reduced = &inverse * strain * inverse.transpose();
+    let Some(eigen) = SymmetricEigen::try_new(reduced, f64::EPSILON, 1000) else {
+        return;
+    };
+    let shapes = inverse.transpose() * eigen.eigenvectors;
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    for (vector, column) in vectors.iter_mut().zip(order) {
+        let mut sum = motions[0].clone().scaled(shapes[(0, column)]);
+        for (row, motion) in motions.iter().enumerate().skip(1) {
+            sum = sum.plus(shapes[(row, column)], motion);
+        }
+        *vector = model.vector(&sum);
+    }
+}
+
 impl SpecimenModes {
     pub(super) fn new(
         specimen: &Specimen,
@@ -63,11 +111,19 @@ impl SpecimenModes {
         let model = Model::new(specimen, &mesh.divide(&specimen.body))?;
         let (stiffness, mass) = model.matrices();
         let rigid = model.rigid_motions();
-        let shift = if rigid > 0 { SHIFT } else { 0.0 };
+        let shift = match rigid {
+            0 if model.is_weakly_held() => SMALL_SHIFT,
+            0 => 0.0,
+            _ => SHIFT,
+        };
         let highest = model.highest_square();
         let locked = model.locked_motions();
-        let Eigenpairs { values, vectors } =
-            lowest_pairs(&stiffness, &mass, shift, highest, &locked, count + rigid)?;
+        let mut pairs = lowest_pairs(&stiffness, &mass, shift, highest, &locked, count + rigid)?;
+        if shift == SMALL_SHIFT {
+            let soft = pairs.values.partition_point(|value| *value < shift);
+            refine(&model, [&stiffness, &mass], &mut pairs.vectors[..soft]);
+        }
+        let Eigenpairs { values, vectors } = pairs;
         // Rounding moves each value by some parts in 1e16 of the highest one.
         let rounding = NO_STIFFNESS + 1e-7 * SHIFT + 1e-15 * highest;
         let slow = &values[..rigid];

@@ -6,12 +6,12 @@ use super::problem::{
     ROUGH, along, everywhere, promising, value_along, within_bounds,
 };
 use super::uncertainty::{
-    BudgetInput, DescriptionPull, LEAST_DISCREPANCY, UncertainInput, attachment_inputs,
-    discrepancy, joint_near, whitening, width_inputs,
+    AttachmentTolerance, BudgetInput, DescriptionPull, LEAST_DISCREPANCY, UncertainInput,
+    attachment_inputs, discrepancy, joint_near, whitening, width_inputs,
 };
 use super::{ConsistentSettings, Goodness, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
-use crate::perturbation::MonteCarlo;
+use crate::perturbation::{MonteCarlo, ReadingError};
 use crate::{IdentifyError, MeasuredMode, Stiffnesses};
 use nalgebra::DVector;
 use rand::SeedableRng;
@@ -32,6 +32,8 @@ pub struct ConsistentEstimator {
     pub(super) modes: Vec<MeasuredMode>,
     /// Index of the model of each mode.
     pub(super) structures: Vec<usize>,
+    /// Standard uncertainties of the masses on the structure of each model.
+    attachments: Vec<Vec<AttachmentTolerance>>,
     pub(super) base: Point,
     /// Parameters estimated along with the joint, with their prior.
     pub(super) nuisances: Vec<(Parameter, f64)>,
@@ -66,6 +68,8 @@ pub struct MovedClamp {
     pub structure: JointedStructure,
     /// Its modes.
     pub modes: Vec<MeasuredMode>,
+    /// Standard uncertainties of the masses on it, in their order.
+    pub attachments: Vec<AttachmentTolerance>,
 }
 
 /// Start of repetitions of an estimate: the minima of a first one, and the body as it belongs to the
@@ -146,12 +150,14 @@ impl ConsistentEstimator {
         check(structure, &all, settings)?;
         let mut models = vec![FrequencyModel::new(structure, model_modes(modes))?];
         let mut structures = vec![0; modes.len()];
+        let mut attachments = vec![settings.attachments.clone()];
         let mut base = models[0].nominal();
         for (moved, length) in moved.iter().zip(&Parameter::LENGTHS[1..]) {
             let model = FrequencyModel::new(&moved.structure, model_modes(&moved.modes))?;
             base[length.index()] = moved.structure.beam.length.ln();
             structures.extend(vec![models.len(); moved.modes.len()]);
             models.push(model.of_length(*length));
+            attachments.push(moved.attachments.clone());
         }
         if structure.assembly != Assembly::Free {
             let held = settings.held;
@@ -186,6 +192,7 @@ impl ConsistentEstimator {
             settings: settings.clone(),
             modes: all,
             structures,
+            attachments,
             base,
             inputs: Vec::new(),
             discrepancy: 0.0,
@@ -286,8 +293,21 @@ impl ConsistentEstimator {
             let numbers: Vec<usize> = own.map(|(mode, _)| mode.mode).collect();
             let structure = model.structure();
             let joint = (structure.assembly != Assembly::Free).then(|| joint_near(point));
-            let attachments = &self.settings.attachments;
+            let attachments = &self.attachments[index];
             let mut found = attachment_inputs(structure, joint, &numbers, attachments);
+            // In the test of the free bar a mass sits at a place of its own, and may be another one of the same name.
+            if index > 0 && structure.assembly == Assembly::Free {
+                for input in &mut found {
+                    let is_same = all.iter().any(|known| {
+                        known.name == input.name
+                            && known.stated == input.stated
+                            && known.std == input.std
+                    });
+                    if !(input.is_mass && is_same) {
+                        input.name.push_str(" in the free test");
+                    }
+                }
+            }
             let poisson = self.settings.tolerances.poisson.unwrap_or(0.0);
             found.extend(width_inputs(structure, joint, &numbers, poisson));
             // The same mass loads every structure that it sits on.
@@ -721,8 +741,9 @@ impl ConsistentEstimator {
 const CHUNK: usize = 256;
 
 impl ConsistentEstimator {
-    /// Repeats the estimate `samples` times with independent normal errors. The frequencies have their stated
-    /// standard deviations and the discrepancy, the beam's properties and the inputs their tolerances. Each repetition starts from those minima of the
+    /// Repeats the estimate `samples` times with independent errors. The frequencies have their stated
+    /// standard deviations and the discrepancy. `half_widths` (Hz), in the order of [`Self::frequencies`], say which
+    /// part of each is uniform; what is not listed is normal. The beam's properties and the inputs their tolerances. Each repetition starts from those minima of the
     /// first estimate that its errors can make the deepest, four at most. The body is that of the first estimate, and
     /// changes of the beam are followed to first order. This leaves less than a thousandth of a standard deviation.
     /// The result depends on the seed, not on the number of threads. Repetitions that do not converge count as
@@ -733,15 +754,17 @@ impl ConsistentEstimator {
     pub fn monte_carlo(
         &self,
         near: &Neighbourhood,
+        half_widths: &[f64],
         samples: usize,
         seed: u64,
     ) -> Result<MonteCarlo, IdentifyError> {
         let mut errors = Vec::with_capacity(self.modes.len());
-        for mode in &self.modes {
+        for (index, mode) in self.modes.iter().enumerate() {
             let std = mode.std.filter(|std| std.is_finite());
             let std = std.ok_or(IdentifyError::NoUncertainty { mode: mode.mode })?;
-            let std = std.hypot(self.discrepancy * mode.frequency);
-            errors.push((mode.frequency, std));
+            let half_width = half_widths.get(index).copied().unwrap_or(0.0);
+            let error = ReadingError::new(std, half_width);
+            errors.push(error.with_normal(self.discrepancy * mode.frequency));
         }
         let chunks: Vec<Vec<Stiffnesses>> = (0..samples.div_ceil(CHUNK))
             .into_par_iter()
@@ -758,33 +781,32 @@ impl ConsistentEstimator {
     /// Returns the stiffnesses of those of `count` repetitions that converge.
     fn repeat(
         &self,
-        random: ChaCha8Rng,
+        mut random: ChaCha8Rng,
         count: usize,
-        errors: &[(f64, f64)],
+        errors: &[ReadingError],
         near: &Neighbourhood,
     ) -> Vec<Stiffnesses> {
         let models = near.models.as_ref().unwrap_or(&self.models);
         let stated = self.problem(models, &self.frequencies());
-        let mut normal = StandardNormal.sample_iter(random);
         let mut found = Vec::with_capacity(count);
         for _ in 0..count {
             let mut problem = stated.clone();
             let mut moved: f64 = 0.0;
-            let read = problem.data.iter_mut().zip(errors);
-            for ((datum, (mean, std)), error) in read.zip(&mut normal) {
-                let error: f64 = error;
-                datum.frequency = mean + std * error;
-                moved = moved.hypot(std * error / datum.std);
+            for (datum, error) in problem.data.iter_mut().zip(errors) {
+                let error = error.draw(&mut random);
+                datum.frequency += error;
+                moved = moved.hypot(error / datum.std);
             }
-            for (input, error) in self.inputs.iter().zip(&mut normal) {
-                let error: f64 = error;
+            for input in &self.inputs {
+                let error: f64 = StandardNormal.sample(&mut random);
                 for (datum, change) in problem.data.iter_mut().zip(&input.changes) {
                     datum.frequency *= 1.0 + change * error;
                 }
                 moved = moved.hypot(error);
             }
             // A stated property of the beam is a reading too, with its own error.
-            for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {
+            for prior in &mut problem.priors {
+                let error: f64 = StandardNormal.sample(&mut random);
                 prior.value += prior.std * error;
                 moved = moved.hypot(error);
             }

@@ -14,20 +14,20 @@ pub use measured::{
 };
 pub use model::{
     Baseline, BaselineSection, BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection,
-    FromReadings, GapPlaceSection, GapSection, HeadlineSection, HeadlineValue,
+    FreeTestSection, FromReadings, GapPlaceSection, GapSection, HeadlineSection, HeadlineValue,
     IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
     UpdatedModelSection, gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
-    AverageSection, Conditions, EstimateMethod, FrfResonance, MonteCarloSection,
-    PerturbationSection, ResolutionSpanSection, SensitivitySection,
+    AverageSection, CommonScaleSection, Conditions, EstimateMethod, FrfResonance,
+    MonteCarloSection, PerturbationSection, ResolutionSpanSection, SensitivitySection,
 };
 pub use tapjoint_identify::Uncertain;
 pub use tapjoint_signal::modal::ReadBy;
 
 use crate::format::with_minus_signs;
-use model::{estimate_section, lengths_of};
+use model::{estimate_section, free_test_of, lengths_of};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_analysis::{
@@ -61,6 +61,9 @@ pub struct Document {
     /// Resonances of the beam at its other free lengths, where the clamp was moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Vec<LengthSection>>,
+    /// The test of the same bar without its joint, whose frequencies enter the estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_test: Option<FreeTestSection>,
     /// Frequency response functions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frfs: Option<Vec<FrfSection>>,
@@ -199,6 +202,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
         recordings: (!analysis.recordings.is_empty()).then(|| recordings.collect()),
         modes: Some(modes.collect()),
         lengths: lengths_of(analysis),
+        free_test: free_test_of(analysis),
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification.map(|found| predictions(&found.prediction)),

@@ -359,30 +359,68 @@ pub struct LengthSection {
     pub prediction: Vec<PredictionSection>,
 }
 
-/// Returns the sections of other free lengths; `None` without any.
-pub(super) fn lengths_of(analysis: &Analysis) -> Option<Vec<LengthSection>> {
+/// The test of the same bar without its joint. Its frequencies enter the same estimate.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct FreeTestSection {
+    /// Its description.
+    pub file: String,
+    /// Length of the bar (m).
+    pub length: f64,
+    /// Its recordings.
+    pub recordings: Vec<String>,
+    /// Its resonances, ascending.
+    pub modes: Vec<ModeSection>,
+    /// The modes that entered the estimate beside their predictions by it; empty without an estimate, and with relative
+    /// weights, where the free bar tells nothing.
+    pub prediction: Vec<PredictionSection>,
+}
+
+/// Returns the section of the free bar's test; `None` without one.
+pub(super) fn free_test_of(analysis: &Analysis) -> Option<FreeTestSection> {
+    let free = analysis.free_test.as_ref()?;
+    let modes = free.modes.iter();
+    // Its structure follows those of other free lengths.
+    let structure = 1 + analysis.lengths.len();
+    Some(FreeTestSection {
+        file: free.file.clone(),
+        length: free.bar.structure.beam.length,
+        recordings: free.recordings.iter().map(|one| one.file.clone()).collect(),
+        modes: modes
+            .map(|mode| ModeSection::of(mode, &free.recordings))
+            .collect(),
+        prediction: predicted_of(analysis, structure, &free.bar.structure.beam),
+    })
+}
+
+/// Returns the fitted modes of one structure of the estimate beside their predictions; `beam` is its own.
+fn predicted_of(analysis: &Analysis, structure: usize, beam: &Beam) -> Vec<PredictionSection> {
     let found = analysis.identification.as_ref();
     let estimate = found.and_then(|found| found.consistent.as_ref());
+    let fitted = estimate.into_iter().flat_map(|estimate| &estimate.modes);
+    let fitted = fitted.filter(|mode| mode.structure == structure);
+    let rows = fitted.map(|mode| PredictionSection {
+        mode: mode.mode,
+        measured: Some(mode.measured),
+        predicted: Some(mode.predicted),
+        lambda: Some(beam.lambda_of(mode.predicted)),
+        error_percent: Some(mode.error_percent),
+        used: true,
+    });
+    rows.collect()
+}
+
+/// Returns the sections of other free lengths; `None` without any.
+pub(super) fn lengths_of(analysis: &Analysis) -> Option<Vec<LengthSection>> {
     let mut sections = Vec::with_capacity(analysis.lengths.len());
     for (structure, own) in (1..).zip(&analysis.lengths) {
         let modes = own.modes.iter();
-        let fitted = estimate.iter().flat_map(|estimate| &estimate.modes);
-        let fitted = fitted.filter(|mode| mode.structure == structure);
-        let prediction = fitted.map(|mode| PredictionSection {
-            mode: mode.mode,
-            measured: Some(mode.measured),
-            predicted: Some(mode.predicted),
-            lambda: Some(own.structure.beam.lambda_of(mode.predicted)),
-            error_percent: Some(mode.error_percent),
-            used: true,
-        });
         sections.push(LengthSection {
             length: own.length,
             recordings: own.recordings.clone(),
             modes: modes
                 .map(|mode| ModeSection::of(mode, &analysis.recordings))
                 .collect(),
-            prediction: prediction.collect(),
+            prediction: predicted_of(analysis, structure, &own.structure.beam),
         });
     }
     (!sections.is_empty()).then_some(sections)

@@ -530,7 +530,7 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
     });
     let failed = list.iter().map(|found| (found.method, found.failed));
     let mut note = format!(
-        "{} draws, each frequency with its own standard deviation.{}",
+        "{} draws, each frequency with its own standard deviation: uniform within half a line where it was read on one, else normal.{}",
         list.first().map_or(0, |found| found.samples),
         failures(&failed.collect::<Vec<_>>(), " and are left out")
     );
@@ -625,7 +625,8 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
     }
     let with_kz = ordered.iter().any(|(_, row)| row.kz_percent.is_some());
     let names = if with_kz { &NAMES[..] } else { &NAMES[..2] };
-    let rows = ordered.into_iter().map(|(span, row)| {
+    let mut rows: Vec<Vec<Cell>> = Vec::with_capacity(ordered.len() + list.len());
+    for (span, row) in ordered {
         let mode = mode_of(document, row.mode).filter(|mode| mode.frequency > 0.0);
         let percent = mode.map(|mode| 100.0 * row.half_line / mode.frequency);
         let mut cells = vec![
@@ -641,8 +642,8 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
                 signed_percent(percent),
             ));
         }
-        cells
-    });
+        rows.push(cells);
+    }
     let mut notes = Vec::new();
     for span in list {
         let drivers = drivers(&span.sensitivity, names);
@@ -656,6 +657,33 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
                 ),
             });
         }
+    }
+    let of_scale = list
+        .iter()
+        .filter_map(|span| Some((span.method, span.common_scale.as_ref()?)));
+    let of_scale = side_by_side(of_scale, |_| 0, |row| row.0);
+    if !of_scale.is_empty() {
+        notes.push(
+            "All: every frequency is off by one factor, the standard uncertainty of the bar's own scale by the description, \
+             h/L\u{b2} sqrt(E/\u{3c1})."
+                .to_owned(),
+        );
+    }
+    for (method, scale) in of_scale {
+        let mut cells = vec![
+            number("Mode", "all"),
+            by_method(method, &methods),
+            number("Bound (Hz)", MISSING),
+            number("Bound (%)", bound_percent(scale.scale_percent)),
+        ];
+        let moves = [scale.kx_percent, scale.ky_percent, scale.kz_percent];
+        for (name, percent) in names.iter().zip(moves) {
+            cells.push(number(
+                &format!("{name} moves (%)"),
+                signed_percent(percent),
+            ));
+        }
+        rows.push(cells);
     }
     Some(Table::of(
         "Which mode drives which parameter",

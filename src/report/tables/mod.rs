@@ -12,7 +12,7 @@ pub use joint::{
     pairs, parameters, perturbation, sensitivity, set_up_words, spans,
 };
 pub use modes::{
-    fitted_to, frfs, left_out, lengths, mode_details, modes, modes_from, prediction,
+    fitted_to, free_test, frfs, left_out, lengths, mode_details, modes, modes_from, prediction,
     reading_details, readings,
 };
 pub use recordings::{

@@ -4,7 +4,7 @@ use super::{
     Cell, Place, Table, bound_of, coherence, mode_name, mode_of, number, page_number, page_words,
     words,
 };
-use crate::document::{Document, ModeSection, ReadBy, is_strong, method_name};
+use crate::document::{Document, ModeSection, PredictionSection, ReadBy, is_strong, method_name};
 use crate::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
@@ -126,32 +126,61 @@ pub fn modes_from(document: &Document) -> Option<String> {
 pub fn lengths(document: &Document) -> Option<Table> {
     let lengths = document.lengths.as_deref()?.iter();
     let rows = lengths.flat_map(|length| {
-        let modes = length.modes.iter().filter(|mode| mode.mode.is_some());
-        modes.map(|mode| {
-            let mut fitted = length.prediction.iter();
-            let fitted = fitted.find(|row| Some(row.mode) == mode.mode);
-            let value = reading(mode).value;
-            let predicted = fitted.and_then(|row| row.predicted);
-            [
-                number("Free length (m)", trimmed(length.length, 6)),
-                number("Mode", or_missing(mode.mode)),
-                number("Measured (Hz)", value.clone()),
-                number(
-                    "Predicted (Hz)",
-                    or_missing(predicted.map(|hz| with_decimals_of(hz, &value))),
-                ),
-                number(
-                    "Error (%)",
-                    signed_percent(fitted.and_then(|row| row.error_percent)),
-                ),
-                words("Recording", or_missing(mode.recording.as_ref())),
-            ]
-        })
+        let (modes, prediction) = (&length.modes, &length.prediction);
+        beside_prediction("Free length (m)", length.length, modes, prediction)
     });
     let note = "The same joint holds the beam at each length, and all lengths enter one estimate. The diagnosis takes the \
                 recordings of the beam's own length alone.";
     let rows: Vec<_> = rows.collect();
     (!rows.is_empty()).then(|| Table::of("Modes where the clamp was moved", rows, note))
+}
+
+/// Measured beside predicted frequencies of the same bar without its joint; `None` without its test.
+pub fn free_test(document: &Document) -> Option<Table> {
+    let free = document.free_test.as_ref()?;
+    let rows = beside_prediction("Length (m)", free.length, &free.modes, &free.prediction);
+    let used = match free.prediction.is_empty() {
+        true => {
+            "They are not used: without uncertainties of the frequencies the free bar tells nothing."
+        }
+        false => "They enter the estimate as data, and tell how stiff and heavy the bar is.",
+    };
+    let note = format!(
+        "Frequencies of the same bar without its joint, by {}. {used}",
+        free.file
+    );
+    (!rows.is_empty()).then(|| Table::of("Modes of the free bar", rows, &note))
+}
+
+/// Returns a row for each numbered mode, measured beside predicted, and the length (m) that all have.
+fn beside_prediction(
+    heading: &str,
+    length: f64,
+    modes: &[ModeSection],
+    prediction: &[PredictionSection],
+) -> Vec<[Cell; 6]> {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let rows = numbered.map(|mode| {
+        let mut fitted = prediction.iter();
+        let fitted = fitted.find(|row| Some(row.mode) == mode.mode);
+        let value = reading(mode).value;
+        let predicted = fitted.and_then(|row| row.predicted);
+        [
+            number(heading, trimmed(length, 6)),
+            number("Mode", or_missing(mode.mode)),
+            number("Measured (Hz)", value.clone()),
+            number(
+                "Predicted (Hz)",
+                or_missing(predicted.map(|hz| with_decimals_of(hz, &value))),
+            ),
+            number(
+                "Error (%)",
+                signed_percent(fitted.and_then(|row| row.error_percent)),
+            ),
+            words("Recording", or_missing(mode.recording.as_ref())),
+        ]
+    });
+    rows.collect()
 }
 
 /// Details of the reading of each resonance of the merged list; `None` where nothing is known but the reading

@@ -30,6 +30,7 @@ pub fn document() -> Document {
     Document {
         mode_shapes: None,
         lengths: None,
+        free_test: None,
         frfs: None,
         monte_carlo: None,
         perturbation_averages: None,
@@ -314,6 +315,12 @@ fn span() -> ResolutionSpanSection {
                 ..SensitivitySection::default()
             })
             .collect(),
+        common_scale: Some(CommonScaleSection {
+            scale_percent: 0.8,
+            kx_percent: Some(3.2),
+            ky_percent: Some(-5.2),
+            ..CommonScaleSection::default()
+        }),
     }
 }
 

@@ -50,9 +50,9 @@ pub use observations::{diagnose_test, nominal, nominal_with, observations, read_
 use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{
-    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult,
-    MonteCarloSection, MovedLength, PerturbationSection, Perturbations, ResolutionSpanSection,
-    SensitivitySection,
+    AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification, LeftOutMode,
+    ModeResult, MonteCarloSection, MovedLength, PerturbationSection, Perturbations,
+    ResolutionSpanSection, SensitivitySection,
 };
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,

@@ -196,6 +196,7 @@ fn free_bar(
                 std: Some(*std),
             })
             .collect(),
+        attachments: Vec::new(),
     }
 }
 

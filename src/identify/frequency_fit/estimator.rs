@@ -6,8 +6,8 @@ use super::problem::{
     ROUGH, along, everywhere, promising, value_along, within_bounds,
 };
 use super::uncertainty::{
-    BudgetInput, DescriptionPull, LEAST_DISCREPANCY, UncertainInput, attachment_inputs,
-    discrepancy, joint_near, whitening, width_inputs,
+    AttachmentTolerance, BudgetInput, DescriptionPull, LEAST_DISCREPANCY, UncertainInput,
+    attachment_inputs, discrepancy, joint_near, whitening, width_inputs,
 };
 use super::{ConsistentSettings, Goodness, Limit, Quantity, ResidualWeights, joint_at, limit_of};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
@@ -32,6 +32,8 @@ pub struct ConsistentEstimator {
     pub(super) modes: Vec<MeasuredMode>,
     /// Index of the model of each mode.
     pub(super) structures: Vec<usize>,
+    /// Uncertainties of the masses of each model.
+    attachments: Vec<Vec<AttachmentTolerance>>,
     pub(super) base: Point,
     /// Parameters estimated along with the joint, with their prior.
     pub(super) nuisances: Vec<(Parameter, f64)>,
@@ -52,9 +54,9 @@ pub struct PointFit {
     pub point: Point,
     /// Sum of the squared residuals there; infinite where no start leads to a minimum.
     pub misfit: f64,
-    /// Standard deviations of the estimated coordinates (1, logarithms and atanh), in the order of
-    /// the fit; `None` where nothing is known.
-    pub stds: Vec<Option<f64>>,
+    /// Covariance of the estimated coordinates (1, logarithms and atanh), in the order of the fit; infinite where nothing is
+    /// known.
+    pub covariance: Vec<Vec<f64>>,
     /// Reason for which the search ended.
     pub stop: StopReason,
 }
@@ -66,6 +68,8 @@ pub struct MovedClamp {
     pub structure: JointedStructure,
     /// Its modes.
     pub modes: Vec<MeasuredMode>,
+    /// Uncertainties of its masses, in their order. One with the name of another length's is the same mass and error of place.
+    pub attachments: Vec<AttachmentTolerance>,
 }
 
 /// Start of repetitions of an estimate: the minima of a first one, and the body as it belongs to the
@@ -106,6 +110,14 @@ impl PointFit {
     /// Returns the non-dimensional joint; a direction that is held rigid is infinite.
     pub fn joint(&self) -> JointStiffness {
         joint_at(&self.point)
+    }
+
+    /// Returns the standard deviations of the estimated coordinates; `None` where nothing is known.
+    pub fn stds(&self) -> Vec<Option<f64>> {
+        let rows = self.covariance.iter().enumerate();
+        let stds = rows.map(|(index, row)| row[index].sqrt());
+        stds.map(|std| Some(std).filter(|std| std.is_finite()))
+            .collect()
     }
 }
 
@@ -180,8 +192,11 @@ impl ConsistentEstimator {
                 nuisances.extend(tolerance.map(|std| (length, std * ratio)));
             }
         }
+        let of_moved = moved.iter().map(|moved| moved.attachments.clone());
+        let attachments = [settings.attachments.clone()].into_iter().chain(of_moved);
         Ok(Self {
             nuisances,
+            attachments: attachments.collect(),
             models,
             settings: settings.clone(),
             modes: all,
@@ -262,7 +277,7 @@ impl ConsistentEstimator {
             // A residual is predicted less measured: an input that raises the frequencies lowers it.
             let pull = -(triangle * change).dot(&residuals);
             pulls.push(DescriptionPull {
-                input: BudgetInput::Attachment(input.name.clone()),
+                input: input.input.clone(),
                 stated: input.stated,
                 fitted: input.stated + pull * input.std,
                 pull,
@@ -286,7 +301,7 @@ impl ConsistentEstimator {
             let numbers: Vec<usize> = own.map(|(mode, _)| mode.mode).collect();
             let structure = model.structure();
             let joint = (structure.assembly != Assembly::Free).then(|| joint_near(point));
-            let attachments = &self.settings.attachments;
+            let attachments = &self.attachments[index];
             let mut found = attachment_inputs(structure, joint, &numbers, attachments);
             let poisson = self.settings.tolerances.poisson.unwrap_or(0.0);
             found.extend(width_inputs(structure, joint, &numbers, poisson));
@@ -298,7 +313,7 @@ impl ConsistentEstimator {
                 .count();
             let total = self.modes.len();
             for input in found {
-                let known = all.iter_mut().find(|known| known.name == input.name);
+                let known = all.iter_mut().find(|known| known.input == input.input);
                 match known {
                     Some(known) => {
                         known.changes[before..before + numbers.len()]
@@ -480,18 +495,28 @@ impl ConsistentEstimator {
         let best = minima.into_iter().next().map(|best| {
             let directions = self.directions();
             let covariance = Covariance::new(&best.state.jacobian, &directions);
-            let fitted = directions.iter().take(self.settings.fit.len());
+            let fitted = &directions[..self.settings.fit.len()];
+            let rows = fitted.iter().map(|first| {
+                let row = fitted.iter().map(|second| {
+                    let is_known = [first, second].map(|one| covariance.std(one).is_some());
+                    match is_known {
+                        [true, true] => covariance.between(first, second),
+                        _ => f64::INFINITY,
+                    }
+                });
+                row.collect()
+            });
             PointFit {
                 point: best.state.point,
                 misfit: best.state.cost,
-                stds: fitted.map(|direction| covariance.std(direction)).collect(),
+                covariance: rows.collect(),
                 stop: best.stop,
             }
         });
         best.unwrap_or(PointFit {
             point: self.base,
             misfit: f64::INFINITY,
-            stds: Vec::new(),
+            covariance: Vec::new(),
             stop: StopReason::NothingFree,
         })
     }

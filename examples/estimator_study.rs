@@ -103,13 +103,13 @@ fn exact_error(model: PairsModel, index: usize) -> Option<(f64, f64, f64)> {
     let fit = estimator.fit();
     let (found, truth) = (coordinates(&fit.joint()), coordinates(&case.joint));
     let mut worst = (0.0f64, 0.0f64);
-    for ((found, truth), std) in found.iter().zip(truth).zip(&fit.stds) {
+    for ((found, truth), std) in found.iter().zip(truth).zip(fit.stds()) {
         // Of unit relative errors; what rounding does to this parameter.
         let allowed = (ROUNDING * std.unwrap_or(f64::INFINITY)).max(1e-8);
         let error = (found - truth).abs();
         worst = (worst.0.max(error / allowed), worst.1.max(error));
     }
-    let condition = fit.stds.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
+    let condition = fit.stds().iter().flatten().fold(0.0f64, |a, b| a.max(*b));
     Some((worst.0, worst.1, condition))
 }
 
@@ -163,7 +163,7 @@ fn noisy_case(model: PairsModel, noise: f64, index: usize) -> Option<[Option<Sam
     let mut samples = [None; 3];
     let quantities = [Quantity::Kx, Quantity::Ky, Quantity::Coupling];
     for (index, quantity) in quantities.into_iter().enumerate() {
-        let std = at_truth.stds.get(index).copied().flatten();
+        let std = at_truth.stds().get(index).copied().flatten();
         samples[index] = std.and_then(|std| {
             let scale = if index == 2 {
                 1.0 - truth[2].powi(2)

@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
 use tapjoint_identify::consistent::{
-    ConsistentEstimate, ConsistentEstimator, MovedClamp, PointFit,
+    ConsistentEstimate, ConsistentEstimator, LeftOutAnswer, MovedClamp, PointFit,
 };
 use tapjoint_identify::perturbation::{
     ReadingError, SIGN_PATTERN_MODES, average_errors, common_sensitivity, mode_sensitivities,
@@ -90,9 +90,10 @@ pub fn identify(
     let floor = settings.frequency_floor;
     let mut measured = measured_modes(modes, scatter, floor);
     let fit_modes = settings.fit_modes.unwrap_or(usize::MAX);
-    let set_ups = match settings.method {
-        EstimateMethod::Consistent => fitted_set_ups(structure, modes, settings),
-        _ => Vec::new(),
+    let is_consistent = settings.method == EstimateMethod::Consistent;
+    let set_ups = match is_consistent {
+        true => fitted_set_ups(structure, modes, settings, None),
+        false => Vec::new(),
     };
     if !set_ups.is_empty() {
         // The joint between the set-ups: each mode's best reading may be of another one.
@@ -109,35 +110,25 @@ pub fn identify(
         moved.push(MovedClamp {
             structure: length.structure.clone(),
             modes: own,
-            attachments: settings.details.attachments.clone(),
+            attachments: length.attachments.clone(),
         });
     }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     let (mut from_readings, mut left_out, mut better_numbers) = (None, None, None);
-    if settings.method == EstimateMethod::Consistent {
+    if is_consistent {
         let details = &settings.details;
-        let mut estimated = settled(structure, details, &used, &moved, &set_ups);
-        if let Ok((all, estimate)) = &estimated {
-            better_numbers = better_numbering(structure, details, &used, &moved, estimate);
-            if let Some(found) = all.outlying_mode() {
-                let mut rest = used.clone();
-                rest.retain(|mode| mode.mode != found.mode);
-                if let Ok(without) = settled(structure, details, &rest, &moved, &set_ups) {
-                    left_out = Some(LeftOutMode {
-                        found,
-                        with_all: Box::new(estimate.clone()),
-                    });
-                    used = rest;
-                    estimated = Ok(without);
-                }
-            }
-        }
-        match estimated {
-            Ok((found, estimate)) => {
-                estimator = Some(found);
-                consistent = Some(Box::new(estimate));
+        match settled(structure, details, &used, &moved, &set_ups) {
+            Ok((all, estimate)) => {
+                better_numbers = better_numbering(structure, details, &used, &moved, &estimate);
+                let answers = left_out_answers(structure, modes, settings, &all);
+                (left_out, consistent) = joined(answers, estimate);
+                estimator = Some(all);
             }
             Err(error) => refused = Some(error.to_string()),
+        }
+        if let Some(LeftOutMode { found, .. }) = &left_out {
+            used.retain(|mode| mode.mode != found.mode);
+            estimator = estimator.map(|all| all.without(found.mode).settled());
         }
         let exact = estimator_of_lengths(structure, &details.exact(), &used, &moved);
         let exact = exact.and_then(|exact| exact.estimate());
@@ -220,6 +211,42 @@ fn settled(
     Ok((estimator, estimate))
 }
 
+/// Returns the estimates without each of the modes that may not belong to the others, the most probable first; none where all
+/// belong together. `all` is the estimator of all modes.
+fn left_out_answers(
+    structure: &TestedStructure,
+    modes: &[ModeResult],
+    settings: &IdentifySettings,
+    all: &ConsistentEstimator,
+) -> Vec<LeftOutAnswer> {
+    let outlying = all.outlying_modes().into_iter();
+    let answers = outlying.filter_map(|mode| {
+        let set_ups = fitted_set_ups(structure, modes, settings, Some(mode.mode));
+        let rest = all.without(mode.mode).settled();
+        Some(LeftOutAnswer {
+            mode,
+            estimate: rest.estimate_with_set_ups(&set_ups).ok()?,
+        })
+    });
+    answers.collect()
+}
+
+/// Returns the main estimate, and what is left out of it. `with_all` is the estimate from all modes.
+fn joined(
+    answers: Vec<LeftOutAnswer>,
+    with_all: ConsistentEstimate,
+) -> (Option<LeftOutMode>, Option<Box<ConsistentEstimate>>) {
+    let (Some(estimate), Some(first)) = (LeftOutAnswer::joined(&answers), answers.first()) else {
+        return (None, Some(Box::new(with_all)));
+    };
+    let left_out = LeftOutMode {
+        found: first.mode,
+        answers,
+        with_all: Box::new(with_all),
+    };
+    (Some(left_out), Some(Box::new(estimate)))
+}
+
 /// Returns other numbers of the modes under which the model explains them, where it fails as they are numbered: one mode was
 /// missed, or one peak is none. `None` where no such numbering explains them, or several do.
 fn better_numbering(
@@ -265,31 +292,41 @@ fn better_numbering(
     (*best > EXPLAINS && second < SECOND * best).then(|| numbers.clone())
 }
 
-/// Fits each set-up alone, by its own modes of the described length; none where fewer than two set-ups that differ can be
-/// fitted.
+/// Fits each set-up alone, by the modes of the described length that all set-ups have, without the one that is left out, and
+/// with the description as exact: what is wrong in all set-ups moves their joints alike. None where fewer than two set-ups
+/// that differ can be fitted.
 fn fitted_set_ups(
     structure: &TestedStructure,
     modes: &[ModeResult],
     settings: &IdentifySettings,
+    left_out: Option<usize>,
 ) -> Vec<PointFit> {
     let numbers = modes.iter().filter_map(|mode| mode.mode);
-    let numbers: Vec<usize> = numbers
+    let mut numbers: Vec<usize> = numbers
         .take(settings.fit_modes.unwrap_or(usize::MAX))
         .collect();
+    numbers.retain(|number| Some(*number) != left_out);
     let unknowns = fitted(structure, &settings.details).len();
-    let mut fits = Vec::new();
-    for mut own in set_ups(modes, settings.frequency_floor) {
-        own.retain(|mode| numbers.contains(&mode.mode));
-        if own.len() < unknowns {
-            continue;
-        }
-        if let Ok(estimator) = estimator_of_lengths(structure, &settings.details, &own, &[]) {
-            let fit = estimator.fit();
-            if fit.misfit.is_finite() {
-                fits.push(fit);
-            }
-        }
+    let mut all = set_ups(modes, settings.frequency_floor);
+    // Errors that all set-ups share cancel only where all are fitted to the same modes.
+    let is_in_all = |number: &usize| {
+        let mut all = all.iter();
+        all.all(|own| own.iter().any(|mode| mode.mode == *number))
+    };
+    let shared: Vec<usize> = numbers.iter().copied().filter(is_in_all).collect();
+    if shared.len() >= unknowns {
+        numbers = shared;
     }
+    for own in &mut all {
+        own.retain(|mode| numbers.contains(&mode.mode));
+    }
+    all.retain(|own| own.len() >= unknowns);
+    let exact = settings.details.exact();
+    let estimators = all
+        .iter()
+        .filter_map(|own| estimator_of_lengths(structure, &exact, own, &[]).ok());
+    let fits = estimators.map(|estimator| estimator.fit());
+    let fits: Vec<PointFit> = fits.filter(|fit| fit.misfit.is_finite()).collect();
     if fits.len() < 2 { Vec::new() } else { fits }
 }
 

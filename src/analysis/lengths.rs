@@ -13,12 +13,39 @@ use super::structure::{
 use super::warnings::Warning;
 use super::wiring::{PipelineError, measure_test};
 use std::path::Path;
+use tapjoint_beam::specimen::PointMass;
 use tapjoint_description::TestDescription;
+use tapjoint_identify::consistent::AttachmentTolerance;
 
 /// A free length (m) in words, to the micrometre.
 fn length_words(length: f64) -> String {
     format!("free length {} m", (1e6 * length).round() / 1e6)
 }
+
+/// Returns the uncertainties of the masses of another free length. A mass under a name that is `known` is the same one; a
+/// fastened mass that differs from it has a name of its own.
+fn attachments_of(
+    own: &StructureDetails,
+    length: f64,
+    known: &[(&AttachmentTolerance, &PointMass)],
+) -> Vec<AttachmentTolerance> {
+    let all = own.attachments.iter().zip(&own.masses);
+    let named = all.map(|(tolerance, load)| {
+        let mut known = known.iter();
+        let is_other = known.any(|(other, there)| {
+            other.name == tolerance.name && (there.mass / load.mass - 1.0).abs() > SAME_MASS
+        });
+        let mut tolerance = tolerance.clone();
+        if is_other {
+            tolerance.name = format!("{}, {}", tolerance.name, length_words(length));
+        }
+        tolerance
+    });
+    named.collect()
+}
+
+/// Masses of one name that differ by more than this share are two.
+const SAME_MASS: f64 = 1e-6;
 
 /// The numbered modes of a test.
 pub(super) struct NumberedTest {
@@ -101,16 +128,23 @@ fn numbered(
         let aside = set_aside(&own_test, &own);
         if let Some(length) = length {
             let structure = tested_structure(&own_test);
-            let details = structure_details(&own_test, &structure.beam);
-            let (modes, doubts) = modes_of_test(&own_test, &mut own, &aside, &structure, &details);
+            let details_of_length = structure_details(&own_test, &structure.beam);
+            let (modes, doubts) =
+                modes_of_test(&own_test, &mut own, &aside, &structure, &details_of_length);
             let doubts = doubts.into_iter();
             let doubts = doubts.map(|doubt| doubt.of_part(&length_words(length)));
             found.warnings.extend(doubts);
             let used = own.iter().zip(&aside).filter(|(_, aside)| aside.is_none());
+            let described = details.attachments.iter().zip(&details.masses);
+            let earlier = found.lengths.iter();
+            let earlier = earlier.flat_map(|one| one.attachments.iter().zip(&one.structure.masses));
+            let known: Vec<_> = described.chain(earlier).collect();
+            let attachments = attachments_of(&details_of_length, length, &known);
             found.lengths.push(MovedLength {
                 length,
                 recordings: used.map(|(recording, _)| recording.file.clone()).collect(),
-                structure: jointed(&structure, &details),
+                attachments,
+                structure: jointed(&structure, &details_of_length),
                 modes,
             });
         } else {

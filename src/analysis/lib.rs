@@ -52,8 +52,8 @@ use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{
     AverageSection, BetweenRecordings, CommonScaleSection, Estimate, EstimateMethod,
-    Identification, ModeResult, MonteCarloSection, MovedLength, PerturbationSection, Perturbations,
-    ResolutionSpanSection, SensitivitySection,
+    Identification, LeftOutMode, ModeResult, MonteCarloSection, MovedLength, PerturbationSection,
+    Perturbations, ResolutionSpanSection, SensitivitySection,
 };
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,

@@ -7,7 +7,9 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_beam::{Beam, JointStiffness};
-use tapjoint_identify::consistent::{ConsistentEstimate, JointedStructure, OutlyingMode};
+use tapjoint_identify::consistent::{
+    AttachmentTolerance, ConsistentEstimate, JointedStructure, LeftOutAnswer, OutlyingMode,
+};
 use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MeasuredMode, PredictedMode, Uncertain};
 use tapjoint_numerics::stats::chi_square_quantile;
@@ -130,6 +132,8 @@ pub struct MovedLength {
     pub recordings: Vec<String>,
     /// The structure of this length, with the masses of its first recording.
     pub structure: JointedStructure,
+    /// Uncertainties of its masses, in their order.
+    pub attachments: Vec<AttachmentTolerance>,
     /// Its modes, ascending.
     pub modes: Vec<ModeResult>,
 }
@@ -268,7 +272,7 @@ pub struct Identification {
     pub consistent: Option<Box<ConsistentEstimate>>,
     /// The same by the readings alone: the description exact, and a model that misses nothing.
     pub from_readings: Option<Box<ConsistentEstimate>>,
-    /// The mode that is left out because it does not belong to the others.
+    /// The mode that is left out because it does not belong to the others, or may not.
     pub left_out: Option<LeftOutMode>,
     /// Numbers of the modes under which the model would explain them, where it does not as they are numbered.
     pub better_numbers: Option<Vec<usize>>,
@@ -344,11 +348,13 @@ pub enum Estimate {
     FreeBeam(Box<FreeBeamEstimate>),
 }
 
-/// A mode that is left out of the estimate, and the estimate with it.
+/// A mode that is left out of the estimate, and the estimates with it and without others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOutMode {
-    /// How it deviates.
+    /// How it deviates. Of several modes that may be the outlying one it is the most probable.
     pub found: OutlyingMode,
+    /// The estimates without each of the modes that may be the outlying one, the most probable first.
+    pub answers: Vec<LeftOutAnswer>,
     /// The estimate from all modes.
     pub with_all: Box<ConsistentEstimate>,
 }

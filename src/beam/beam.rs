@@ -119,9 +119,14 @@ impl Beam {
         lambda * lambda * self.unit_frequency()
     }
 
-    /// Returns true where the theory lets the width stiffen the beam. With a Poisson's ratio of 0 no section curls.
+    /// Returns true where the section curls across the width as the beam bends: with any Poisson's ratio but 0.
+    pub fn curls(&self) -> bool {
+        self.poisson != 0.0
+    }
+
+    /// Returns true where the theory lets the width stiffen the beam.
     pub fn is_stiffened(&self, theory: BeamTheory) -> bool {
-        theory == BeamTheory::Timoshenko && self.poisson != 0.0
+        theory == BeamTheory::Timoshenko && self.curls()
     }
 
     /// Returns how slender the beam is for the given theory.

@@ -35,6 +35,7 @@ mod modal_fit;
 mod mode_file;
 mod moved_clamp;
 mod observations;
+mod outlying_modes;
 mod pairing;
 mod pipeline;
 mod pipeline_fits;

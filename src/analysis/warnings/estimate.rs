@@ -82,8 +82,11 @@ pub(crate) fn of_estimate(
     let mut warnings = Vec::new();
     match (&found.consistent, &found.estimate, &found.reason) {
         (Some(consistent), ..) => {
-            warnings.extend(found.left_out.as_ref().map(left_out));
-            warnings.extend(found.better_numbers.as_deref().map(better_numbers));
+            let numbers = found.better_numbers.as_deref();
+            match &found.left_out {
+                Some(modes) => warnings.push(left_out(modes, numbers)),
+                None => warnings.extend(numbers.map(better_numbers)),
+            }
             warnings.extend(of_consistent(consistent, modes));
         }
         // The closed form stands in the place of the consistent estimate.
@@ -274,29 +277,78 @@ fn two_digits(size: f64) -> String {
     }
 }
 
-/// The mode that is left out, and the joint with it.
-fn left_out(left_out: &LeftOutMode) -> Warning {
-    let found = &left_out.found;
-    let mut with_all = Vec::new();
+/// The mode that is left out, or those of which one does not belong to the others, and the joint with and without it. Other
+/// numbers that would explain all modes are another reading of the same misfit.
+fn left_out(left_out: &LeftOutMode, numbers: Option<&[usize]>) -> Warning {
+    let with_all = answer_words(&left_out.with_all);
+    let mut text = match &left_out.answers[..] {
+        several @ [_, _, ..] => {
+            let mut modes: Vec<usize> = several.iter().map(|answer| answer.mode.mode).collect();
+            modes.sort_unstable();
+            let modes: Vec<String> = modes.iter().map(usize::to_string).collect();
+            let answers: Vec<String> = several
+                .iter()
+                .map(|answer| {
+                    format!(
+                        "{} without mode {}, which then lies {:+.2} % off ({} standard deviations)",
+                        answer_words(&answer.estimate),
+                        answer.mode.mode,
+                        answer.mode.percent,
+                        times(answer.mode.deviations.abs())
+                    )
+                })
+                .collect();
+            format!(
+                "one of the modes {} does not belong to the others; the frequencies do not tell which. The best fit has {}. With \
+                 all modes it has {with_all}. The limits hold all answers without one of these modes, the values are those without mode {}. \
+                 Look at their peaks and their numbers",
+                listed(&modes),
+                answers.join("; "),
+                left_out.found.mode,
+            )
+        }
+        _ => {
+            let found = &left_out.found;
+            format!(
+                "mode {} is left out: it lies {:+.2} % from what the other modes predict ({} standard deviations). Without it \
+                 the model explains the rest (goodness of fit {}). With it the best fit has {with_all}. Look at its peak and its \
+                 number",
+                found.mode,
+                found.percent,
+                times(found.deviations.abs()),
+                chance(found.goodness_without),
+            )
+        }
+    };
+    if let Some(numbers) = numbers {
+        let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+        text += &format!(
+            ". Or all modes belong together and are numbered wrongly: the model explains them with the numbers {}",
+            numbers.join(", ")
+        );
+    }
+    Warning::new("outlying-mode", text)
+}
+
+/// "1 and 3", "1, 2 and 3".
+fn listed(words: &[String]) -> String {
+    match words {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => words.concat(),
+    }
+}
+
+/// "kt 1.4000e6, kr 900".
+fn answer_words(estimate: &ConsistentEstimate) -> String {
+    let mut words = Vec::new();
     for quantity in [Quantity::Kt, Quantity::Kr, Quantity::Modulus] {
-        let is_asked = left_out.with_all.fit.contains(&quantity.lead());
-        let own = left_out.with_all.quantity(quantity).filter(|_| is_asked);
+        let is_asked = estimate.fit.contains(&quantity.lead());
+        let own = estimate.quantity(quantity).filter(|_| is_asked);
         if let Some(value) = own.and_then(|own| own.value) {
-            with_all.push(format!("{} {value:.4e}", quantity.name()));
+            words.push(format!("{} {value:.4e}", quantity.name()));
         }
     }
-    Warning::new(
-        "outlying-mode",
-        format!(
-            "mode {} is left out: it lies {:+.2} % from what the other modes predict ({} standard deviations). Without it \
-             the model explains the rest (goodness of fit {}). With it the best fit has {}. Look at its peak and its number",
-            found.mode,
-            found.percent,
-            times(found.deviations.abs()),
-            chance(found.goodness_without),
-            with_all.join(", ")
-        ),
-    )
+    words.join(", ")
 }
 
 /// Other numbers of the modes that the model would explain.

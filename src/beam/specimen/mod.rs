@@ -245,6 +245,12 @@ impl Specimen {
         self.joint.map_or([0.0; 2], |joint| [joint.kt, joint.kr])
     }
 
+    /// Returns true where the width stiffens a beam.
+    pub fn is_stiffened(&self) -> bool {
+        self.width_stiffening != WidthStiffening::Ignored
+            && self.body.beams().iter().any(Beam::curls)
+    }
+
     /// Returns the lowest `count` modes, ascending. Motions that are rigid but for the springs to the ground
     /// are left out and listed apart ([`SpecimenModes::suspension_frequencies`]).
     ///

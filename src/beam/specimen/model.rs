@@ -45,7 +45,7 @@ impl Numbering {
         };
         let rigid = [kt, kr, held];
         let mut numbering = Self {
-            stiffened: is_stiffened(specimen),
+            stiffened: specimen.is_stiffened(),
             nodes: Vec::new(),
             base: None,
             size: 0,
@@ -104,12 +104,6 @@ impl Numbering {
             self.nodes.push(node);
         }
     }
-}
-
-/// Returns true where the width stiffens the beams. With a Poisson's ratio of 0 no section curls.
-fn is_stiffened(specimen: &Specimen) -> bool {
-    let mut beams = specimen.body.beams().iter();
-    specimen.width_stiffening != WidthStiffening::Ignored && beams.any(|beam| beam.poisson != 0.0)
 }
 
 /// Displacement, rotation and curvature across the width of every node, and the rotation of the base.
@@ -265,7 +259,7 @@ impl Model {
         specimen.check()?;
         let beams = specimen.body.beams();
         let units = Units::of(&beams[0], specimen.body.length());
-        let stiffened = is_stiffened(specimen);
+        let stiffened = specimen.is_stiffened();
         let mut runs: Vec<Run> = Vec::new();
         for (beam, &elements) in beams.iter().zip(elements) {
             let last = runs.last();

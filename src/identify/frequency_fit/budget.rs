@@ -117,10 +117,10 @@ impl Finished<'_> {
                 add(input, quantity, by.abs());
             }
             for (input, change) in self.estimator.inputs.iter().zip(&inputs) {
-                let name = BudgetInput::Attachment(input.name.clone());
-                add(name, quantity, by_reading.dot(change).abs());
+                let std = by_reading.dot(change).abs();
+                add(input.input.clone(), quantity, std);
             }
-            let scatter = self.scatter(&gradient, &gradient).sqrt();
+            let scatter = self.set_ups.of_mean(&gradient, &gradient).sqrt();
             if scatter > 0.0 {
                 add(BudgetInput::SetUps, quantity, scatter);
             }
@@ -220,7 +220,7 @@ impl Finished<'_> {
             .budgeted()
             .into_iter()
             .filter_map(|(quantity, gradient)| {
-                let scatter = self.scatter(&gradient, &gradient).sqrt();
+                let scatter = self.set_ups.of_mean(&gradient, &gradient).sqrt();
                 Some((quantity, covariance.std(&gradient)?.hypot(scatter)))
             });
         stds.collect()

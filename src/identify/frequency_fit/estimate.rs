@@ -6,6 +6,7 @@ use super::problem::{
     Covariance, Evaluation, LOG_STIFFNESS, MISFIT, Minimum, NOTHING_KNOWN, Problem, along, dot,
     value_along,
 };
+use super::set_ups::SetUps;
 use super::{
     ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, FlatDirection, Goodness,
     Identifiability, OtherMinimum, Quantity, ResidualWeights, joint_at, limit_of,
@@ -27,7 +28,7 @@ pub(super) struct Finished<'a> {
     pub(super) covariance: Covariance,
     goodness: Goodness,
     /// Fits of each set-up alone.
-    set_ups: &'a [PointFit],
+    pub(super) set_ups: SetUps<'a>,
 }
 
 impl ConsistentEstimator {
@@ -40,8 +41,8 @@ impl ConsistentEstimator {
     }
 
     /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are fits of each of them alone, with the
-    /// same parameters; the modes of this estimator have their mean frequencies. Intervals hold the joint of a further
-    /// set-up, by Student's t.
+    /// same parameters, the same modes and an exact description; the modes of this estimator have their mean frequencies.
+    /// Intervals hold the mean joint, by Student's t; that of a further set-up stands beside them.
     ///
     /// # Errors
     /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
@@ -55,11 +56,13 @@ impl ConsistentEstimator {
         let mut minima = minima.into_iter();
         let best = minima.next().ok_or(IdentifyError::NothingToEstimate)?;
         let directions = self.directions();
+        let is_measured = self.settings.weights == ResidualWeights::Measured;
+        let fit = &self.settings.fit;
         let finished = Finished {
             estimator: self,
             covariance: Covariance::new(&best.state.jacobian, &directions),
             goodness: self.tested(&problem, &best, directions.len()),
-            set_ups,
+            set_ups: SetUps::new(set_ups, fit, is_measured, &best.state.point),
             problem,
             best,
             directions,
@@ -137,42 +140,6 @@ impl Finished<'_> {
         student::quantile(0.05, self.goodness.degrees_of_freedom as f64)
     }
 
-    /// Covariance of two coordinates between a further set-up and the estimate, by the scatter of n set-ups: their variance
-    /// times 1 + 1/n. Its root is the standard deviation of the normal distribution with the same 95 % interval as
-    /// Student's t with n - 1 degrees of freedom. 0 without set-ups.
-    pub(super) fn scatter(&self, first: &Point, second: &Point) -> f64 {
-        let count = self.set_ups.len() as f64;
-        let freedom = count - 1.0;
-        if freedom < 1.0 {
-            return 0.0;
-        }
-        let set_ups = self.set_ups.iter();
-        let sum: f64 = set_ups
-            .map(|set_up| self.deviation(first, set_up) * self.deviation(second, set_up))
-            .sum();
-        let as_normal = student::quantile(0.05, freedom) / NORMAL_95;
-        sum / freedom * (1.0 + 1.0 / count) * as_normal.powi(2)
-    }
-
-    /// How far a coordinate of a set-up is from the estimate; 0 where the set-up's own uncertainty explains it. A stiffness
-    /// that its frequencies hardly feel, as near a rigid joint, may lie anywhere.
-    fn deviation(&self, gradient: &Point, set_up: &PointFit) -> f64 {
-        let moved =
-            value_along(gradient, &set_up.point) - value_along(gradient, &self.best.state.point);
-        let mut variance = 0.0;
-        for (parameter, std) in self.estimator.settings.fit.iter().zip(&set_up.stds) {
-            let part = gradient[parameter.index()];
-            if part != 0.0 && self.measured() {
-                variance += (part * std.unwrap_or(f64::INFINITY)).powi(2);
-            }
-        }
-        if moved * moved > 4.0 * variance {
-            moved
-        } else {
-            0.0
-        }
-    }
-
     fn quantities(&self) -> Vec<EstimatedQuantity> {
         let parameters = self.estimator.free_parameters();
         let quantities = parameters.flat_map(|parameter| Quantity::of(parameter).iter());
@@ -195,30 +162,40 @@ impl Finished<'_> {
         };
         let gradient = quantity.gradient();
         let now = value_along(&gradient, point);
-        let scatter = self.scatter(&gradient, &gradient).sqrt();
-        let is_known = NORMAL_95 * scatter < NOT_KNOWN;
+        let scatter = self.set_ups.of_mean(&gradient, &gradient).sqrt();
+        let by_set_ups = self.set_ups.half_of_mean(&gradient);
+        let is_known = by_set_ups < NOT_KNOWN;
         let unit = self.covariance.std(&gradient).filter(|_| is_known);
         let scale = self.scale();
         // The interval with the misfit for uncertainty is that of the coordinate to first order. Student's
         // distribution accounts for the few frequencies, which give the misfit only roughly.
-        let scaled: Option<f64> = unit.zip(scale).map(|(unit, scale)| {
-            let half = self.student_95() * unit * scale;
-            half.hypot(NORMAL_95 * scatter)
-        });
-        let reaches = match self.measured() {
+        let by_misfit = unit
+            .zip(scale)
+            .map(|(unit, scale)| self.student_95() * unit * scale);
+        let scaled = by_misfit.map(|half| half.hypot(by_set_ups));
+        let own = match self.measured() {
             true => [-1.0, 1.0].map(|sign| {
                 let profile = is_known.then(|| Profile::new(self, quantity, sign))?;
-                Some((profile.end()? - now).hypot(NORMAL_95 * scatter))
+                Some((profile.end()? - now).abs())
             }),
             // Without stated uncertainties the scatter of the residuals is all that is known.
-            false => [scaled, scaled],
+            false => [by_misfit, by_misfit],
         };
+        let reaches = own.map(|own| Some(own?.hypot(by_set_ups)));
         // Ends that are decades apart determine nothing.
         let is_determined = reaches[0]
             .zip(reaches[1])
             .is_none_or(|(below, above)| below + above < 2.0 * NOT_KNOWN);
         let unit = unit.filter(|_| is_determined);
         let [below, above] = reaches.map(|reach| reach.filter(|_| is_determined));
+        let by_further = self.set_ups.half_of_further(&gradient);
+        let further = match (own, is_determined && by_further > 0.0) {
+            ([Some(below), Some(above)], true) => Some((
+                self.quantity_at(quantity, now - below.hypot(by_further)),
+                self.quantity_at(quantity, now + above.hypot(by_further)),
+            )),
+            _ => None,
+        };
         let low = below.map(|reach| self.quantity_at(quantity, now - reach));
         let high = above.map(|reach| self.quantity_at(quantity, now + reach));
         let scaled = scaled.filter(|half| *half < NOT_KNOWN).map(|half| {
@@ -244,6 +221,7 @@ impl Finished<'_> {
             scaled,
             at_least: low.filter(|_| high.is_none()),
             at_most: high.filter(|_| low.is_none()),
+            further,
             limit: limit_of(quantity, point),
         }
     }
@@ -271,21 +249,29 @@ impl Finished<'_> {
         let c = coupling.value.unwrap_or(0.0);
         gradient[Parameter::Coupling.index()] = -(1.0 - c * c) / c;
         let own = self.covariance.std(&gradient).filter(|_| c != 0.0);
-        let scatter = self.scatter(&gradient, &gradient).sqrt();
+        let scatter = self.set_ups.of_mean(&gradient, &gradient).sqrt();
         let scaled = own
             .zip(self.scale())
             .map(|(own, scale)| (own * scale).hypot(scatter));
-        let (unit, reach) = match self.measured() {
-            true => (own.map(|own| own.hypot(scatter)), NORMAL_95),
-            false => (scaled, self.student_95()),
+        let unit = match self.measured() {
+            true => own.map(|own| own.hypot(scatter)),
+            false => scaled,
         };
+        let by_set_ups = self.set_ups.half_of_mean(&gradient);
+        let half = match self.measured() {
+            true => own.map(|own| NORMAL_95 * own),
+            false => own
+                .zip(self.scale())
+                .map(|(own, scale)| self.student_95() * own * scale),
+        };
+        let half = half.map(|half| half.hypot(by_set_ups));
         let one_sign = coupling
             .low
             .zip(coupling.high)
             .is_some_and(|(low, high)| low * high > 0.0);
         let [low, high] = [-1.0, 1.0].map(|sign: f64| {
-            let (value, unit) = value.zip(unit).filter(|_| one_sign)?;
-            Some(value * (sign * value.signum() * reach * unit).exp())
+            let (value, half) = value.zip(half).filter(|_| one_sign)?;
+            Some(value * (sign * value.signum() * half).exp())
         });
         let std = value.zip(unit).map(|(value, unit)| value.abs() * unit);
         EstimatedQuantity {
@@ -300,6 +286,7 @@ impl Finished<'_> {
             scaled: None,
             at_least: None,
             at_most: None,
+            further: None,
             limit: coupling.limit,
         }
     }
@@ -360,7 +347,7 @@ impl Finished<'_> {
             gradients.map(|first| {
                 gradients.map(|second| {
                     let own = factor * self.covariance.between(&first, &second);
-                    own + self.scatter(&first, &second)
+                    own + self.set_ups.of_mean(&first, &second)
                 })
             })
         })

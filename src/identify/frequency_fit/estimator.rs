@@ -32,7 +32,7 @@ pub struct ConsistentEstimator {
     pub(super) modes: Vec<MeasuredMode>,
     /// Index of the model of each mode.
     pub(super) structures: Vec<usize>,
-    /// Standard uncertainties of the masses on the structure of each model.
+    /// Uncertainties of the masses of each model.
     attachments: Vec<Vec<AttachmentTolerance>>,
     pub(super) base: Point,
     /// Parameters estimated along with the joint, with their prior.
@@ -54,9 +54,9 @@ pub struct PointFit {
     pub point: Point,
     /// Sum of the squared residuals there; infinite where no start leads to a minimum.
     pub misfit: f64,
-    /// Standard deviations of the estimated coordinates (1, logarithms and atanh), in the order of
-    /// the fit; `None` where nothing is known.
-    pub stds: Vec<Option<f64>>,
+    /// Covariance of the estimated coordinates (1, logarithms and atanh), in the order of the fit; infinite where nothing is
+    /// known.
+    pub covariance: Vec<Vec<f64>>,
     /// Reason for which the search ended.
     pub stop: StopReason,
 }
@@ -68,7 +68,7 @@ pub struct MovedClamp {
     pub structure: JointedStructure,
     /// Its modes.
     pub modes: Vec<MeasuredMode>,
-    /// Standard uncertainties of the masses on it, in their order.
+    /// Uncertainties of its masses, in their order. One with the name of another length's is the same mass and error of place.
     pub attachments: Vec<AttachmentTolerance>,
 }
 
@@ -110,6 +110,14 @@ impl PointFit {
     /// Returns the non-dimensional joint; a direction that is held rigid is infinite.
     pub fn joint(&self) -> JointStiffness {
         joint_at(&self.point)
+    }
+
+    /// Returns the standard deviations of the estimated coordinates; `None` where nothing is known.
+    pub fn stds(&self) -> Vec<Option<f64>> {
+        let rows = self.covariance.iter().enumerate();
+        let stds = rows.map(|(index, row)| row[index].sqrt());
+        stds.map(|std| Some(std).filter(|std| std.is_finite()))
+            .collect()
     }
 }
 
@@ -269,7 +277,7 @@ impl ConsistentEstimator {
             // A residual is predicted less measured: an input that raises the frequencies lowers it.
             let pull = -(triangle * change).dot(&residuals);
             pulls.push(DescriptionPull {
-                input: BudgetInput::Attachment(input.name.clone()),
+                input: input.input.clone(),
                 stated: input.stated,
                 fitted: input.stated + pull * input.std,
                 pull,
@@ -298,13 +306,14 @@ impl ConsistentEstimator {
             // In the test of the free bar a mass sits at a place of its own, and may be another one of the same name.
             if index > 0 && structure.assembly == Assembly::Free {
                 for input in &mut found {
-                    let is_same = all.iter().any(|known| {
-                        known.name == input.name
+                    let is_known = all.iter().any(|known| {
+                        known.input == input.input
                             && known.stated == input.stated
                             && known.std == input.std
                     });
-                    if !(input.is_mass && is_same) {
-                        input.name.push_str(" in the free test");
+                    let is_same = input.is_mass && is_known;
+                    if let (false, BudgetInput::Attachment(name)) = (is_same, &mut input.input) {
+                        name.push_str(" in the free test");
                     }
                 }
             }
@@ -318,7 +327,7 @@ impl ConsistentEstimator {
                 .count();
             let total = self.modes.len();
             for input in found {
-                let known = all.iter_mut().find(|known| known.name == input.name);
+                let known = all.iter_mut().find(|known| known.input == input.input);
                 match known {
                     Some(known) => {
                         known.changes[before..before + numbers.len()]
@@ -500,18 +509,28 @@ impl ConsistentEstimator {
         let best = minima.into_iter().next().map(|best| {
             let directions = self.directions();
             let covariance = Covariance::new(&best.state.jacobian, &directions);
-            let fitted = directions.iter().take(self.settings.fit.len());
+            let fitted = &directions[..self.settings.fit.len()];
+            let rows = fitted.iter().map(|first| {
+                let row = fitted.iter().map(|second| {
+                    let is_known = [first, second].map(|one| covariance.std(one).is_some());
+                    match is_known {
+                        [true, true] => covariance.between(first, second),
+                        _ => f64::INFINITY,
+                    }
+                });
+                row.collect()
+            });
             PointFit {
                 point: best.state.point,
                 misfit: best.state.cost,
-                stds: fitted.map(|direction| covariance.std(direction)).collect(),
+                covariance: rows.collect(),
                 stop: best.stop,
             }
         });
         best.unwrap_or(PointFit {
             point: self.base,
             misfit: f64::INFINITY,
-            stds: Vec::new(),
+            covariance: Vec::new(),
             stop: StopReason::NothingFree,
         })
     }

@@ -19,6 +19,7 @@ mod estimator;
 mod model;
 mod outlier;
 mod problem;
+mod set_ups;
 mod uncertainty;
 
 pub use budget::{BudgetEntry, Measure, Remedy};
@@ -26,7 +27,7 @@ pub use estimator::{ConsistentEstimator, MovedClamp, Neighbourhood, PointFit};
 pub use model::{
     FrequencyModel, JointedStructure, ModeResponse, PARAMETERS, Parameter, Point, Route,
 };
-pub use outlier::OutlyingMode;
+pub use outlier::{LeftOutAnswer, OutlyingMode};
 pub use tapjoint_beam::specimen::LapLayout;
 pub use tapjoint_numerics::least_squares::StopReason;
 pub use uncertainty::{
@@ -108,7 +109,7 @@ pub struct ConsistentSettings {
     /// Uncertain properties of the beam: with measured weights they are estimated along with the
     /// joint, each held near its stated value. A property in `fit` has no such hold.
     pub tolerances: BeamTolerances,
-    /// Uncertainties of the structure's masses, in their order; with measured weights only.
+    /// Uncertainties of the described structure's masses, in their order; with measured weights only.
     pub attachments: Vec<AttachmentTolerance>,
     /// Mass of the beam by a balance; with measured weights only.
     pub weighed: Option<WeighedBeam>,
@@ -179,6 +180,8 @@ pub struct EstimatedQuantity {
     pub at_least: Option<f64>,
     /// Upper end of an interval without lower end: "at most".
     pub at_most: Option<f64>,
+    /// The 95 % interval for a further set-up, where set-ups differ; not of Kz and Ktr.
+    pub further: Option<(f64, f64)>,
     /// End of the range that the best value has reached.
     pub limit: Option<Limit>,
 }
@@ -249,7 +252,7 @@ pub struct ConsistentEstimate {
     pub description: Vec<DescriptionPull>,
     /// What further measurements would make of the standard deviations, where the description is uncertain.
     pub remedies: Vec<Remedy>,
-    /// Number of set-ups that differ beyond noise. Standard deviations and intervals are for a further one. 0 without.
+    /// Number of set-ups that differ beyond noise. Standard deviations and intervals are for their mean. 0 without.
     pub set_ups: usize,
     /// Reason for which the search ended.
     pub stop: StopReason,
@@ -327,7 +330,8 @@ impl Quantity {
             Parameter::SecondLength
             | Parameter::ThirdLength
             | Parameter::FourthLength
-            | Parameter::FifthLength => &[],
+            | Parameter::FifthLength
+            | Parameter::SixthLength => &[],
         }
     }
 

@@ -181,6 +181,8 @@ pub enum Parameter {
     FourthLength,
     /// Length (m) of the beam where its clamp was moved again.
     FifthLength,
+    /// Length (m) of the beam where its clamp was moved again, or of the free bar beside five lengths.
+    SixthLength,
 }
 
 impl Parameter {
@@ -201,15 +203,17 @@ impl Parameter {
         Self::ThirdLength,
         Self::FourthLength,
         Self::FifthLength,
+        Self::SixthLength,
     ];
 
-    /// Lengths of the beam in one fit: as described first, then where its clamp was moved.
-    pub const LENGTHS: [Self; 5] = [
+    /// Lengths of the beam in one fit: as described first, then where its clamp was moved, and that of the free bar.
+    pub const LENGTHS: [Self; 6] = [
         Self::Length,
         Self::SecondLength,
         Self::ThirdLength,
         Self::FourthLength,
         Self::FifthLength,
+        Self::SixthLength,
     ];
 
     /// Properties whose product the mass of the beam is, but for a constant.
@@ -235,12 +239,13 @@ impl Parameter {
             "third-length",
             "fourth-length",
             "fifth-length",
+            "sixth-length",
         ][self.index()]
     }
 }
 
 /// Number of parameters.
-pub const PARAMETERS: usize = 12;
+pub const PARAMETERS: usize = 13;
 
 /// A place in parameter space: logarithms of the SI values, atanh of the coupling. An infinite
 /// logarithm of a stiffness is a rigid joint. Lengths that no structure of the fit has are of no effect.

@@ -28,9 +28,12 @@ pub const LEAST_DISCREPANCY: f64 = 5e-4;
 /// Largest discrepancy that is still called an uncertainty: beyond it the model is another structure's.
 pub const MOST_DISCREPANCY: f64 = 0.5;
 
-/// Standard uncertainty of how a joint holds the width, between 0 for springs spread over it and 1 for a clamp that keeps the
-/// slope across it.
-pub const WIDTH_HOLD_STD: f64 = 0.5;
+/// Standard uncertainty of the hold of the width (1) about 0, that of springs over the width.
+///
+/// A joint that grips the whole width holds it anywhere between 0 and 1: a mean of 0.5, and a standard deviation of 0.29 about
+/// it. The model stays at 0, as prediction, diagnosis and simulation do, and a joint that grips the middle alone lies below
+/// it. The uncertainty is therefore the root mean square of that range, sqrt(0.5^2 + 0.29^2).
+pub const WIDTH_HOLD_STD: f64 = 0.58;
 
 /// What contributes to the uncertainty of an estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +48,14 @@ pub enum BudgetInput {
     Weighing,
     /// Mass or place of something attached, by name.
     Attachment(String),
+    /// Poisson's ratio.
+    Poisson,
+    /// How the joint holds the section across the width.
+    WidthHold,
     /// Differences between set-ups.
     SetUps,
+    /// Several modes, one of which does not belong to the others.
+    OutlyingMode,
 }
 
 impl BudgetInput {
@@ -58,7 +67,10 @@ impl BudgetInput {
             Self::Property(parameter) => parameter.name(),
             Self::Weighing => "weighing",
             Self::Attachment(name) => name,
+            Self::Poisson => "poisson",
+            Self::WidthHold => "hold of the width",
             Self::SetUps => "set-ups",
+            Self::OutlyingMode => "outlying mode",
         }
     }
 }
@@ -90,10 +102,10 @@ pub struct AttachmentTolerance {
 /// An input that the fit does not move.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct UncertainInput {
+    /// What it is in the budget.
+    pub(super) input: BudgetInput,
     /// True for a mass, which a balance tells.
     pub(super) is_mass: bool,
-    /// Name in the budget.
-    pub(super) name: String,
     /// Value that the description states (SI).
     pub(super) stated: f64,
     /// Standard uncertainty (SI).
@@ -103,7 +115,7 @@ pub(super) struct UncertainInput {
 }
 
 /// Returns the inputs that the masses on a structure are: the mass and the place of each, where they are uncertain and
-/// change a frequency. `modes` are the numbers of the structure's modes, `joint` is near the fitted one.
+/// change a frequency. `tolerances` are in the order of its masses, `modes` are the numbers of the structure's modes, `joint` is near the fitted one.
 pub(super) fn attachment_inputs(
     structure: &JointedStructure,
     joint: Option<Joint>,
@@ -152,8 +164,8 @@ pub(super) fn attachment_inputs(
             };
             if std > 0.0 && changes.iter().any(|change| *change != 0.0) {
                 inputs.push(UncertainInput {
+                    input: BudgetInput::Attachment(name),
                     is_mass,
-                    name,
                     stated,
                     std,
                     changes,
@@ -167,9 +179,8 @@ pub(super) fn attachment_inputs(
 /// Returns the inputs that the width is: Poisson's ratio, and how the joint holds the section across the width. Empty where
 /// the model takes no notice of the width.
 ///
-/// The model spreads the joint's springs over the width. A clamp that keeps the slope gives the frequencies of
-/// `Specimen::clamp_differences`; a joint that grips the whole width lies between both. Half of the difference is one standard
-/// uncertainty.
+/// The model spreads the joint's springs over the width (hold 0). A clamp that keeps the slope gives the frequencies of
+/// `Specimen::clamp_differences` (hold 1).
 pub(super) fn width_inputs(
     structure: &JointedStructure,
     joint: Option<Joint>,
@@ -196,8 +207,8 @@ pub(super) fn width_inputs(
             .iter()
             .map(|mode| sign * (other[mode - 1] / own[mode - 1] - 1.0));
         inputs.push(UncertainInput {
+            input: BudgetInput::Poisson,
             is_mass: false,
-            name: "poisson".to_owned(),
             stated,
             std: poisson,
             changes: changes.collect(),
@@ -208,8 +219,8 @@ pub(super) fn width_inputs(
         && differences.iter().any(|difference| *difference != 0.0)
     {
         inputs.push(UncertainInput {
+            input: BudgetInput::WidthHold,
             is_mass: false,
-            name: "hold of the width".to_owned(),
             stated: 0.0,
             std: WIDTH_HOLD_STD,
             changes: modes

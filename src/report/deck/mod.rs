@@ -249,13 +249,11 @@ impl Deck {
 
     /// Takes the stiffening by the width out of the predicted frequencies of a specimen.
     fn without_width(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
-        let mut beams = specimen.body.beams().iter();
-        let ignored = WidthStiffening::Ignored;
-        if specimen.width_stiffening == ignored || beams.all(|beam| beam.poisson == 0.0) {
+        if !specimen.is_stiffened() {
             return Ok(());
         }
         let plain = Specimen {
-            width_stiffening: ignored,
+            width_stiffening: WidthStiffening::Ignored,
             ..specimen.clone()
         };
         let count = self.frequencies.len();

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::ModeSection;
 use crate::format::significant;
-use tapjoint_analysis::{Analysis, Estimate, EstimateMethod, Identification};
+use tapjoint_analysis::{Analysis, Estimate, EstimateMethod, Identification, LeftOutMode};
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
@@ -26,6 +26,9 @@ pub struct EstimatedValue {
     pub from_readings: Option<FromReadings>,
     /// What each input contributes, the largest first; empty of a closed form.
     pub budget: Vec<BudgetRow>,
+    /// The 95 % limits for the joint of a further set-up; only where set-ups differ beyond noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub further_set_up: Option<[f64; 2]>,
 }
 
 impl EstimatedValue {
@@ -180,7 +183,7 @@ pub struct DescriptionRow {
     pub pull: f64,
 }
 
-/// A mode that was left out of the estimate.
+/// A mode that was left out of the estimate. Of several modes that may not belong to the others it is the most probable.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LeftOutRow {
     /// Its number.
@@ -194,6 +197,28 @@ pub struct LeftOutRow {
     /// Kr (N m/rad) with all modes, likewise.
     pub kr: Option<Uncertain>,
     /// Modulus (Pa) with all modes, likewise.
+    pub modulus: Option<Uncertain>,
+    /// All modes that may not belong to the others, the most probable first. With more than one the limits of the estimate hold
+    /// the limits of all answers.
+    pub candidates: Vec<CandidateRow>,
+}
+
+/// A mode that may not belong to the others, and the estimate without it.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct CandidateRow {
+    /// Its number.
+    pub mode: usize,
+    /// Probability that it is this one of the candidates.
+    pub probability: f64,
+    /// Measured less predicted by the other modes (%).
+    pub error_percent: f64,
+    /// The same in standard deviations of that prediction.
+    pub deviations: f64,
+    /// Kt (N/m) without it; null where it is not estimated.
+    pub kt: Option<Uncertain>,
+    /// Kr (N m/rad) without it, likewise.
+    pub kr: Option<Uncertain>,
+    /// Modulus (Pa) without it, likewise.
     pub modulus: Option<Uncertain>,
 }
 
@@ -217,7 +242,7 @@ pub struct EstimateSection {
     pub method: EstimateMethod,
     /// Modes that entered.
     pub modes_used: Vec<usize>,
-    /// Set-ups that differ beyond noise: the estimate is that of their mean, intervals hold a further one.
+    /// Set-ups that differ beyond noise: estimate and intervals are those of their mean joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub set_ups: Option<usize>,
     /// Why the estimate is doubtful, if it is.
@@ -483,26 +508,47 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
     let closed = closed.unwrap_or_default();
     Some(EstimateSection {
         assumed: Some(found.assumed.clone()).filter(|assumed| !assumed.is_empty()),
-        left_out: found.left_out.as_ref().map(|left_out| {
-            let with_all = |quantity: Quantity| {
-                let all = &left_out.with_all;
-                let found =
-                    value(all, None, quantity).filter(|_| all.fit.contains(&quantity.lead()));
-                found.map(|found| found.uncertain)
-            };
-            LeftOutRow {
-                mode: left_out.found.mode,
-                error_percent: left_out.found.percent,
-                deviations: left_out.found.deviations,
-                kt: with_all(Quantity::Kt),
-                kr: with_all(Quantity::Kr),
-                modulus: with_all(Quantity::Modulus),
-            }
-        }),
+        left_out: found.left_out.as_ref().map(left_out_row),
         pairs: closed.pairs,
         free_beam: closed.free_beam,
         single_modes: closed.single_modes,
         ..consistent_section(consistent, found.from_readings.as_deref())
+    })
+}
+
+/// The mode that was left out, with the values of each answer.
+fn left_out_row(left_out: &LeftOutMode) -> LeftOutRow {
+    let [kt, kr, modulus] = asked_values(&left_out.with_all);
+    let answers = left_out.answers.iter();
+    let candidates = answers.map(|answer| {
+        let [kt, kr, modulus] = asked_values(&answer.estimate);
+        CandidateRow {
+            mode: answer.mode.mode,
+            probability: answer.mode.probability,
+            error_percent: answer.mode.percent,
+            deviations: answer.mode.deviations,
+            kt,
+            kr,
+            modulus,
+        }
+    });
+    LeftOutRow {
+        mode: left_out.found.mode,
+        error_percent: left_out.found.percent,
+        deviations: left_out.found.deviations,
+        kt,
+        kr,
+        modulus,
+        candidates: candidates.collect(),
+    }
+}
+
+/// Kt, Kr and the modulus, where they were asked for.
+fn asked_values(found: &ConsistentEstimate) -> [Option<Uncertain>; 3] {
+    [Quantity::Kt, Quantity::Kr, Quantity::Modulus].map(|quantity| {
+        let own = value(found, None, quantity);
+        let own = own.filter(|_| found.fit.contains(&quantity.lead()));
+        own.map(|own| own.uncertain)
     })
 }
 
@@ -604,6 +650,7 @@ fn value(
             }
         }),
         budget,
+        further_set_up: estimated.further.map(|(low, high)| [low, high]),
     })
 }
 

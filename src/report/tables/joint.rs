@@ -434,11 +434,27 @@ fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
     Some(100.0 * (value - base) / base)
 }
 
-/// Says that std and limits hold the scatter between set-ups, after a blank; `None` where they do not.
+/// Says whose joint the estimate is where set-ups differ, and where that of a further one lies, after a blank; `None` where
+/// they do not.
 pub fn set_up_words(estimate: &EstimateSection) -> Option<String> {
     let count = estimate.set_ups?;
+    let all = [("Kt", "N/m", &estimate.kt), ("Kr", "N m/rad", &estimate.kr)];
+    let further = all.into_iter().filter_map(|(name, unit, value)| {
+        let [low, high] = value.as_ref()?.further_set_up?;
+        let (factor, letter) = prefix(low);
+        let [low, high] = [low, high].map(|end| significant(factor * end, 3));
+        Some(format!(
+            "{name} {low} to {high} {letter}{}",
+            unit_words(unit)
+        ))
+    });
+    let further: Vec<String> = further.collect();
+    let further = match further.is_empty() {
+        true => String::new(),
+        false => format!(" A further set-up (95 %): {}.", further.join(", ")),
+    };
     Some(format!(
-        " {count} set-ups differ beyond noise. Value: of their mean frequencies. Std and limits: for a further set-up."
+        " {count} set-ups differ beyond noise. Value, std and limits are those of their mean joint.{further}"
     ))
 }
 

@@ -762,9 +762,10 @@ const CHUNK: usize = 256;
 impl ConsistentEstimator {
     /// Repeats the estimate `samples` times with independent errors. The frequencies have their stated
     /// standard deviations and the discrepancy. `half_widths` (Hz), in the order of [`Self::frequencies`], say which
-    /// part of each is uniform; what is not listed is normal. The beam's properties and the inputs their tolerances. Each repetition starts from those minima of the
-    /// first estimate that its errors can make the deepest, four at most. The body is that of the first estimate, and
-    /// changes of the beam are followed to first order. This leaves less than a thousandth of a standard deviation.
+    /// part of each is uniform. What is not listed is normal. The beam's properties and the inputs have their tolerances.
+    /// Each repetition starts from those minima of the first estimate that its errors can make the deepest, four at
+    /// most. The body is that of the first estimate, and changes of the beam are followed to first order. This leaves
+    /// less than a thousandth of a standard deviation.
     /// The result depends on the seed, not on the number of threads. Repetitions that do not converge count as
     /// failed.
     ///

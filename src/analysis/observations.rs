@@ -252,6 +252,10 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
         joint_before: joint_before.filter(|joint| joint.iter().all(|k| *k > 0.0 && k.is_finite())),
         ..nominal_with(test, estimate.map(|estimate| estimate.joint))
     };
+    if let Some(free) = &analysis.free_test {
+        let known = &mut nominal.uncertainty;
+        known.free_scale = free_scale(&free.bar, &known.beam);
+    }
     if let Some(estimate) = estimate {
         take_estimated_properties(&mut nominal, estimate);
     }

@@ -7,7 +7,7 @@ use tapjoint::gap::{
     diagnose, observe,
 };
 use tapjoint::identify::observation::{
-    Configuration, ExtraPeak, Observations, ObservedMode, UNPAIRED,
+    Configuration, ExtraPeak, Observations, Observed, ObservedMode, UNPAIRED,
 };
 use tapjoint::pipeline::read_elsewhere;
 use tapjoint::structure::specimen::{Joint, PointMass};
@@ -698,4 +698,51 @@ fn recover_two_large_effects_at_once() {
     };
     named.sort_by_key(|effect| effect.name());
     assert_eq!(named, [EffectId::AddedMass, EffectId::CrossCoupling]);
+}
+
+/// A beam whose modulus is 4 % off, and a free test of it.
+#[test]
+fn prop_a_free_test_tells_the_material_from_a_gap() {
+    let mut nominal = strip_on_springs(1.0, None);
+    nominal.uncertainty.beam.modulus = Some(0.01);
+    let settings = GapSettings::default();
+    let modulus = effect(EffectId::Modulus, &[("relative", 0.04)]);
+    let observed = observe(&five_recordings(), &nominal, &[modulus], 41).unwrap();
+    let mut with_free = |value: f64| {
+        nominal.uncertainty.free_scale = Some(Observed {
+            value,
+            std: 5e-4,
+            freedom: None,
+        });
+        let diagnosis = diagnose(&observed, &nominal, &settings).unwrap();
+        result(&diagnosis, "modulus").probability
+    };
+    // The free bar's frequencies are those of the stiffer material.
+    let agreeing = with_free(0.5 * 0.04_f64.ln_1p());
+    assert!(agreeing > 0.5, "{agreeing}");
+    // Or they are as described, which clears the material.
+    let other = with_free(0.0);
+    assert!(other < 0.05, "{other}");
+}
+
+/// A balance that agrees with the description narrows the joint's interval.
+#[test]
+fn prop_a_weighed_beam_narrows_the_joint() {
+    let mut nominal = strip_on_springs(1.0, None);
+    nominal.uncertainty.beam.density = Some(0.02);
+    let observed = observe(&five_recordings(), &nominal, &[], 42).unwrap();
+    let width = |nominal: &Nominal| {
+        let diagnosis = diagnose(&observed, nominal, &GapSettings::default()).unwrap();
+        let [low, high] = result(&diagnosis, "none").joint_intervals[1].unwrap();
+        (high / low).ln()
+    };
+    let without = width(&nominal);
+    nominal.uncertainty.weighed = Some(Observed {
+        value: 0.0,
+        std: 1e-3,
+        freedom: None,
+    });
+    let with = width(&nominal);
+    // By a fifth here: the modes measure most of the density themselves.
+    assert!(with < 0.9 * without, "{with} {without}");
 }

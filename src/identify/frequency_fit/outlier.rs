@@ -22,9 +22,9 @@ use super::uncertainty::{BudgetInput, LEAST_DISCREPANCY};
 use super::{BudgetEntry, ConsistentEstimate, Quantity, ResidualWeights};
 use tapjoint_numerics::stats::chi_square_tail;
 
-const FAILS: f64 = 5e-3;
-const EXPLAINS: f64 = 5e-3;
-const DEVIATION: f64 = 3.5;
+const FAILS: f64 = 1e-3;
+const EXPLAINS: f64 = 0.02;
+const DEVIATION: f64 = 4.0;
 /// Least probability of a candidate, that of the first being 1.
 const SECOND: f64 = 0.1;
 /// Errors beyond this share (1) are less usual: such a peak would have another number.

@@ -114,19 +114,19 @@ pub fn identify(
         });
     }
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
-    let (mut from_readings, mut left_out, mut better_numbers) = (None, None, None);
+    let (mut from_readings, mut without, mut better_numbers) = (None, None, None);
     if is_consistent {
         let details = &settings.details;
         match settled(structure, details, &used, &moved, &set_ups) {
             Ok((all, estimate)) => {
                 better_numbers = better_numbering(structure, details, &used, &moved, &estimate);
                 let answers = left_out_answers(structure, modes, settings, &all);
-                (left_out, consistent) = joined(answers, estimate);
+                (without, consistent) = joined(answers, estimate);
                 estimator = Some(all);
             }
             Err(error) => refused = Some(error.to_string()),
         }
-        if let Some(LeftOutMode { found, .. }) = &left_out {
+        if let Some(LeftOutMode { found, .. }) = &without {
             used.retain(|mode| mode.mode != found.mode);
             estimator = estimator.map(|all| all.without(found.mode).settled());
         }
@@ -153,10 +153,16 @@ pub fn identify(
         (None, Some(_)) => refused,
         (None, None) => refused.or(missing),
     };
+    let is_alone = without.as_ref().is_some_and(|one| one.answers.len() == 1);
+    let (left_out, one_of_several) = match is_alone {
+        true => (without, None),
+        false => (None, without),
+    };
     let mut found = Identification {
         assumed: assumed(consistent.as_deref(), &settings.details),
         consistent,
         left_out,
+        one_of_several,
         better_numbers,
         from_readings,
         estimate,

@@ -272,8 +272,11 @@ pub struct Identification {
     pub consistent: Option<Box<ConsistentEstimate>>,
     /// The same by the readings alone: the description exact, and a model that misses nothing.
     pub from_readings: Option<Box<ConsistentEstimate>>,
-    /// The mode that is left out because it does not belong to the others, or may not.
+    /// The mode that is left out because it does not belong to the others. The diagnosis leaves it out as well.
     pub left_out: Option<LeftOutMode>,
+    /// Several modes, one of which does not belong to the others. The diagnosis takes them all: an effect that the model lacks
+    /// may be the cause.
+    pub one_of_several: Option<LeftOutMode>,
     /// Numbers of the modes under which the model would explain them, where it does not as they are numbered.
     pub better_numbers: Option<Vec<usize>>,
     /// Standard uncertainties of the description that it does not state, in words; empty without any.
@@ -291,6 +294,11 @@ pub struct Identification {
 }
 
 impl Identification {
+    /// The mode that the estimate is without, alone or as the most probable of several.
+    pub fn without_mode(&self) -> Option<&LeftOutMode> {
+        self.left_out.as_ref().or(self.one_of_several.as_ref())
+    }
+
     /// The method that estimate and prediction go by, if `wanted` is asked for: the consistent estimate where there is
     /// one, or where all stiffnesses are known.
     pub(super) fn method(

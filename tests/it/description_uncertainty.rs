@@ -528,8 +528,8 @@ fn recover_intervals_hold_the_truth_where_the_description_errs() {
 fn recover_the_mode_that_does_not_belong_to_the_others() {
     for (kind, section, alone, among) in [
         (Kind::TwoParameter, Section::Euler, 0.8, 0.95),
-        (Kind::ThreeParameter, Section::Timoshenko, 0.7, 0.93),
-        (Kind::Lap, Section::Wide, 0.75, 0.95),
+        (Kind::ThreeParameter, Section::Timoshenko, 0.65, 0.93),
+        (Kind::Lap, Section::Wide, 0.7, 0.95),
         (Kind::Free, Section::Timoshenko, 0.95, 0.95),
     ] {
         let found = outlier_answers(kind, section, World::Outlier, 60, 3);
@@ -551,10 +551,10 @@ fn recover_the_mode_that_does_not_belong_to_the_others() {
         let few = Binomial::new(among, count).unwrap().cdf(right);
         assert!(few > CHANCE, "{}: {right} of {count} among", kind.name());
         let clean = outlier_answers(kind, section, World::Normal, 60, 3);
-        // The rule asks for a failure of the model, which a right one shows in one of two hundred: three of 60 is a chance
-        // of 1 in 300.
+        // The rule asks for a failure of the model, which a right one shows in one of a thousand: two of 60 is a chance
+        // of 1 in 600.
         let false_alarms = clean.iter().filter(|answer| !answer.named.is_empty());
-        assert!(false_alarms.count() < 3, "{}", kind.name());
+        assert!(false_alarms.count() < 2, "{}", kind.name());
     }
 }
 

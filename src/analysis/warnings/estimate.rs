@@ -83,7 +83,7 @@ pub(crate) fn of_estimate(
     match (&found.consistent, &found.estimate, &found.reason) {
         (Some(consistent), ..) => {
             let numbers = found.better_numbers.as_deref();
-            match &found.left_out {
+            match found.without_mode() {
                 Some(modes) => warnings.push(left_out(modes, numbers)),
                 None => warnings.extend(numbers.map(better_numbers)),
             }

@@ -508,7 +508,7 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
     let closed = closed.unwrap_or_default();
     Some(EstimateSection {
         assumed: Some(found.assumed.clone()).filter(|assumed| !assumed.is_empty()),
-        left_out: found.left_out.as_ref().map(left_out_row),
+        left_out: found.without_mode().map(left_out_row),
         pairs: closed.pairs,
         free_beam: closed.free_beam,
         single_modes: closed.single_modes,

@@ -483,6 +483,33 @@ fn normalise(unit: &str) -> String {
     spelled
 }
 
+/// A value in the unit with the decimal prefix that leaves one to three digits before the point.
+///
+/// Returns the factor to multiply by and the prefix: 1.4e6 gives (1e-6, "M"). Small values keep
+/// their unit: "mN/m" is not in use.
+pub fn prefix(value: f64) -> (f64, &'static str) {
+    match value.abs() {
+        v if !v.is_finite() => (1.0, ""),
+        v if v >= 1e9 => (1e-9, "G"),
+        v if v >= 1e6 => (1e-6, "M"),
+        v if v >= 1e3 => (1e-3, "k"),
+        _ => (1.0, ""),
+    }
+}
+
+/// "2.124 MN/m": a value in its unit with the prefix of [`prefix`] and four digits.
+pub fn with_prefix(value: f64, unit: &str) -> String {
+    let (factor, letter) = prefix(value);
+    let scaled = factor * value;
+    let digits = scaled.abs().log10().floor();
+    let decimals = if digits.is_finite() {
+        (3.0 - digits).clamp(0.0, 9.0)
+    } else {
+        0.0
+    };
+    format!("{scaled:.*} {letter}{unit}", decimals as usize)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

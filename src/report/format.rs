@@ -1,5 +1,7 @@
 //! Numbers as readers want them: the digits follow the uncertainty.
 
+pub use tapjoint_numerics::quantity::prefix;
+
 /// Shown where a value does not exist.
 pub const MISSING: &str = "\u{2013}";
 /// Shown for a stiffness without bound.
@@ -212,20 +214,6 @@ fn exact_decimals(value: f64, least: f64) -> Option<usize> {
 pub fn unit_words(unit: &str) -> String {
     unit.replace("m/s2", "m/s\u{b2}")
         .replace("kg/m3", "kg/m\u{b3}")
-}
-
-/// A value in the unit with the decimal prefix that leaves one to three digits before the point.
-///
-/// Returns the factor to multiply by and the prefix: 1.4e6 gives (1e-6, "M"). Small values keep
-/// their unit: "mN/m" is not in use.
-pub fn prefix(value: f64) -> (f64, &'static str) {
-    match value.abs() {
-        v if !v.is_finite() => (1.0, ""),
-        v if v >= 1e9 => (1e-9, "G"),
-        v if v >= 1e6 => (1e-6, "M"),
-        v if v >= 1e3 => (1e-3, "k"),
-        _ => (1.0, ""),
-    }
 }
 
 /// Power of ten of the last of `digits` significant digits, after rounding: 0.0996 with two digits

@@ -14,6 +14,7 @@ use tapjoint_identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, FitVerdict, Limit, NOTABLE_MISFIT, Quantity,
 };
 use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
+use tapjoint_numerics::quantity::with_prefix;
 use tapjoint_numerics::stats::times;
 
 /// A mode that moves by more than this share (1) is reported: what drift and sensors usually do is less.
@@ -173,7 +174,7 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
     let minima = found.other_minima.iter();
     for other in minima.filter(|other| other.rms_percent < most) {
         let values = other.values.iter();
-        let values = values.map(|(q, v)| format!("{} {v:.4e}", q.name()));
+        let values = values.map(|(quantity, value)| value_words(*quantity, *value));
         let text = format!(
             "another joint comes near the same frequencies, to {:.2} % rms: {}",
             other.rms_percent,
@@ -338,17 +339,29 @@ fn listed(words: &[String]) -> String {
     }
 }
 
-/// "kt 1.4000e6, kr 900".
+/// "Kt 1.400 MN/m, Kr 900.0 N m/rad".
 fn answer_words(estimate: &ConsistentEstimate) -> String {
     let mut words = Vec::new();
     for quantity in [Quantity::Kt, Quantity::Kr, Quantity::Modulus] {
         let is_asked = estimate.fit.contains(&quantity.lead());
         let own = estimate.quantity(quantity).filter(|_| is_asked);
         if let Some(value) = own.and_then(|own| own.value) {
-            words.push(format!("{} {value:.4e}", quantity.name()));
+            words.push(value_words(quantity, value));
         }
     }
     words.join(", ")
+}
+
+/// "Kt 1.400 MN/m": a value with its symbol and unit.
+fn value_words(quantity: Quantity, value: f64) -> String {
+    let (symbol, unit) = match quantity {
+        Quantity::Kt => ("Kt", "N/m"),
+        Quantity::Kr => ("Kr", "N m/rad"),
+        Quantity::Modulus => ("modulus", "Pa"),
+        Quantity::Density => ("density", "kg/m3"),
+        _ => return format!("{} {value:.4}", quantity.name()),
+    };
+    format!("{symbol} {}", with_prefix(value, unit))
 }
 
 /// Other numbers of the modes that the model would explain.
@@ -403,7 +416,8 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
     });
     let only = [("least", quantity.at_least), ("most", quantity.at_most)];
     let only = only.map(|(word, end)| {
-        end.map(|end| format!("the frequencies say only that {name} is at {word} {end:.4e} (95 %)"))
+        let end = end.map(|end| value_words(quantity.quantity, end));
+        end.map(|end| format!("the frequencies give a limit only: {end} at {word} (95 %)"))
     });
     let parts: Vec<String> = limit
         .into_iter()

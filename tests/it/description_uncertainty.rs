@@ -579,8 +579,8 @@ fn left_out_answers(modes: &[MeasuredMode]) -> Vec<LeftOutAnswer> {
 
 #[test]
 fn prop_the_limits_of_several_answers_hold_them_all() {
-    // Four modes and two stiffnesses: one mode left out leaves one to test with.
-    let answers = left_out_answers(&spoiled(4, &[(4, 0.02)]));
+    // Kr follows the first mode and Kt the second: an error of either looks much like one of the other.
+    let answers = left_out_answers(&spoiled(5, &[(2, 6e-3)]));
     assert!(answers.len() > 1, "{answers:?}");
     let sum: f64 = answers.iter().map(|answer| answer.mode.probability).sum();
     assert!((sum - 1.0).abs() < 1e-12, "{sum}");

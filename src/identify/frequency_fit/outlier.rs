@@ -10,7 +10,7 @@
 //! 1. with all modes the model fails, with the least discrepancy: probability below [`FAILS`];
 //! 2. without the most probable one it explains the rest: probability above [`EXPLAINS`];
 //! 3. that mode deviates by [`DEVIATION`] standard deviations or more;
-//! 4. the rest has a mode more than parameters to be tested by;
+//! 4. there are [`FEWEST`] modes or more, and the rest has one more than parameters to be tested by;
 //! 5. some mode is none of the candidates.
 //!
 //! What a model misses in all modes is no outlier: then the rest is not explained either.
@@ -25,6 +25,7 @@ use tapjoint_numerics::stats::chi_square_tail;
 const FAILS: f64 = 1e-3;
 const EXPLAINS: f64 = 0.02;
 const DEVIATION: f64 = 4.0;
+const FEWEST: usize = 5;
 /// Least probability of a candidate, that of the first being 1.
 const SECOND: f64 = 0.1;
 /// Errors beyond this share (1) are less usual: such a peak would have another number.
@@ -63,7 +64,7 @@ impl ConsistentEstimator {
         let described = self.structures.iter().filter(|index| **index == 0).count();
         let is_tested = self.settings.weights == ResidualWeights::Measured
             && self.settings.discrepancy
-            && described >= self.settings.fit.len() + 2;
+            && described >= FEWEST.max(self.settings.fit.len() + 2);
         let goodness = self.goodness.and_then(|goodness| goodness.probability);
         if !is_tested || goodness.is_none_or(|goodness| goodness >= FAILS) {
             return Vec::new();

@@ -9,7 +9,7 @@
 //! The second table is about outlying modes. Of the tests where one lies beyond 5 standard deviations of what the others
 //! predict it has the shares where it is the only one named (found), where it is among the named (among), and where an
 //! observer who knows the distributions of the world holds it for the most probable (ideal). The other columns are of all
-//! tests: the mean number of modes that are named together, the share in which others are named alone, and the coverage
+//! tests: the mean number of modes that are named together, the share in which only others are named, and the coverage
 //! of the limits that are stated in the end, in brackets of the tests beyond 5.
 //!
 //! The third table (`--world effect`, cantilevers) is of descriptions that lack an effect of the catalogue: by effect and by how far

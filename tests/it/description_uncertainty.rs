@@ -9,14 +9,12 @@ mod worlds;
 
 use crate::shared::steel_strip;
 use statrs::distribution::{Binomial, DiscreteCDF};
-use tapjoint::description::TestDescription;
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{
     AttachmentTolerance, BeamTolerances, BudgetInput, ConsistentEstimate, ConsistentEstimator,
     ConsistentSettings, FrequencyModel, JointedStructure, LEAST_DISCREPANCY, LeftOutAnswer,
     Measure, MovedClamp, Parameter, Quantity, WeighedBeam,
 };
-use tapjoint::pipeline::{structure_details, tested_structure};
 use tapjoint::structure::specimen::{Mesh, PointMass};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, Joint};
 use worlds::{Answer, Kind, Section, World, answers, outlier_answers};
@@ -416,7 +414,6 @@ fn val_what_a_measurement_would_bring_is_what_it_brings() {
     // Five modes of the free bar, right to the least discrepancy.
     let free = JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Free);
     let test = MovedClamp {
-        attachments: Vec::new(),
         modes: modes_of(&free, 5)
             .into_iter()
             .map(|mode| MeasuredMode {
@@ -425,6 +422,7 @@ fn val_what_a_measurement_would_bring_is_what_it_brings() {
             })
             .collect(),
         structure: free,
+        attachments: Vec::new(),
     };
     let estimator = ConsistentEstimator::of_lengths(&structure, &modes, &[test], &settings);
     let with_test = estimator.unwrap().settled().estimate().unwrap();
@@ -558,38 +556,6 @@ fn recover_the_mode_that_does_not_belong_to_the_others() {
     }
 }
 
-#[test]
-fn val_the_scale_of_the_frequencies_is_as_uncertain_as_its_factors() {
-    let scale = |more: &str, density: &str| {
-        let text = format!(
-            "[beam]\nlength = 0.5\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\n{density}{more}[joint]\nkind = \"cantilever\"\n"
-        );
-        let test = TestDescription::parse(&text, "test.toml").unwrap();
-        let structure = tested_structure(&test);
-        structure_details(&test, &structure.beam).scale_std()
-    };
-    let stated = "tolerance = { length = \"0.2 %\", width = \"0.5 %\", thickness = \"0.4 %\", modulus = \"2 %\", density = \"0.6 %\" }\n";
-    // h/L^2 sqrt(E/rho): 0.4, 2 x 0.2, 2/2 and 0.6/2 %.
-    let expected =
-        (0.004f64.powi(2) + 0.004f64.powi(2) + 0.01f64.powi(2) + 0.003f64.powi(2)).sqrt();
-    assert_close(
-        scale(stated, "density = 7850\n").unwrap(),
-        expected,
-        1e-9,
-        "stated",
-    );
-    // A weighed bar: h^1.5 L^-1.5 sqrt(E b/m), and the balance is right to 0.1 %.
-    let powers = [0.01f64, 0.0005, 1.5 * 0.004, 1.5 * 0.002, 0.0025];
-    let expected = powers.iter().map(|share| share * share).sum::<f64>().sqrt();
-    assert_close(
-        scale(stated, "mass = 0.98\n").unwrap(),
-        expected,
-        1e-9,
-        "weighed",
-    );
-    assert_eq!(scale("tolerance = \"exact\"\n", "density = 7850\n"), None);
-}
-
 /// Frequencies of the loaded strip of which some are off by these shares.
 fn spoiled(count: usize, errors: &[(usize, f64)]) -> Vec<MeasuredMode> {
     let mut modes = modes_of(&loaded(), count);
@@ -613,9 +579,9 @@ fn left_out_answers(modes: &[MeasuredMode]) -> Vec<LeftOutAnswer> {
 
 #[test]
 fn prop_the_limits_of_several_answers_hold_them_all() {
-    // Of five modes some can stand for others where they lie off.
-    let mut answers = (1..=5).map(|mode| left_out_answers(&spoiled(5, &[(mode, 0.01)])));
-    let answers = answers.find(|answers| answers.len() > 1).unwrap();
+    // Kr follows the first mode and Kt the second: an error of either looks much like one of the other.
+    let answers = left_out_answers(&spoiled(5, &[(2, 6e-3)]));
+    assert!(answers.len() > 1, "{answers:?}");
     let sum: f64 = answers.iter().map(|answer| answer.mode.probability).sum();
     assert!((sum - 1.0).abs() < 1e-12, "{sum}");
     let joined = LeftOutAnswer::joined(&answers).unwrap();

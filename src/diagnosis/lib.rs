@@ -55,8 +55,7 @@ pub use description::DescriptionUncertainty;
 pub use result::{
     AmplitudeDependence, Block, Closure, CrossValidation, DecidedBy, Diagnosis, FrequencyChange,
     Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
-    Misfit, NextTest, ParameterValue, PropertyChange, Proposal, Residual, UnlocatedSensors,
-    Verdict,
+    Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
 pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
 pub use structure::{Nominal, NominalSensor};

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
+use tapjoint_beam::Beam;
 use tapjoint_beam::effects::{Effect, EffectId, Group, JointLaw, Place};
-use tapjoint_identify::consistent::Parameter;
 
 /// Answer of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
@@ -215,18 +215,9 @@ pub struct HypothesisResult {
     /// Best coupling of the joint's own model (1), without that of the effects.
     #[serde(skip)]
     pub coupling: f64,
-    /// Where the fit moves the properties of the beam, within their tolerances.
+    /// The beam, of a lap joint its left half, where the fit moves it within its tolerances.
     #[serde(skip)]
-    pub beam: Vec<PropertyChange>,
-}
-
-/// A property of the beam that the fit moves.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PropertyChange {
-    /// The property.
-    pub property: Parameter,
-    /// Logarithm of its best value over the described one (1).
-    pub change: f64,
+    pub beam: Option<Beam>,
 }
 
 fn joined_groups<S: Serializer>(groups: &[Group], to: S) -> Result<S::Ok, S::Error> {

@@ -10,7 +10,7 @@ use crate::optimum::{LinearModel, Optimum, maximise};
 use crate::parameters::{LocationKind, NuisanceParameter, Prior};
 use crate::result::{
     CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LocationMap,
-    ParameterValue, PropertyChange, UnlocatedSensors, Verdict,
+    ParameterValue, UnlocatedSensors, Verdict,
 };
 use crate::settings::{
     CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, LEAST_MAP_DATA, MISFIT, SEPARATE,
@@ -24,8 +24,10 @@ use crate::verdict::{
     location_probabilities, none_of, verdict,
 };
 use nalgebra::DMatrix;
+use tapjoint_beam::Beam;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_beam::specimen::Body;
+use tapjoint_identify::consistent::Parameter;
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Returns the result of a comparison.
@@ -154,7 +156,7 @@ impl<'a> Reference<'a> {
             misfit: residuals.as_ref().map(Residuals::misfit),
             effects: layout.effects_at(parameters).unwrap_or_default(),
             coupling: coupling.map_or(0.0, |k| parameters[k]),
-            beam: property_changes(dataset, &parameters[layout.first_nuisance()..]),
+            beam: Some(fitted_beam(dataset, &parameters[layout.first_nuisance()..])),
             ..HypothesisResult::default()
         };
         if !candidate.is_unknown() {
@@ -248,14 +250,24 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Returns where the values of the nuisance parameters move the beam's properties.
-fn property_changes(dataset: &Dataset, values: &[f64]) -> Vec<PropertyChange> {
-    let nuisances = dataset.nuisances.iter().zip(values);
-    let changes = nuisances.filter_map(|(nuisance, &change)| match nuisance.parameter {
-        NuisanceParameter::Property { property } => Some(PropertyChange { property, change }),
-        _ => None,
-    });
-    changes.collect()
+/// Returns the first beam with the properties that these values of the nuisance parameters give it.
+fn fitted_beam(dataset: &Dataset, values: &[f64]) -> Beam {
+    let mut beam = dataset.nominal.specimen.body.beams()[0];
+    for (nuisance, change) in dataset.nuisances.iter().zip(values) {
+        let NuisanceParameter::Property { property } = nuisance.parameter else {
+            continue;
+        };
+        let own = match property {
+            Parameter::Modulus => &mut beam.modulus,
+            Parameter::Density => &mut beam.density,
+            Parameter::Thickness => &mut beam.thickness,
+            Parameter::Width => &mut beam.width,
+            Parameter::Length => &mut beam.length,
+            _ => continue,
+        };
+        *own *= change.exp();
+    }
+    beam
 }
 
 /// Returns a parameter with its value and standard uncertainty.

@@ -7,8 +7,8 @@ use tapjoint_beam::StructureError;
 use tapjoint_beam::effects::{Circumstances, Effect, EffectError, EffectId, Seen, apply};
 use tapjoint_beam::specimen::{Mesh, PointMass};
 use tapjoint_description::{Assembly, BeamTheory, SensorKind, TestDescription};
+use tapjoint_description::{described_beam, described_specimen};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
-use tapjoint_identify::consistent::Parameter;
 use tapjoint_identify::observation::effective_share;
 use toml::Value;
 
@@ -120,33 +120,40 @@ fn line(key: &str, value: f64) -> String {
 fn described(test: &TestDescription, found: &HypothesisResult) -> String {
     let beam = &test.beam;
     let mut text = format!("name = {}\n\n[beam]\n", quoted(&test.name));
-    let properties = [
-        ("length", beam.length, Parameter::Length),
-        ("width", beam.width, Parameter::Width),
-        ("thickness", beam.thickness, Parameter::Thickness),
-        ("modulus", beam.modulus, Parameter::Modulus),
-        ("density", beam.density, Parameter::Density),
-    ];
+    let described = described_beam(test);
     // Within its tolerance the fit moves each property to where the readings ask for it.
-    for (key, described, property) in properties {
-        let factor = factor_of(found, property);
-        if factor != 1.0 {
+    let fitted = found.beam.unwrap_or(described);
+    // The fit's length is that of the left half of a lap joint, the described one that of both.
+    let stretched = fitted.length / described_specimen(test, None).body.beams()[0].length;
+    let properties = [
+        ("length", beam.length, stretched * beam.length),
+        ("width", beam.width, fitted.width),
+        ("thickness", beam.thickness, fitted.thickness),
+        ("modulus", beam.modulus, fitted.modulus),
+        ("density", beam.density, fitted.density),
+    ];
+    for (key, described, fitted) in properties {
+        if fitted != described {
             text.push_str(&format!("# Described: {described}.\n"));
         }
-        text.push_str(&line(key, factor * described));
+        text.push_str(&line(key, fitted));
     }
     text.extend(beam.poisson.map(|poisson| line("poisson", poisson)));
     if let Some(right) = &test.joint.right {
         text.push_str("\n[beam.right]\n");
+        // Both halves are wrong by the same factor.
         let own = [
-            ("width", right.width, Some(Parameter::Width)),
-            ("thickness", right.thickness, Some(Parameter::Thickness)),
-            ("modulus", right.modulus, Some(Parameter::Modulus)),
-            ("density", right.density, Some(Parameter::Density)),
-            ("poisson", right.poisson, None),
+            ("width", right.width, fitted.width / beam.width),
+            (
+                "thickness",
+                right.thickness,
+                fitted.thickness / beam.thickness,
+            ),
+            ("modulus", right.modulus, fitted.modulus / beam.modulus),
+            ("density", right.density, fitted.density / beam.density),
+            ("poisson", right.poisson, 1.0),
         ];
-        for (key, described, property) in own {
-            let factor = property.map_or(1.0, |property| factor_of(found, property));
+        for (key, described, factor) in own {
             text.extend(described.map(|described| line(key, factor * described)));
         }
     }
@@ -157,13 +164,6 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
     text
-}
-
-/// Returns the fitted value of a property over the described one.
-fn factor_of(found: &HypothesisResult, property: Parameter) -> f64 {
-    let mut all = found.beam.iter();
-    let own = all.find(|one| one.property == property);
-    own.map_or(1.0, |own| own.change.exp())
 }
 
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {

@@ -9,12 +9,14 @@ mod worlds;
 
 use crate::shared::steel_strip;
 use statrs::distribution::{Binomial, DiscreteCDF};
+use tapjoint::description::TestDescription;
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{
     AttachmentTolerance, BeamTolerances, BudgetInput, ConsistentEstimate, ConsistentEstimator,
     ConsistentSettings, FrequencyModel, JointedStructure, LEAST_DISCREPANCY, LeftOutAnswer,
     Measure, MovedClamp, Parameter, Quantity, WeighedBeam,
 };
+use tapjoint::pipeline::{structure_details, tested_structure};
 use tapjoint::structure::specimen::{Mesh, PointMass};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, Joint};
 use worlds::{Answer, Kind, Section, World, answers, outlier_answers};
@@ -554,6 +556,38 @@ fn recover_the_mode_that_does_not_belong_to_the_others() {
         let false_alarms = clean.iter().filter(|answer| !answer.named.is_empty());
         assert!(false_alarms.count() < 2, "{}", kind.name());
     }
+}
+
+#[test]
+fn val_the_scale_of_the_frequencies_is_as_uncertain_as_its_factors() {
+    let scale = |more: &str, density: &str| {
+        let text = format!(
+            "[beam]\nlength = 0.5\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\n{density}{more}[joint]\nkind = \"cantilever\"\n"
+        );
+        let test = TestDescription::parse(&text, "test.toml").unwrap();
+        let structure = tested_structure(&test);
+        structure_details(&test, &structure.beam).scale_std()
+    };
+    let stated = "tolerance = { length = \"0.2 %\", width = \"0.5 %\", thickness = \"0.4 %\", modulus = \"2 %\", density = \"0.6 %\" }\n";
+    // h/L^2 sqrt(E/rho): 0.4, 2 x 0.2, 2/2 and 0.6/2 %.
+    let expected =
+        (0.004f64.powi(2) + 0.004f64.powi(2) + 0.01f64.powi(2) + 0.003f64.powi(2)).sqrt();
+    assert_close(
+        scale(stated, "density = 7850\n").unwrap(),
+        expected,
+        1e-9,
+        "stated",
+    );
+    // A weighed bar: h^1.5 L^-1.5 sqrt(E b/m), and the balance is right to 0.1 %.
+    let powers = [0.01f64, 0.0005, 1.5 * 0.004, 1.5 * 0.002, 0.0025];
+    let expected = powers.iter().map(|share| share * share).sum::<f64>().sqrt();
+    assert_close(
+        scale(stated, "mass = 0.98\n").unwrap(),
+        expected,
+        1e-9,
+        "weighed",
+    );
+    assert_eq!(scale("tolerance = \"exact\"\n", "density = 7850\n"), None);
 }
 
 /// Frequencies of the loaded strip of which some are off by these shares.

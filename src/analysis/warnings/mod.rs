@@ -170,7 +170,7 @@ pub const WARNING_CODES: [(&str, &str); 76] = [
     ),
     (
         "outlying-mode",
-        "a mode does not belong to the others and is left out of the estimate",
+        "a mode, or one of a few, does not belong to the others and is left out of the estimate",
     ),
     (
         "other-numbers",

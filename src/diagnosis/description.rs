@@ -1,4 +1,4 @@
-//! How well the structure is described, and what an error of the description does to the frequencies.
+//! What an error of the description does to the frequencies.
 //!
 //! Each uncertain property is a nuisance parameter with its standard uncertainty as the prior, as in the estimate of the
 //! joint. The joint's stiffnesses stay in SI while the beam under them changes. With the shares t and r of the joint's
@@ -15,23 +15,7 @@
 use crate::structure::ModalModel;
 use tapjoint_beam::WidthStiffening;
 use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen};
-use tapjoint_identify::consistent::{BeamTolerances, Parameter};
-use tapjoint_identify::observation::Observed;
-
-/// Standard uncertainties of a description; those of zero are exact.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct DescriptionUncertainty {
-    /// Properties of the beam.
-    pub beam: BeamTolerances,
-    /// Masses of sensors and of what is fastened (1, relative).
-    pub masses: f64,
-    /// Positions of sensors, fastened masses and taps (m).
-    pub positions: f64,
-    /// Logarithm of the beam's mass by a balance over the described one; `None` where it was not weighed.
-    pub weighed: Option<Observed>,
-    /// Logarithm of the free beam's frequencies over the described ones, on average; `None` without a free test.
-    pub free_scale: Option<Observed>,
-}
+use tapjoint_identify::consistent::Parameter;
 
 /// Properties of the beam that are nuisance parameters.
 pub const PROPERTIES: [Parameter; 5] = [

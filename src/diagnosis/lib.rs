@@ -4,8 +4,8 @@
 //! ```text
 //! Observations, Nominal -> observations   common modes, unpaired peaks, checks
 //!                          dataset        data with their uncertainties, nuisance parameters
-//!                          description    how well the beam is known, and what that does to frequencies
-//!                          structure      the described structure and its modal models
+//!                          structure      the described structure, how well it is known, and its modal models
+//!                          description    what an error of the description does to the frequencies
 //!                          parameters     effects, priors, order of the parameters
 //!                          forward        predictions of a hypothesis and their slopes
 //!                          evidence       evidence of a hypothesis (with optimum)
@@ -51,14 +51,13 @@ mod tests;
 mod validate;
 mod verdict;
 
-pub use description::DescriptionUncertainty;
 pub use result::{
     AmplitudeDependence, Block, Closure, CrossValidation, DecidedBy, Diagnosis, FrequencyChange,
     Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
     Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
 pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
-pub use structure::{Nominal, NominalSensor};
+pub use structure::{DescriptionUncertainty, Nominal, NominalSensor};
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
 
 use tapjoint_identify::observation::Observations;

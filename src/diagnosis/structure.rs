@@ -2,7 +2,6 @@
 //!
 //! This chapter and [`forward`](crate::forward) alone know that the structure is a beam on a joint.
 
-use crate::description::DescriptionUncertainty;
 use crate::joint_motion::{
     JointMotion, ModeAmplitude, StiffnessChanges, initial_amplitude, log_stiffness,
 };
@@ -16,7 +15,8 @@ use tapjoint_beam::effects::{JointLaw, Seen};
 use tapjoint_beam::specimen::{
     BeamModes, Body, Joint, Mesh, PointInertia, PointMass, Specimen, SpecimenModes,
 };
-use tapjoint_identify::observation::{Configuration, ObservedMode, effective_share};
+use tapjoint_identify::consistent::BeamTolerances;
+use tapjoint_identify::observation::{Configuration, Observed, ObservedMode, effective_share};
 use tapjoint_numerics::stats::median;
 
 /// Number of elements of a structure.
@@ -43,6 +43,21 @@ pub struct Nominal {
     /// Largest bias of frequencies that are read on lines (Hz); `None` for fitted ones, which
     /// have none.
     pub reading_bias: Option<f64>,
+}
+
+/// Standard uncertainties of a description; those of zero are exact.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DescriptionUncertainty {
+    /// Properties of the beam.
+    pub beam: BeamTolerances,
+    /// Masses of sensors and of what is fastened (1, relative).
+    pub masses: f64,
+    /// Positions of sensors, fastened masses and taps (m).
+    pub positions: f64,
+    /// Logarithm of the beam's mass by a balance over the described one; `None` where it was not weighed.
+    pub weighed: Option<Observed>,
+    /// Logarithm of the free beam's frequencies over the described ones, on average; `None` without a free test.
+    pub free_scale: Option<Observed>,
 }
 
 /// Sensor as described.

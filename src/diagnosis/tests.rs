@@ -3,7 +3,7 @@
 use crate::amplitude::{sensitivity, set_joint_motions};
 use crate::compare::set_section_slopes;
 use crate::dataset::{Dataset, Datum, MORE_MODES, Observable, ObservableKind};
-use crate::description::{DescriptionUncertainty, PROPERTIES, SectionSlopes};
+use crate::description::{PROPERTIES, SectionSlopes};
 use crate::diagnose;
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
@@ -11,7 +11,7 @@ use crate::forward::Forward;
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effect};
 use crate::settings::GapSettings;
-use crate::structure::{ModalModel, Nominal, NominalSensor};
+use crate::structure::{DescriptionUncertainty, ModalModel, Nominal, NominalSensor};
 use crate::synthetic::{PlannedConfiguration, TestPlan, observe};
 use std::sync::Arc;
 use tapjoint_beam::Beam;

@@ -17,6 +17,7 @@ mod budget;
 mod estimate;
 mod estimator;
 mod model;
+mod monte_carlo;
 mod outlier;
 mod problem;
 mod set_ups;

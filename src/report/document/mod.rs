@@ -3,9 +3,15 @@
 //! Units are SI, frequencies Hz. A value that does not exist is `null`, never 0. `low` and `high`
 //! are 95 % limits, `null` where unbounded or unknown.
 
+mod gap;
+mod headline;
 mod measured;
 mod model;
 
+pub use gap::{
+    Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection, gap_section,
+};
+pub use headline::{HeadlineSection, HeadlineValue};
 pub(crate) use measured::is_strong;
 pub use measured::{
     AmplitudeSection, ChannelSection, DatasetSection, FitSection, FittedFunctionSection,
@@ -13,10 +19,8 @@ pub use measured::{
     frf_document, method_name,
 };
 pub use model::{
-    Baseline, BaselineSection, BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection,
-    FreeTestSection, FromReadings, GapPlaceSection, GapSection, HeadlineSection, HeadlineValue,
+    BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection, FreeTestSection, FromReadings,
     IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
-    UpdatedModelSection, gap_section,
 };
 // Sections that are results as they are.
 pub use tapjoint_analysis::{

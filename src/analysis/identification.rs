@@ -226,7 +226,7 @@ fn left_out_answers(
     all: &ConsistentEstimator,
 ) -> Vec<LeftOutAnswer> {
     let outlying = all.outlying_modes().into_iter();
-    let answers = outlying.filter_map(|mode| {
+    let answers = outlying.map(|mode| {
         let set_ups = fitted_set_ups(structure, modes, settings, Some(mode.mode));
         let rest = all.without(mode.mode).settled();
         Some(LeftOutAnswer {
@@ -234,7 +234,8 @@ fn left_out_answers(
             estimate: rest.estimate_with_set_ups(&set_ups).ok()?,
         })
     });
-    answers.collect()
+    // Without the answer of one candidate no limits hold all.
+    answers.collect::<Option<_>>().unwrap_or_default()
 }
 
 /// Returns the main estimate, and what is left out of it. `with_all` is the estimate from all modes.

@@ -16,8 +16,8 @@ use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
 use tapjoint_description::{coupling, described_beam, described_specimen};
 use tapjoint_diagnosis::{
-    DescriptionUncertainty, Diagnosis, GapError, GapSettings, Nominal, NominalSensor, Proposal,
-    diagnose,
+    DescriptionUncertainty, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, NominalSensor,
+    Proposal, Verdict, diagnose, reading_evidence,
 };
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimate, LEAST_DISCREPANCY, MovedClamp, Parameter,
@@ -40,13 +40,15 @@ const COMMON: f64 = 1.5e-5;
 
 /// Returns the observations of a test; none for a bare recording, whose peaks have no numbers of a model.
 pub fn observations(analysis: &Analysis) -> Observations {
+    observations_without(analysis, None)
+}
+
+/// Returns the observations without one of the modes.
+fn observations_without(analysis: &Analysis, left_out: Option<usize>) -> Observations {
     let mut configurations = Vec::new();
-    // What does not belong to the other modes explains nothing that they share.
-    let found = analysis.identification.as_ref();
-    let left_out = found.and_then(|found| Some(found.left_out.as_ref()?.found.mode));
     if analysis.structure.is_some() && analysis.recordings.is_empty() {
         let modes = analysis.modes.iter();
-        let modes = modes.filter(|mode| mode.mode != left_out);
+        let modes = modes.filter(|mode| left_out.is_none() || mode.mode != left_out);
         let modes = modes.filter_map(|mode| {
             Some(ObservedMode::read_elsewhere(
                 mode.mode?,
@@ -230,13 +232,66 @@ pub fn diagnose_test(
     analysis: &Analysis,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
-    let mut found = diagnose(&observations(analysis), &nominal(test, analysis), settings)?;
+    let mut found = diagnose_modes(analysis, &nominal(test, analysis), settings)?;
     // What has been done is no next test.
     if test.beam.free.is_some() || test.beam.free_test.is_some() {
         let next = &mut found.next_tests;
         next.retain(|next| next.proposal != Proposal::BareBeam);
     }
+    // The table of the uncertainty says what thickness and length alone would bring.
+    if test.beam.weighed.is_some() {
+        let next = &mut found.next_tests;
+        next.retain(|next| next.proposal != Proposal::Calipers);
+    }
     Ok(found)
+}
+
+/// Odds (logarithm) from which on one explanation excludes another: 20 to 1.
+const EXCLUDED: f64 = 3.0;
+
+/// Diagnoses all modes, or without the one that the estimate leaves out. What looks like the wrong reading of one mode may be an
+/// effect that the model lacks, and the other way round: the evidence of both decides.
+fn diagnose_modes(
+    analysis: &Analysis,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<Diagnosis, GapError> {
+    let all = observations(analysis);
+    let found = analysis.identification.as_ref();
+    let left_out = found.and_then(|found| Some(found.left_out.as_ref()?.found.mode));
+    let Some(mode) = left_out else {
+        return diagnose(&all, nominal, settings);
+    };
+    let without = || {
+        let rest = observations_without(analysis, left_out);
+        diagnose(&rest, nominal, settings)
+    };
+    let (Ok(mut all_modes), Some(reading)) = (
+        diagnose(&all, nominal, settings),
+        reading_evidence(&all, nominal, settings, mode)?,
+    ) else {
+        return without();
+    };
+    let explained = all_modes.hypotheses.iter();
+    let explained = explained.filter(|one| one.hypothesis != Hypothesis::None);
+    let Some(best) = explained.max_by(|a, b| a.probability.total_cmp(&b.probability)) else {
+        return without();
+    };
+    let odds = best.log_bayes_factor.unwrap_or(f64::NEG_INFINITY) - reading;
+    let is_named = !all_modes.verdict.hypotheses().is_empty();
+    if odds > EXCLUDED {
+        return Ok(all_modes);
+    }
+    if odds < -EXCLUDED || !is_named {
+        return without();
+    }
+    // Either the effect, or nothing but the reading of this mode.
+    let mut either = all_modes.verdict.hypotheses();
+    if !either.contains(&Hypothesis::None) {
+        either.push(Hypothesis::None);
+    }
+    all_modes.verdict = Verdict::Set(either);
+    Ok(all_modes)
 }
 
 /// The structure as described, with the joint as estimated: where the diagnosis begins.
@@ -254,7 +309,8 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
     };
     if let Some(free) = &analysis.free_test {
         let known = &mut nominal.uncertainty;
-        known.free_scale = free_scale(&free.bar, &known.beam);
+        known.free_scale = free_scale(&free.bar, &known.beam, test.beam.length);
+        known.has_same_clock = !free.recordings.is_empty();
     }
     if let Some(estimate) = estimate {
         take_estimated_properties(&mut nominal, estimate);
@@ -265,25 +321,29 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
 /// Spread of a property that is estimated (1): it has no prior, and what the description says of it is a guess.
 const ESTIMATED: f64 = 0.3;
 
-/// Takes the modulus or the density from the estimate, where that estimates it.
+/// Takes the modulus or the density from the estimate, where that estimates it. Weight and free test are then compared with
+/// the new nominal beam.
 fn take_estimated_properties(nominal: &mut Nominal, estimate: &ConsistentEstimate) {
     let described = nominal.specimen.body.beams()[0];
-    for parameter in &estimate.fit {
-        let tolerances = &mut nominal.uncertainty.beam;
-        let beams = nominal.specimen.body.beams_mut().iter_mut();
-        match parameter {
-            Parameter::Modulus => {
-                tolerances.modulus = Some(ESTIMATED);
-                let factor = estimate.beam.modulus / described.modulus;
-                beams.for_each(|beam| beam.modulus *= factor);
-            }
-            Parameter::Density => {
-                tolerances.density = Some(ESTIMATED);
-                let factor = estimate.beam.density / described.density;
-                beams.for_each(|beam| beam.density *= factor);
-            }
-            _ => {}
-        }
+    let known = &mut nominal.uncertainty;
+    let (mut modulus, mut density) = (1.0, 1.0);
+    if estimate.fit.contains(&Parameter::Modulus) {
+        known.beam.modulus = Some(ESTIMATED);
+        modulus = estimate.beam.modulus / described.modulus;
+    }
+    if estimate.fit.contains(&Parameter::Density) {
+        known.beam.density = Some(ESTIMATED);
+        density = estimate.beam.density / described.density;
+    }
+    for beam in nominal.specimen.body.beams_mut() {
+        beam.modulus *= modulus;
+        beam.density *= density;
+    }
+    if let Some(weighed) = &mut known.weighed {
+        weighed.value -= density.ln();
+    }
+    if let Some(free) = &mut known.free_scale {
+        free.value -= 0.5 * (modulus / density).ln();
     }
 }
 
@@ -345,45 +405,64 @@ fn uncertainty(test: &TestDescription) -> DescriptionUncertainty {
     let details = structure_details(test, &beam);
     let halves = described_specimen(test, None);
     let weighed = details.weighed.map(|weighed| {
-        // That of both halves of a lap joint.
+        let ratio = weighed.length / beam.length;
+        // Of a lap joint both halves.
         let beams = halves.body.beams().iter();
-        let described = beams.map(Beam::mass).sum::<f64>() * weighed.length / beam.length;
+        let described = beams.map(Beam::mass).sum::<f64>() * ratio;
+        let of_length = match details.is_longer {
+            true => details.tolerances.length.unwrap_or(0.0) / ratio,
+            false => 0.0,
+        };
         Observed {
             value: (weighed.mass / described).ln(),
-            std: weighed.std / weighed.mass,
+            std: (weighed.std / weighed.mass).hypot(of_length),
             freedom: None,
         }
     });
+    let free = details.free.as_ref();
     DescriptionUncertainty {
         beam: details.tolerances,
         masses: tolerance.masses.std,
         positions: tolerance.positions.std,
         weighed,
-        free_scale: details
-            .free
-            .as_ref()
-            .and_then(|free| free_scale(free, &details.tolerances)),
+        free_scale: free.and_then(|free| free_scale(free, &details.tolerances, beam.length)),
+        is_longer: details.is_longer,
+        has_same_clock: false,
     }
 }
 
-/// Returns the mean of the free bar's frequencies over the described ones (logarithm); `None` where the bar has none.
-fn free_scale(free: &MovedClamp, tolerances: &BeamTolerances) -> Option<Observed> {
+/// Returns the mean of the free bar's frequencies over the described ones (logarithm); `None` where the bar has none. `length`
+/// (m) is that of the beam, for which the tolerances are given.
+fn free_scale(free: &MovedClamp, tolerances: &BeamTolerances, length: f64) -> Option<Observed> {
     let count = free.modes.iter().map(|mode| mode.mode).max()?;
     let specimen = free.structure.specimen(None);
     let predicted = specimen.modes(count, Mesh::DIAGNOSIS).ok()?;
     let (mut weights, mut sum) = (0.0, 0.0);
+    // Change of the mean by mass and place of everything that sits on the bar.
+    let mut of_masses = vec![[0.0; 2]; specimen.masses.len()];
     for mode in &free.modes {
-        let predicted = predicted.frequencies()[mode.mode - 1];
+        let index = mode.mode - 1;
         let reading = mode.std.unwrap_or(0.0) / mode.frequency;
         let weight = (reading * reading + LEAST_DISCREPANCY * LEAST_DISCREPANCY).recip();
         weights += weight;
-        sum += weight * (mode.frequency / predicted).ln();
+        sum += weight * (mode.frequency / predicted.frequencies()[index]).ln();
+        for (load, changes) in specimen.masses.iter().zip(&mut of_masses) {
+            // d ln f/d m = -phi^2/2, d ln f/d x = -m phi phi', of a shape of unit modal mass.
+            let phi = predicted.displacement(index, load.position);
+            changes[0] -= weight * 0.5 * phi * phi;
+            changes[1] -= weight * load.mass * phi * predicted.slope(index, load.position);
+        }
     }
-    // f is proportional to L^-2, and the length of the bar is known as well as that of the beam.
-    let of_length = 2.0 * tolerances.length.unwrap_or(0.0);
+    let attached = free.attachments.iter().zip(&of_masses);
+    let attached = attached.map(|(tolerance, changes)| {
+        let [by_mass, by_place] = changes.map(|change| change / weights);
+        (by_mass * tolerance.mass).powi(2) + (by_place * tolerance.position).powi(2)
+    });
+    // f is proportional to L^-2. The length of the bar is known as well as that of the beam, in m.
+    let of_length = 2.0 * tolerances.length.unwrap_or(0.0) * length / free.structure.beam.length;
     Some(Observed {
         value: sum / weights,
-        std: weights.sqrt().recip().hypot(of_length),
+        std: (weights.recip() + of_length * of_length + attached.sum::<f64>()).sqrt(),
         freedom: None,
     })
 }

@@ -101,6 +101,8 @@ pub struct StructureDetails {
     pub attachments: Vec<AttachmentTolerance>,
     /// The bare bar on a balance.
     pub weighed: Option<WeighedBeam>,
+    /// True where the bar is longer than the beam: the clamp holds a part of it.
+    pub is_longer: bool,
     /// The bar without its joint, with its frequencies.
     pub free: Option<MovedClamp>,
     /// True where the model itself may miss the frequencies.
@@ -131,7 +133,7 @@ impl StructureDetails {
     /// Returns the relative standard uncertainty of all frequencies by that of the beam; `None` of an exact description.
     ///
     /// f is proportional to h/L^2 sqrt(E/rho). A density that the weight m tells is m/(L b h), so that f goes with
-    /// h^1.5 L^-1.5 sqrt(E b/m).
+    /// h^1.5 L^-1.5 sqrt(E b/m). Where a longer bar was weighed, L^-2 stays.
     pub fn scale_std(&self) -> Option<f64> {
         let known = &self.tolerances;
         let weighed = self
@@ -149,7 +151,7 @@ impl StructureDetails {
                 (known.modulus, 0.5),
                 (Some(weighed.std / weighed.mass), 0.5),
                 (known.thickness, 1.5),
-                (known.length, 1.5),
+                (known.length, if self.is_longer { 2.0 } else { 1.5 }),
                 (known.width, 0.5),
             ],
         };
@@ -196,6 +198,7 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
             std: weighed.std,
             length: bar_length,
         }),
+        is_longer: test.beam.bar_length.is_some(),
         free: test
             .beam
             .free

@@ -238,8 +238,9 @@ const CSV_HEADS: [&str; 6] = [
     "name,planted,detectable,refutable,verdict,named,",
 ];
 /// First words of the test descriptions that the program writes.
-const DESCRIPTION_HEADS: [&str; 2] = [
+const DESCRIPTION_HEADS: [&str; 3] = [
     "# The model with what the diagnosis found (verdict:",
+    "# The model with the most probable hypothesis, which the diagnosis does not establish (verdict:",
     "# Recordings of a virtual test, made by `tapjoint simulate`.",
 ];
 /// First words of the manual pages that the program writes.

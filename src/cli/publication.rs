@@ -293,12 +293,14 @@ impl OutputFolder {
         })
     }
 
-    /// Adds a list of checksums if a file has no mark of the program. Returns the names of all files.
+    /// Adds a list of checksums if a file has no mark of the program, or the folder has a list already. Returns the names of all
+    /// files.
     fn add_checksums(&self) -> io::Result<Vec<PathBuf>> {
         let filled = self.filled();
         let mut names = files_below(&filled)?;
         let marked = names.iter().map(|name| carries_mark(&filled.join(name)));
-        if marked.collect::<io::Result<Vec<_>>>()?.contains(&false) {
+        let is_listed = self.path.join(CHECKSUMS).is_file();
+        if is_listed || marked.collect::<io::Result<Vec<_>>>()?.contains(&false) {
             let new: Vec<_> = names
                 .iter()
                 .map(|name| (name.clone(), filled.join(name)))

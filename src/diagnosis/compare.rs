@@ -135,6 +135,29 @@ pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
         .min_by(f64::total_cmp)
 }
 
+/// Spread of the reading of a mode that is off (1): a neighbour's peak, or one of another direction.
+const OFF: f64 = 0.02;
+
+/// Returns the evidence that one mode's reading is off, over that of the nominal model (logarithm). `None` for a mode that takes no
+/// part in the fit.
+pub fn reading_evidence(test: Test<'_>, mode: usize) -> Option<f64> {
+    let found = at_locations(test, |test| {
+        let (dataset, none) = prepared(test)?;
+        if mode > dataset.fitted_modes {
+            return None;
+        }
+        let mut loose = dataset;
+        loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, OFF);
+        let forward = Forward::new(&loose, &[]);
+        let priors = forward.priors();
+        let mut start = none.parameters().to_vec();
+        start.resize(priors.len(), 0.0);
+        let off = evaluate(&forward, &priors, &start)?;
+        Some(off.log_evidence - none.log_evidence)
+    });
+    found.into_iter().max_by(f64::total_cmp)
+}
+
 /// Returns the data, with amplitudes and slopes by the nominal model, and the fit of that model.
 fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);

@@ -80,6 +80,14 @@ impl Observable {
         self.kind == ObservableKind::Damping
     }
 
+    /// Returns whether it is measured of the bar alone.
+    pub fn is_of_bar(&self) -> bool {
+        matches!(
+            self.kind,
+            ObservableKind::BeamMass | ObservableKind::FreeScale
+        )
+    }
+
     /// Returns whether it is a modal constant or a ratio of a shape.
     pub fn is_shape(&self) -> bool {
         matches!(

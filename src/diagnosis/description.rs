@@ -9,12 +9,13 @@
 //! d ln f/d ln L = -2 + 3 t/2 + r/2 + sum (m phi^2/2 + m x phi phi')
 //! ```
 //!
-//! since f L^2 (rho A/E I)^1/2 depends on K_t L^3/E I, K_r L/E I, m/(rho A L), and x/L alone. Thickness and width follow
+//! since f L^2 (rho A/E I)^1/2 depends on K_t L^3/E I, K_r L/E I, m/(rho A L), x/L and (h/L)^2 alone. Thickness and width follow
 //! from E I and rho A. Rotary inertias and other springs enter in the same way.
 
-use crate::structure::ModalModel;
-use tapjoint_beam::WidthStiffening;
-use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen};
+use crate::structure::{ModalModel, ROTATION};
+use std::f64::consts::TAU;
+use tapjoint_beam::specimen::{Body, Mesh, PointInertia, PointMass, Specimen};
+use tapjoint_beam::{Beam, WidthStiffening};
 use tapjoint_identify::consistent::Parameter;
 
 /// Properties of the beam that are nuisance parameters.
@@ -25,6 +26,18 @@ pub const PROPERTIES: [Parameter; 5] = [
     Parameter::Width,
     Parameter::Length,
 ];
+
+/// Returns a property of a beam; `None` for a parameter that is none.
+pub fn property_of(beam: &mut Beam, property: Parameter) -> Option<&mut f64> {
+    match property {
+        Parameter::Modulus => Some(&mut beam.modulus),
+        Parameter::Density => Some(&mut beam.density),
+        Parameter::Thickness => Some(&mut beam.thickness),
+        Parameter::Width => Some(&mut beam.width),
+        Parameter::Length => Some(&mut beam.length),
+        _ => None,
+    }
+}
 
 /// Returns the derivative of the logarithm of the beam's mass with respect to that of a property.
 pub fn mass_slope(property: Parameter) -> f64 {
@@ -65,6 +78,19 @@ impl SectionSlopes {
     }
 }
 
+/// What an axial force and a base add to the energies of a mode.
+#[derive(Default)]
+struct Held {
+    /// Share of the strain energy (1).
+    strain: f64,
+    /// Share of the kinetic energy (1).
+    kinetic: f64,
+    /// Part of the derivative by the logarithm of the length (1).
+    by_length: f64,
+}
+
+/// Distance from a joint that is surely on one of its beams, over the length (1).
+const HAIR: f64 = 1e-9;
 /// Step of the differences along the section (1).
 const STEP: f64 = 1e-3;
 
@@ -87,21 +113,39 @@ impl ModalModel {
             by_length +=
                 1.5 * share - spring.stiffness * spring.position * phi * slope / omega_square;
         }
-        let joint = match &specimen.body {
-            Body::One(_) => 0.0,
-            Body::Joined([left, _]) => left.length,
+        let Held {
+            strain,
+            kinetic,
+            by_length: held,
+        } = self.share_of_others(index);
+        springs += strain;
+        masses += kinetic;
+        by_length += held;
+        // What sits at the joint moves with it; all else stays where it is.
+        let mut at_joint = specimen.overlap_masses();
+        let PointInertia { mass, inertia } = specimen.joint_mass;
+        let positions = match &specimen.body {
+            Body::One(_) => vec![0.0],
+            // Half of it on either beam, a hair inside.
+            Body::Joined([left, _]) => [1.0 - HAIR, 1.0 + HAIR].map(|x| x * left.length).to_vec(),
         };
-        let at_joint = PointMass {
-            position: joint,
-            mass: specimen.joint_mass.mass + specimen.overlap.map_or(0.0, |overlap| overlap.mass),
-            inertia: specimen.joint_mass.inertia,
-        };
-        for mass in specimen.masses.iter().chain([&at_joint]) {
+        let share = 1.0 / positions.len() as f64;
+        at_joint.extend(positions.into_iter().map(|position| PointMass {
+            position,
+            mass: share * mass,
+            inertia: share * inertia,
+        }));
+        for mass in specimen.masses.iter().chain(&at_joint) {
             let phi = self.modes().displacement(index, mass.position);
             let slope = self.modes().slope(index, mass.position);
             let (own, turning) = (mass.mass * phi * phi, mass.inertia * slope * slope);
             masses += own + turning;
-            by_length += 0.5 * own + 1.5 * turning + mass.mass * mass.position * phi * slope;
+            by_length += 0.5 * own + 1.5 * turning;
+        }
+        for mass in &specimen.masses {
+            let phi = self.modes().displacement(index, mass.position);
+            let slope = self.modes().slope(index, mass.position);
+            by_length += mass.mass * mass.position * phi * slope;
         }
         let (stiffness, inertia) = (0.5 * (1.0 - springs), -0.5 * (1.0 - masses));
         match property {
@@ -112,6 +156,41 @@ impl ModalModel {
             Parameter::Length => by_length,
             _ => 0.0,
         }
+    }
+
+    /// Returns the shares of an axial force and of a base that rocks in the energies of a mode.
+    fn share_of_others(&self, index: usize) -> Held {
+        const POINTS: usize = 48;
+        let specimen = &self.seen.specimen;
+        let omega_square = self.omega(index).powi(2);
+        let mut held = Held::default();
+        if specimen.axial_force != 0.0 {
+            // The work of the force P is P int phi'^2 dx, by the midpoint rule.
+            let step = specimen.body.length() / POINTS as f64;
+            let squares = (0..POINTS).map(|point| {
+                let slope = self.modes().slope(index, (point as f64 + 0.5) * step);
+                slope * slope * step
+            });
+            let share = specimen.axial_force * squares.sum::<f64>() / omega_square;
+            held.strain += share;
+            held.by_length += share;
+        }
+        if let (Some(base), Some(joint)) = (specimen.base, specimen.joint)
+            && base.ratio > 0.0
+            && joint.kr.is_finite()
+        {
+            // The joint's moment turns the base: M = (k - omega^2 J) theta.
+            let moment = joint.kr * self.modes().joint_motion(index)[ROTATION];
+            let stiffness = joint.kr / base.ratio;
+            let natural_square = (TAU * base.frequency).powi(2);
+            let theta = moment / (stiffness * (1.0 - omega_square / natural_square));
+            let strain = stiffness * theta * theta / omega_square;
+            let kinetic = stiffness * theta * theta / natural_square;
+            held.strain += strain;
+            held.kinetic += kinetic;
+            held.by_length += 0.5 * strain + 1.5 * kinetic;
+        }
+        held
     }
 
     /// Returns the slopes of the first modes along the section; `None` where a beam next to this one has no solution.

@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use tapjoint_beam::effects::{Circumstances, EffectId, JointLaw, apply};
 use tapjoint_beam::specimen::{BeamModes, Mesh, PointMass, Specimen};
+use tapjoint_identify::consistent::Parameter;
 use tapjoint_identify::observation::effective_share;
 
 /// Model of a dataset under one hypothesis.
@@ -175,7 +176,9 @@ impl<'a> Forward<'a> {
     /// Returns the modal models next to a point that is solved. If only frequencies are predicted, Rayleigh's
     /// quotient gives their change.
     fn solve_near(&self, parameters: &[f64], there: &[ModalModel]) -> Option<Vec<ModalModel>> {
-        let frequencies_alone = self.observables.iter().all(Observable::is_frequency);
+        // The beam alone has no part in the shapes.
+        let mut vibrating = self.observables.iter().filter(|one| !one.is_of_bar());
+        let frequencies_alone = vibrating.all(Observable::is_frequency);
         self.solve_by(parameters, |configuration, specimen| {
             let known = &there[configuration];
             if known.seen.specimen == *specimen {
@@ -260,7 +263,9 @@ impl<'a> Forward<'a> {
                 ObservableKind::BeamMass => Some(0.0),
                 ObservableKind::FreeScale => {
                     let modulus = self.size_of(EffectId::Modulus, parameters);
-                    Some(0.5 * modulus.ln_1p())
+                    let same = self.dataset.nominal.uncertainty.has_same_clock;
+                    let clock = if same { one.seen.frequency_scale } else { 1.0 };
+                    Some(0.5 * modulus.ln_1p() + clock.ln())
                 }
                 ObservableKind::Slope | ObservableKind::Damping => {
                     let law = self.law(parameters);
@@ -322,7 +327,11 @@ impl<'a> Forward<'a> {
         }
         match (observable.kind, nuisance) {
             (ObservableKind::BeamMass, NuisanceParameter::Property { property }) => {
-                return mass_slope(property);
+                let is_longer = self.dataset.nominal.uncertainty.is_longer;
+                return match property {
+                    Parameter::Length if is_longer => 0.0,
+                    _ => mass_slope(property),
+                };
             }
             (ObservableKind::FreeScale, NuisanceParameter::Property { property }) => {
                 return free_slope(property);

@@ -93,6 +93,21 @@ pub fn diagnose(
     Ok(summary::diagnosis(&comparison, unlocated))
 }
 
+/// Returns the evidence that the reading of one mode is off and nothing else is missing, over that of the nominal model
+/// (logarithm). `None` for a mode that takes no part in the fit.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn reading_evidence(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+    mode: usize,
+) -> Result<Option<f64>, GapError> {
+    let test = checked(observations, nominal, settings)?;
+    Ok(compare::reading_evidence(test, mode))
+}
+
 /// Returns the test if it can be diagnosed.
 fn checked<'a>(
     observations: &'a Observations,

@@ -92,7 +92,7 @@ pub struct GapSettings {
     /// Standard deviations that the joint's stiffnesses may have between set-ups (1), equally
     /// probable: 0.2 %, untouched; 1 %, usual; 2 %, a joint that was re-tightened.
     pub drift_stds: Vec<f64>,
-    /// What the model misses of each frequency at least (1, relative), whatever else explains it: [`LEAST_DISCREPANCY`].
+    /// Standard deviation of what the model misses of each mode's frequency (1, relative): [`LEAST_DISCREPANCY`].
     pub discrepancy: f64,
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
     /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.

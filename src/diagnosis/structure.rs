@@ -54,10 +54,14 @@ pub struct DescriptionUncertainty {
     pub masses: f64,
     /// Positions of sensors, fastened masses and taps (m).
     pub positions: f64,
-    /// Logarithm of the beam's mass by a balance over the described one; `None` where it was not weighed.
+    /// Logarithm of the bar's mass by a balance over that of the nominal bar; `None` where it was not weighed.
     pub weighed: Option<Observed>,
-    /// Logarithm of the free beam's frequencies over the described ones, on average; `None` without a free test.
+    /// Logarithm of the free bar's frequencies over those of the nominal bar, on average; `None` without a free test.
     pub free_scale: Option<Observed>,
+    /// True where the bar is longer than the beam: its length is then another one, and belongs to both data.
+    pub is_longer: bool,
+    /// True where the free test was read by the clock of this one.
+    pub has_same_clock: bool,
 }
 
 /// Sensor as described.

@@ -3,6 +3,7 @@
 use crate::amplitude::amplitude_dependence;
 use crate::compare::ModelComparison;
 use crate::dataset::Dataset;
+use crate::description::property_of;
 use crate::evidence::{Fit, log_likelihood};
 use crate::forward::Forward;
 use crate::next_test::next_tests;
@@ -27,7 +28,6 @@ use nalgebra::DMatrix;
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_beam::specimen::Body;
-use tapjoint_identify::consistent::Parameter;
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Returns the result of a comparison.
@@ -254,18 +254,17 @@ impl<'a> Reference<'a> {
 fn fitted_beam(dataset: &Dataset, values: &[f64]) -> Beam {
     let mut beam = dataset.nominal.specimen.body.beams()[0];
     for (nuisance, change) in dataset.nuisances.iter().zip(values) {
-        let NuisanceParameter::Property { property } = nuisance.parameter else {
-            continue;
-        };
-        let own = match property {
-            Parameter::Modulus => &mut beam.modulus,
-            Parameter::Density => &mut beam.density,
-            Parameter::Thickness => &mut beam.thickness,
-            Parameter::Width => &mut beam.width,
-            Parameter::Length => &mut beam.length,
+        let property = match nuisance.parameter {
+            NuisanceParameter::Property { property } => property,
+            NuisanceParameter::Poisson => {
+                beam.poisson += change;
+                continue;
+            }
             _ => continue,
         };
-        *own *= change.exp();
+        if let Some(own) = property_of(&mut beam, property) {
+            *own *= change.exp();
+        }
     }
     beam
 }

@@ -3,7 +3,7 @@
 use crate::amplitude::{sensitivity, set_joint_motions};
 use crate::compare::set_section_slopes;
 use crate::dataset::{Dataset, Datum, MORE_MODES, Observable, ObservableKind};
-use crate::description::{PROPERTIES, SectionSlopes};
+use crate::description::{PROPERTIES, SectionSlopes, property_of};
 use crate::diagnose;
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
@@ -16,7 +16,9 @@ use crate::synthetic::{PlannedConfiguration, TestPlan, observe};
 use std::sync::Arc;
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::{Circumstances, EffectId, apply};
-use tapjoint_beam::specimen::{Body, Joint, Mesh, PointInertia, PointMass, PointSpring, Specimen};
+use tapjoint_beam::specimen::{
+    Base, Body, Joint, LapOverlap, Mesh, PointInertia, PointMass, PointSpring, Specimen,
+};
 use tapjoint_identify::consistent::{BeamTolerances, Parameter};
 use tapjoint_identify::observation::{ExtraPeak, Observations, UNPAIRED};
 
@@ -412,14 +414,7 @@ fn regress_a_split_decay_weakens_itself_alone() {
 fn with_property(specimen: &Specimen, property: Parameter, factor: f64) -> Specimen {
     let mut other = specimen.clone();
     for beam in other.body.beams_mut() {
-        let own = match property {
-            Parameter::Modulus => &mut beam.modulus,
-            Parameter::Density => &mut beam.density,
-            Parameter::Thickness => &mut beam.thickness,
-            Parameter::Width => &mut beam.width,
-            _ => &mut beam.length,
-        };
-        *own *= factor;
+        *property_of(beam, property).unwrap() *= factor;
     }
     other
 }
@@ -446,11 +441,27 @@ fn val_slopes_of_properties_are_those_of_beams_solved_anew() {
     lap.body = Body::Joined([beam, beam]);
     lap.springs.clear();
     lap.joint_mass = PointInertia::default();
+    lap.overlap = Some(LapOverlap {
+        length: 0.03,
+        mass: 0.05,
+    });
     if let Some(joint) = &mut lap.joint {
         joint.coupling = 0.0;
     }
+    let mut pulled = cantilever.clone();
+    pulled.axial_force = 400.0;
+    pulled.joint_mass = PointInertia::default();
+    let mut based = cantilever.clone();
+    based.joint_mass = PointInertia::default();
+    based.base = Some(Base {
+        frequency: 90.0,
+        ratio: 0.05,
+    });
+    if let Some(joint) = &mut based.joint {
+        joint.coupling = 0.0;
+    }
     let modes = 5;
-    for specimen in [cantilever, lap] {
+    for specimen in [cantilever, lap, pulled, based] {
         let own = Arc::new(specimen.beam_modes(modes, Mesh::SIMULATION).unwrap());
         let model = ModalModel {
             seen: apply(&[], &specimen, &Circumstances::default()),
@@ -462,17 +473,23 @@ fn val_slopes_of_properties_are_those_of_beams_solved_anew() {
         for property in PROPERTIES {
             let frequencies = [STEP, -STEP].map(|step| {
                 let other = with_property(&specimen, property, step.exp());
-                let solved = other.modes(modes, Mesh::SIMULATION).unwrap();
-                solved.frequencies().to_vec()
+                let solved = other.beam_modes(modes, Mesh::SIMULATION).unwrap();
+                let all = solved.modes.frequencies();
+                let numbered = solved.numbers.iter().map(|&index| all[index]);
+                numbered.collect::<Vec<f64>>()
             });
             for mode in 1..=modes {
                 let exact =
                     (frequencies[0][mode - 1] / frequencies[1][mode - 1]).ln() / (2.0 * STEP);
                 let shear = SectionSlopes::of(&section.shear, mode);
                 let found = model.property_slope(model.index(mode).unwrap(), property, shear);
-                // The part of the width's stiffening in the slopes by width and length is left out.
+                // The part of the width's stiffening in the slopes by width and length, about its 0.6 % in mode 5, is left out.
+                let most = match property {
+                    Parameter::Width | Parameter::Length => 1e-2,
+                    _ => 1e-3,
+                };
                 assert!(
-                    (found - exact).abs() < 2e-3,
+                    (found - exact).abs() < most,
                     "{property:?}, mode {mode}: {found} {exact}"
                 );
             }

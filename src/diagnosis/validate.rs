@@ -528,7 +528,7 @@ mod tests {
         }
         let fit = fit_nominal(&dataset).unwrap();
         for (k, (_, datum)) in dataset.holdout.iter_mut().enumerate() {
-            datum.value += [3.0, -2.0][k % 2] * datum.std;
+            datum.value += [3.5, -2.5][k % 2] * datum.std;
         }
         let linearised = HoldoutErrors::new(&dataset, &fit).unwrap().goodness();
         let linearised = linearised.unwrap();

@@ -1,6 +1,6 @@
 //! The described model brought up to date by a diagnosis: as a description for predictions, and its natural
-//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open, and what the model may miss of
-//! each mode, have no place in a description and are left out.
+//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open, how the joint holds the width, and
+//! what the model may miss of each mode have no place in a description and are left out.
 
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;
@@ -138,7 +138,9 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         }
         text.push_str(&line(key, fitted));
     }
-    text.extend(beam.poisson.map(|poisson| line("poisson", poisson)));
+    if beam.poisson.is_some() || fitted.poisson != described.poisson {
+        text.push_str(&line("poisson", fitted.poisson));
+    }
     if let Some(right) = &test.joint.right {
         text.push_str("\n[beam.right]\n");
         // Both halves are wrong by the same factor.

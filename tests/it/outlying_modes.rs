@@ -7,15 +7,22 @@ use std::fmt::Write;
 use std::fs;
 use std::process::Command;
 use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, Parameter};
+use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, BeamTheory};
 
 /// The first seven frequencies (Hz) of the strip on Kt = 1.4 MN/m and Kr = 900 N m/rad.
 fn frequencies() -> Vec<f64> {
-    let structure =
+    frequencies_with(1.4e6, Vec::new())
+}
+
+/// The same on this Kt (N/m), with these masses on it.
+fn frequencies_with(kt: f64, masses: Vec<PointMass>) -> Vec<f64> {
+    let mut structure =
         JointedStructure::new(BeamTheory::Timoshenko, steel_strip(), Assembly::Cantilever);
+    structure.masses = masses;
     let model = FrequencyModel::new(&structure, 7).unwrap();
     let mut point = model.nominal();
-    point[Parameter::Kt as usize] = 1.4e6f64.ln();
+    point[Parameter::Kt as usize] = kt.ln();
     point[Parameter::Kr as usize] = 900f64.ln();
     let modes = 1..=7;
     modes
@@ -100,4 +107,48 @@ fn regress_words_of_outlying_modes() {
         write!(text, "{name}\n{}\n", said(&own)).unwrap();
     }
     assert_snapshot("outlying_modes", &text);
+}
+
+/// A mass that nothing describes may look like the wrong reading of one mode. The diagnosis takes both into account.
+#[test]
+fn regress_a_missing_mass_does_not_hide_behind_an_outlying_mode() {
+    let mut loaded = frequencies_with(1.9e6, vec![PointMass::new(0.33, 0.03)]);
+    loaded.truncate(6);
+    let found = report(&loaded);
+    let left_out = &found["estimate"]["left_out"]["mode"];
+    assert!(left_out.is_u64(), "no mode is left out: {left_out}");
+    let verdict = found["gap"]["verdict"]["kind"].as_str().unwrap();
+    assert!(["named", "group", "set"].contains(&verdict), "{verdict}");
+    assert_ne!(found["headline"]["model"], "described");
+}
+
+#[test]
+fn recover_a_wrong_reading_as_no_gap() {
+    let mut off = frequencies();
+    off[3] *= 1.02;
+    let found = report(&off);
+    assert_eq!(found["estimate"]["left_out"]["mode"], 4);
+    assert_eq!(found["gap"]["verdict"]["kind"], "no-gap");
+    assert_eq!(found["headline"]["model"], "described");
+}
+
+/// The updated model is of another hypothesis the second time, and its file goes or comes.
+#[test]
+fn regress_a_report_is_replaced_by_one_with_another_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    for second in [113.18, 113.9, 114.5, 113.18] {
+        let text = format!(
+            "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850\n\
+             [joint]\nkind = \"cantilever\"\n[measured]\n\
+             frequencies = [15.497, {second}, 317.169, 593.89, 948.421, 1428.441]\nstd = 0.02\n"
+        );
+        fs::write(folder.path().join("test.toml"), text).unwrap();
+        let done = Command::new(env!("CARGO_BIN_EXE_tapjoint"))
+            .current_dir(folder.path())
+            .args(["run", "test.toml", "--quiet", "--out", "report"])
+            .output()
+            .unwrap();
+        let error = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success(), "{second}: {error}");
+    }
 }

@@ -313,7 +313,7 @@ fn left_out(left_out: &LeftOutMode, numbers: Option<&[usize]>) -> Warning {
             format!(
                 "mode {} is left out: it lies {:+.2} % from what the other modes predict ({} standard deviations). Without it \
                  the model explains the rest (goodness of fit {}). With it the best fit has {with_all}. Look at its peak and its \
-                 number",
+                 number, and at what the diagnosis makes of it",
                 found.mode,
                 found.percent,
                 times(found.deviations.abs()),

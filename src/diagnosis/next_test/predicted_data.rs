@@ -236,6 +236,12 @@ impl Posterior {
             covariance: &slopes * covariance * slopes.transpose(),
         };
         self.add_discrepancies(structure, observables, &mut prediction.covariance);
+        if structure == TestedStructure::Bare {
+            let missed = dataset.settings.discrepancy.powi(2);
+            for row in 0..observables.len() {
+                prediction.covariance[(row, row)] += missed;
+            }
+        }
         Some(prediction)
     }
 

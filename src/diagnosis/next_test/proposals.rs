@@ -1,6 +1,7 @@
 //! Tests that are compared, as configurations that the model can predict, and their description in words.
 
 use crate::dataset::{Dataset, MORE_MODES, Observable};
+use crate::description::SectionSlopes;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
 use crate::settings::MOVED_SENSOR;
@@ -253,11 +254,19 @@ impl PlannedTests {
         let planned = self.new_setup(dataset, first.clone(), 0.0);
         self.propose(Proposal::TurnOver, TestedStructure::Whole, planned);
         let nominal = self.whole.nominal.bare();
-        let bare = Dataset {
+        let mut bare = Dataset {
             arrangements: vec![first.bare(&nominal)],
             nominal,
+            // These are of the modes in the joint.
+            section: SectionSlopes::default(),
             ..self.whole.clone()
         };
+        // What the model misses of the free beam's modes is drawn anew: no mode has the number 0.
+        for nuisance in &mut bare.nuisances {
+            if let NuisanceParameter::Discrepancy { mode } = &mut nuisance.parameter {
+                *mode = 0;
+            }
+        }
         let planned = planned_frequencies(dataset, 0);
         self.propose(Proposal::BareBeam, TestedStructure::Bare, planned);
         self.bare = Some(bare);

@@ -416,15 +416,21 @@ impl ConsistentEstimator {
         let structure = self.models[0].structure();
         let body = structure.body().ok()?;
         let mass: f64 = body.beams().iter().map(Beam::mass).sum();
-        let mass = mass * weighed.length / structure.beam.length;
+        let ratio = weighed.length / structure.beam.length;
         let mut gradient = [0.0; PARAMETERS];
         for parameter in Parameter::OF_MASS {
             gradient[parameter.index()] = 1.0;
         }
+        let mut std = weighed.std / weighed.mass;
+        if ratio != 1.0 {
+            // The bar goes on in the clamp: its length is another one than the free length, and as well known in m.
+            gradient[Parameter::Length.index()] = 0.0;
+            std = std.hypot(self.settings.tolerances.length.unwrap_or(0.0) / ratio);
+        }
         Some(Prior {
             gradient,
-            value: value_along(&gradient, &self.base) + (weighed.mass / mass).ln(),
-            std: weighed.std / weighed.mass,
+            value: value_along(&gradient, &self.base) + (weighed.mass / (mass * ratio)).ln(),
+            std,
         })
     }
 

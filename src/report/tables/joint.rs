@@ -270,8 +270,10 @@ fn input_words(input: &str) -> String {
         "discrepancy" => "what the model misses".to_owned(),
         "weighing" => "mass of the bar".to_owned(),
         "set-ups" => "differences between set-ups".to_owned(),
-        // "second-length" and the like: of the moved clamp, or of the free bar.
-        other if other.ends_with("-length") => other.replace('-', " "),
+        // "second-length" and the like.
+        other if other.ends_with("-length") => {
+            format!("{} (moved clamp or free bar)", other.replace('-', " "))
+        }
         other => other.to_owned(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::document::{Document, GapSection, HeadlineSection, HeadlineValue};
+use crate::document::{Document, GapSection};
 use crate::format::{
     RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
@@ -279,24 +279,6 @@ fn price(gap: &GapSection) -> Option<String> {
     })
 }
 
-/// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with the cause, or with each of
-/// several; `None` where the headline is the described model's.
-pub(crate) fn joint_with(headline: &HeadlineSection) -> Option<String> {
-    let value = |found: &HeadlineValue, unit| {
-        let interval = found.low.zip(found.high).map(|(low, high)| [low, high]);
-        stiffness(found.value.unwrap_or(f64::INFINITY), interval, unit)
-    };
-    if headline.is_described() {
-        return None;
-    }
-    let (kt, kr) = (headline.kt.as_ref()?, headline.kr.as_ref()?);
-    Some(format!(
-        "Kt\u{a0}=\u{a0}{}, Kr\u{a0}=\u{a0}{}",
-        value(kt, "N/m"),
-        value(kr, "N\u{a0}m/rad")
-    ))
-}
-
 /// The effects that the verdict names.
 fn cause(gap: &GapSection) -> Option<&HypothesisResult> {
     gap.named()
@@ -334,14 +316,14 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
 fn joint(found: &HypothesisResult) -> Option<String> {
     let [kt, kr] = found.joint?;
     let [of_kt, of_kr] = found.joint_intervals;
-    let kr = stiffness(kr, of_kr, "N\u{a0}m/rad");
-    let kt = stiffness(kt, of_kt, "N/m");
+    let kr = stiffness_with_limits(kr, of_kr, "N\u{a0}m/rad");
+    let kt = stiffness_with_limits(kt, of_kt, "N/m");
     // A value stays on the line of its name and unit.
     Some(format!("Kt\u{a0}=\u{a0}{kt}, Kr\u{a0}=\u{a0}{kr}"))
 }
 
 /// "1.995 MN/m (95 %: 1.991 to 1.999)", the value on one line with its unit.
-fn stiffness(value: f64, interval: Option<[f64; 2]>, unit: &str) -> String {
+pub(super) fn stiffness_with_limits(value: f64, interval: Option<[f64; 2]>, unit: &str) -> String {
     if value.is_infinite() {
         return RIGID.to_owned();
     }

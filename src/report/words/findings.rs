@@ -1,7 +1,11 @@
 //! The findings: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::diagnosis::{gap_in_short, gap_story, joint_with, listed, missing, shows_gap};
-use crate::document::{Document, EstimateSection, PredictionSection, ReadBy};
+use super::diagnosis::{
+    gap_in_short, gap_story, listed, missing, shows_gap, stiffness_with_limits,
+};
+use crate::document::{
+    Document, EstimateSection, HeadlineSection, HeadlineValue, PredictionSection, ReadBy,
+};
 use crate::format::{bound_percent, capital, signed_or_below, significant, trimmed};
 use crate::picture::extent;
 use crate::tables::{Parameter, estimated, quality_count, reading_bound};
@@ -129,6 +133,24 @@ fn joint(document: &Document) -> Option<String> {
         }
         None => described,
     })
+}
+
+/// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with the cause, or with each of
+/// several; `None` where the headline is the described model's.
+fn joint_with(headline: &HeadlineSection) -> Option<String> {
+    let value = |found: &HeadlineValue, unit| {
+        let interval = found.low.zip(found.high).map(|(low, high)| [low, high]);
+        stiffness_with_limits(found.value.unwrap_or(f64::INFINITY), interval, unit)
+    };
+    if headline.is_described() {
+        return None;
+    }
+    let (kt, kr) = (headline.kt.as_ref()?, headline.kr.as_ref()?);
+    Some(format!(
+        "Kt\u{a0}=\u{a0}{}, Kr\u{a0}=\u{a0}{}",
+        value(kt, "N/m"),
+        value(kr, "N\u{a0}m/rad")
+    ))
 }
 
 /// The parameters that have a unit, in words.

@@ -6,15 +6,15 @@
 //! `missing` has up to 1 %, with heavy tails. In `outlier` one mode is off by 0.3 to 5 %. Where the theory takes notice of the
 //! width, the joint of a cantilever holds it anywhere between springs and a clamp; `wide` beams feel that most.
 //!
-//! The second table is about outlying modes. Of the tests where one lies beyond 5 standard deviations of what the others
-//! predict it has the shares where it is the only one named (found), where it is among the named (among), and where an
-//! observer who knows the distributions of the world holds it for the most probable (ideal). The other columns are of all
-//! tests: the mean number of modes that are named together, the share in which only others are named, and the coverage
-//! of the limits that are stated in the end, in brackets of the tests beyond 5.
+//! The second table is about outlying modes. "Beyond 5": the planted mode lies more than 5 standard deviations off. Of
+//! these tests it has three shares. Found: this mode alone is named. Among: it is one of those named. Ideal: an
+//! observer who knows the distributions finds it most probable. The other columns are of all tests: the mean number of
+//! modes named together, the share in which only others are named, and how often the final limits hold the truth. In
+//! brackets: the same of the tests beyond 5.
 //!
-//! The third table (`--world effect`, cantilevers) is of descriptions that lack an effect of the catalogue: by effect and by how far
-//! it moves the frequencies (`--kind` takes the name of one effect), how often it is named, and how often the headline and the
-//! described model's interval hold Kt and Kr.
+//! The third table (`--world effect`, cantilevers) is of descriptions that lack one effect. Each row is one effect and
+//! one range of its size (`--kind`: one effect alone). It has how often the effect is named. It also has how often the
+//! headline and the described model's interval hold Kt and Kr.
 //!
 //! `cargo run --release --example description_coverage -- [--tests N] [--seed S] [--world NAME] [--kind NAME] [--section NAME]`
 //!

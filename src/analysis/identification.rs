@@ -299,9 +299,9 @@ fn better_numbering(
     (*best > EXPLAINS && second < SECOND * best).then(|| numbers.clone())
 }
 
-/// Fits each set-up alone, by the modes of the described length that all set-ups have, without the one that is left out, and
-/// with the description as exact: what is wrong in all set-ups moves their joints alike. None where fewer than two set-ups
-/// that differ can be fitted.
+/// Fits each set-up alone, by the modes of the described length that all set-ups have. `left_out` is the mode to omit.
+/// The description counts as exact: what is wrong in all set-ups moves their joints alike. Empty where fewer than two
+/// differing set-ups can be fitted.
 fn fitted_set_ups(
     structure: &TestedStructure,
     modes: &[ModeResult],

@@ -268,7 +268,9 @@ fn diagnose_modes(
     };
     let (Ok(mut all_modes), Some(reading)) = (
         diagnose(&all, nominal, settings),
-        reading_evidence(&all, nominal, settings, mode)?,
+        reading_evidence(&all, nominal, settings, mode)
+            .ok()
+            .flatten(),
     ) else {
         return without();
     };

@@ -272,7 +272,7 @@ pub struct Identification {
     pub consistent: Option<Box<ConsistentEstimate>>,
     /// The same by the readings alone: the description exact, and a model that misses nothing.
     pub from_readings: Option<Box<ConsistentEstimate>>,
-    /// The mode that is left out because it does not belong to the others. The diagnosis leaves it out as well.
+    /// The mode that is left out because it does not belong to the others. The diagnosis leaves it out unless an effect explains it.
     pub left_out: Option<LeftOutMode>,
     /// Several modes, one of which does not belong to the others. The diagnosis takes them all: an effect that the model lacks
     /// may be the cause.

@@ -11,8 +11,8 @@ use std::ops::{Add, Mul, Sub};
 
 /// All modes of a structure without its joint, by finite elements.
 ///
-/// The joint touches three motions only (displacement, rotation, and curling across the width), so that the
-/// finite-element model with any joint has the frequencies at which compliance and receptance of those motions cancel. The receptance is
+/// The joint touches three motions only: displacement, rotation, and curling across the width. With a joint the
+/// frequencies lie where compliance and receptance of these motions cancel. The receptance is
 /// the sum over the lowest modes of the model without joint, and over motions that stand for all
 /// higher ones: nothing is truncated, and one decomposition serves every joint. What elements miss of their own inertia
 /// is added to second order among these motions (`SecondOrder`).

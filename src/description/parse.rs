@@ -128,7 +128,7 @@ fn check_bar(beam: &Table<'_>, joint: &Table<'_>) -> Result<(), DescriptionError
             .filter(|_| matches!(kind, Some("lap" | "free")))
         {
             return Err(entry.error(
-                "only the bar of a cantilever is known without its joint; remove this key, or set `kind = \"cantilever\"`",
+                "only a cantilever can state this about its bare bar; remove this key, or set `kind = \"cantilever\"`",
             ));
         }
     }

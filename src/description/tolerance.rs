@@ -16,13 +16,6 @@ pub struct StandardUncertainty {
     pub stated: bool,
 }
 
-impl StandardUncertainty {
-    /// Returns it where the file states one.
-    pub fn if_stated(&self) -> Option<f64> {
-        (self.stated && self.std > 0.0).then_some(self.std)
-    }
-}
-
 /// Standard uncertainties of what the file says of the beam. Those that it does not state are assumed, unless the file says
 /// "exact".
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -95,8 +95,8 @@ const HAIR: f64 = 1e-9;
 const STEP: f64 = 1e-3;
 
 impl ModalModel {
-    /// Returns d ln f/d ln p of a mode by its index, for a property p of the beam; `shear_slope` is that of its shear and rotary
-    /// inertia, which are proportional to (h/L)^2.
+    /// Returns d ln f/d ln p (1) of the mode with this index, for a property p of the beam. `shear_slope` is the
+    /// derivative by the relative size of shear and rotary inertia, which is proportional to (h/L)^2.
     pub fn property_slope(&self, index: usize, property: Parameter, shear_slope: f64) -> f64 {
         let specimen = &self.seen.specimen;
         let omega_square = self.omega(index).powi(2);

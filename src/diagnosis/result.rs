@@ -53,7 +53,7 @@ pub enum Verdict {
     Named(Vec<EffectId>),
     /// Effects that these data cannot separate.
     Group(Vec<EffectId>),
-    /// A short list that holds 90 %.
+    /// A short list that holds 90 %, or effects beside "none" where one mode may be read wrongly.
     Set(Vec<Hypothesis>),
     /// A gap that no effect of the catalogue explains.
     Unknown,

@@ -45,10 +45,10 @@ pub struct Nominal {
     pub reading_bias: Option<f64>,
 }
 
-/// Standard uncertainties of a description; those of zero are exact.
+/// Standard uncertainties of a description. 0, or `None` in `beam`, is exact.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DescriptionUncertainty {
-    /// Properties of the beam.
+    /// Properties of the beam (1, relative; Poisson's ratio absolute).
     pub beam: BeamTolerances,
     /// Masses of sensors and of what is fastened (1, relative).
     pub masses: f64,

@@ -144,9 +144,8 @@ pub fn mode_sensitivities(
     Ok(sensitivities)
 }
 
-/// A step of 1e-5: small enough to be a derivative (what it neglects is some 1e-10 of it), large enough
-/// for six digits of it where a search ends within 1e-11 of its goal; the closed form, which has but
-/// rounding, gives ten.
+/// Step of a derivative (%): 1e-5 of a frequency. What it neglects is some 1e-10 of the derivative. A search that ends
+/// within 1e-11 of its goal leaves six digits. The closed form leaves ten.
 const SMALL_PERCENT: f64 = 1e-3;
 
 /// Change per percent from that by [`SMALL_PERCENT`].

@@ -483,7 +483,7 @@ fn normalise(unit: &str) -> String {
     spelled
 }
 
-/// A value in the unit with the decimal prefix that leaves one to three digits before the point.
+/// A value in the unit with the decimal prefix (none, k, M or G) that suits it.
 ///
 /// Returns the factor to multiply by and the prefix: 1.4e6 gives (1e-6, "M"). Small values keep
 /// their unit: "mN/m" is not in use.
@@ -497,7 +497,7 @@ pub fn prefix(value: f64) -> (f64, &'static str) {
     }
 }
 
-/// "2.124 MN/m": a value in its unit with the prefix of [`prefix`] and four digits.
+/// "2.124 MN/m": a value in its unit with the prefix of [`prefix`] and four significant digits below 1000.
 pub fn with_prefix(value: f64, unit: &str) -> String {
     let (factor, letter) = prefix(value);
     let scaled = factor * value;

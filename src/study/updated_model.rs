@@ -1,6 +1,6 @@
 //! The described model brought up to date by a diagnosis: as a description for predictions, and its natural
-//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open, how the joint holds the width, and
-//! what the model may miss of each mode have no place in a description and are left out.
+//! frequencies. Three results of the fit have no place in a description and are left out: the change of shear and
+//! rotary inertia (2 %), the hold of the width, and what the model misses of each mode.
 
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;

@@ -93,9 +93,10 @@ fn regress_a_full_description_is_read_in_si_units() {
     assert_near(test.beam.density, 7850.0, "density");
     assert_eq!(test.beam.poisson, Some(0.29));
     let tolerance = test.beam.tolerance;
-    assert_eq!(tolerance.length.if_stated(), Some(0.001));
+    assert_eq!(tolerance.length.std, 0.001);
+    assert!(tolerance.length.stated);
     assert_near(tolerance.modulus.std, 4.14e9, "2 % of the modulus");
-    assert_eq!(tolerance.density.if_stated(), None);
+    assert!(!tolerance.density.stated);
     assert_near(
         tolerance.density.std,
         39.25,

@@ -301,7 +301,7 @@ fn left_out(left_out: &LeftOutMode, numbers: Option<&[usize]>) -> Warning {
                 .collect();
             format!(
                 "one of the modes {} does not belong to the others; the frequencies do not tell which. The best fit has {}. With \
-                 all modes it has {with_all}. The limits hold all answers without one of these modes, the values are those without mode {}. \
+                 all modes it has {with_all}. The limits hold the limits of all these answers. The values are those without mode {}. \
                  Look at their peaks and their numbers",
                 listed(&modes),
                 answers.join("; "),
@@ -371,7 +371,7 @@ fn better_numbers(numbers: &[usize]) -> Warning {
         "other-numbers",
         format!(
             "the model does not explain the modes as they are numbered. It would with the numbers {}. Check whether a mode \
-             was missed, or a peak is none",
+             was missed, or whether a peak is no mode",
             numbers.join(", ")
         ),
     )

@@ -12,8 +12,8 @@ fn clamp_factor(poisson: f64) -> f64 {
 }
 
 impl Specimen {
-    /// Returns by how much (1) each frequency of the lowest `count` modes would be higher in a rigid clamp, which keeps
-    /// displacement and slope equal across the width, than with springs spread over the width.
+    /// Returns how much higher (1, relative) the lowest `count` frequencies are in a rigid clamp than on springs spread
+    /// over the width. The clamp keeps displacement and slope equal across the width.
     ///
     /// How a joint holds the width is rarely known. A joint that grips the whole width lies between 0 and these numbers.
     /// A free beam has 0. In a lap joint both halves curl alike at the joint.

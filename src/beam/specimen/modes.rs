@@ -58,9 +58,9 @@ impl Mode {
     }
 }
 
-/// Makes the motions of a weak joint anew from their span: one inverse iteration frees them from what is left of elastic
-/// motions, whose energy would hide that of the joint, and Ritz's method separates them from each other. They stay as they
-/// are where either fails.
+/// Corrects the motions of a weak joint. One inverse iteration removes the rest of elastic motions, whose energy would
+/// hide that of the joint. Ritz's method then separates the motions from each other. Where either step fails, nothing
+/// is changed.
 fn refine(model: &Model, [stiffness, mass]: [&BandedMatrix; 2], vectors: &mut [Vec<f64>]) {
     if vectors.is_empty() {
         return;

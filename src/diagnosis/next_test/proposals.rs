@@ -261,7 +261,7 @@ impl PlannedTests {
             section: SectionSlopes::default(),
             ..self.whole.clone()
         };
-        // What the model misses of the free beam's modes is drawn anew: no mode has the number 0.
+        // The model misses the free beam's modes independently. No mode has the number 0.
         for nuisance in &mut bare.nuisances {
             if let NuisanceParameter::Discrepancy { mode } = &mut nuisance.parameter {
                 *mode = 0;

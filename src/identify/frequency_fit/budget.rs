@@ -1,5 +1,4 @@
-//! The budget of an estimate: what each input contributes, where the fit moved the description, and what further
-//! measurements would bring.
+//! The budget of an estimate: what each input contributes, and what further measurements would bring.
 //!
 //! About the best point the estimate is a linear function of everything that is known: readings, stated properties,
 //! attached masses, and the discrepancy. The variance of a quantity is the sum of their shares (JCGM 100:2008, 5.1).

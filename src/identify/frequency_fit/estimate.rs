@@ -40,8 +40,8 @@ impl ConsistentEstimator {
         self.estimate_with_set_ups(&[])
     }
 
-    /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are fits of each of them alone, with the
-    /// same parameters, the same modes and an exact description; the modes of this estimator have their mean frequencies.
+    /// Returns the estimate where the joint differed from set-up to set-up. `set_ups` are their separate fits, with the
+    /// same parameters, the same modes and an exact description. The modes of this estimator have the mean frequencies.
     /// Intervals hold the mean joint, by Student's t; that of a further set-up stands beside them.
     ///
     /// # Errors

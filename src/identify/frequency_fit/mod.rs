@@ -181,7 +181,7 @@ pub struct EstimatedQuantity {
     pub at_least: Option<f64>,
     /// Upper end of an interval without lower end: "at most".
     pub at_most: Option<f64>,
-    /// The 95 % interval for a further set-up, where set-ups differ; not of Kz and Ktr.
+    /// The 95 % interval for a further set-up, where set-ups differ, in the unit of the value; `None` otherwise, and for Kz and Ktr.
     pub further: Option<(f64, f64)>,
     /// End of the range that the best value has reached.
     pub limit: Option<Limit>,

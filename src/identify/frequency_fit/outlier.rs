@@ -42,8 +42,6 @@ pub struct OutlyingMode {
     pub percent: f64,
     /// The same in standard deviations of that prediction, its own reading included.
     pub deviations: f64,
-    /// Probability of a larger misfit with all modes.
-    pub goodness: f64,
     /// Probability of a larger misfit of the other modes.
     pub goodness_without: f64,
     /// Probability that it is this mode, if one of those that are named is off.
@@ -97,7 +95,6 @@ impl ConsistentEstimator {
         if self.settings.discrepancy {
             floor.discrepancy = LEAST_DISCREPANCY;
         }
-        let goodness = self.goodness.and_then(|goodness| goodness.probability);
         let frequencies = floor.frequencies();
         let (renewed, minima) = floor.solve(&frequencies);
         let models = renewed.unwrap_or_else(|| floor.models.clone());
@@ -128,7 +125,6 @@ impl ConsistentEstimator {
                 mode: mode.mode,
                 percent,
                 deviations: fall.sqrt().copysign(percent),
-                goodness: goodness.unwrap_or(1.0),
                 goodness_without: chi_square_tail(best.state.cost, freedom),
                 probability: 0.0,
             });

@@ -12,9 +12,9 @@ pub struct HeadlineSection {
     /// "described"; "with sensor-mass": the model with what the diagnosis names, if that is confirmed; "with modulus or
     /// length": the models with each of what it lists, whose limits hold those of all.
     pub model: String,
-    /// Translational stiffness (N/m).
+    /// Translational stiffness (N/m); null where it is not estimated.
     pub kt: Option<HeadlineValue>,
-    /// Rotational stiffness (N m/rad).
+    /// Rotational stiffness (N m/rad); null where it is not estimated.
     pub kr: Option<HeadlineValue>,
 }
 
@@ -30,17 +30,22 @@ pub struct HeadlineValue {
 }
 
 impl HeadlineSection {
-    /// The joint of the described model; `None` where no stiffness was estimated.
+    /// The joint of the described model. `None` where no stiffness was estimated, or one that no spring can have: the pair
+    /// regression may find such a joint, and it is none to go by.
     pub(super) fn described(estimate: &EstimateSection) -> Option<Self> {
         let value = |found: &Option<EstimatedValue>| {
             let found = &found.as_ref()?.uncertain;
-            // The pair regression may find what no spring can be; that is no joint to go by.
-            (found.value > 0.0).then(|| HeadlineValue {
+            Some(HeadlineValue {
                 value: Some(found.value).filter(|value| value.is_finite()),
                 low: found.low,
                 high: found.high,
             })
         };
+        let found = [&estimate.kt, &estimate.kr];
+        let mut found = found.into_iter().flatten();
+        if found.any(|found| found.uncertain.value <= 0.0) {
+            return None;
+        }
         let (kt, kr) = (value(&estimate.kt), value(&estimate.kr));
         (kt.is_some() || kr.is_some()).then(|| Self {
             model: DESCRIBED.to_owned(),
@@ -61,7 +66,10 @@ impl HeadlineSection {
         let mut found: Option<Self> = None;
         let mut names = Vec::with_capacity(listed.len());
         for hypothesis in &listed {
-            names.push(hypothesis.name());
+            names.push(match hypothesis {
+                Hypothesis::None => "nothing".to_owned(),
+                _ => hypothesis.name(),
+            });
             let own = match hypothesis {
                 Hypothesis::None => described.cloned(),
                 _ => gap.result(hypothesis).and_then(Self::of_hypothesis),

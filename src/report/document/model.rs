@@ -71,7 +71,7 @@ pub struct DescriptionRow {
     pub pull: f64,
 }
 
-/// A mode that was left out of the estimate. Of several modes that may not belong to the others it is the most probable.
+/// The mode that the estimate is without. Where several may be the outlying one, it is the most probable.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LeftOutRow {
     /// Its number.

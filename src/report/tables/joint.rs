@@ -436,8 +436,8 @@ fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
     Some(100.0 * (value - base) / base)
 }
 
-/// Says whose joint the estimate is where set-ups differ, and where that of a further one lies, after a blank; `None` where
-/// they do not.
+/// Returns a note, after a blank, where set-ups differ: the estimate is that of their mean joint. It has the limits for
+/// a further set-up. `None` where they do not differ.
 pub fn set_up_words(estimate: &EstimateSection) -> Option<String> {
     let count = estimate.set_ups?;
     let all = [("Kt", "N/m", &estimate.kt), ("Kr", "N m/rad", &estimate.kr)];
@@ -548,7 +548,7 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
     });
     let failed = list.iter().map(|found| (found.method, found.failed));
     let mut note = format!(
-        "{} draws, each frequency with its own standard deviation: uniform within half a line where it was read on one, else normal.{}",
+        "{} draws, each frequency with its own standard deviation. Errors are uniform within half a line for line readings, else normal.{}",
         list.first().map_or(0, |found| found.samples),
         failures(&failed.collect::<Vec<_>>(), " and are left out")
     );

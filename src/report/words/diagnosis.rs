@@ -300,10 +300,8 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
     }
     let found = cause(gap).filter(|found| found.gap_after < found.gap_before);
     let shrink = found.map(|found| {
-        let joint =
-            joint(found).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
         format!(
-            "With {} the errors of the frequencies shrink from {} to {} % (rms){joint}.",
+            "With {} the errors of the frequencies shrink from {} to {} % (rms).",
             together(&found.hypothesis),
             percent(found.gap_before),
             left(found.gap_after, gap.noise_floor)
@@ -356,7 +354,11 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
             names(effects)
         ),
         Verdict::Set(list) => {
-            let effects: Vec<String> = list.iter().map(Hypothesis::name).collect();
+            let words = list.iter().map(|one| match one {
+                Hypothesis::None => "nothing".to_owned(),
+                _ => one.name(),
+            });
+            let effects: Vec<String> = words.collect();
             match effects.as_slice() {
                 [effect] => format!(
                     "{effect} explains the readings best, but does not predict the withheld ones any better: it is \
@@ -364,7 +366,7 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
                 ),
                 _ => format!(
                     "The cause is most likely one of {}; these data do not decide.",
-                    effects.join(", ")
+                    listed(&effects, "or")
                 ),
             }
         }

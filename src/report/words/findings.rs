@@ -197,6 +197,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
     });
     let rest = [
         quality_count(document).map(|count| capital(&count) + "."),
+        joint_if_confirmed(document),
         estimate(document),
         misfit(document),
         gap_story(document).into_iter().next(),
@@ -304,7 +305,21 @@ fn estimate(document: &Document) -> Option<String> {
     }
     let doubt = estimate.reason.as_ref();
     let doubt = doubt.map_or(String::new(), |reason| format!(" Doubtful: {reason}."));
-    Some(format!("{}.{doubt}", capital(&physical.join("; "))))
+    let physical = match joint_if_confirmed(document) {
+        Some(_) => format!("As described: {}", physical.join("; ")),
+        None => capital(&physical.join("; ")),
+    };
+    Some(format!("{physical}.{doubt}"))
+}
+
+/// The joint with the cause, or with each of several; `None` where the headline is the described model's.
+fn joint_if_confirmed(document: &Document) -> Option<String> {
+    let headline = document.headline.as_ref()?;
+    let joint = joint_with(headline)?;
+    Some(format!(
+        "The joint {}, if confirmed: {joint}.",
+        headline.model
+    ))
 }
 
 /// "translational stiffness Kt = 1.79 MN/m (95 %: 1.60 to 2.01; from the readings alone 1.7890 to 1.7908)".

@@ -169,7 +169,7 @@ fn draw(id: EffectId, random: &mut ChaCha8Rng, from: f64) -> Effect {
         EffectId::AxialLoad => vec![("force", sign * size(0.02, 0.5) * unit / beam.length.powi(2))],
         EffectId::ShearRotary => vec![("factor", size(0.5, 3.0))],
         EffectId::JointDamping => vec![("loss_factor", size(0.01, 0.1))],
-        EffectId::JointDrift | EffectId::Resolution => vec![],
+        _ => vec![],
     };
     Effect::from_pairs(id, &pairs).expect("drawn values are valid")
 }

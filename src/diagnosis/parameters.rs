@@ -276,6 +276,8 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<Candidate
         EffectId::Fixture => Size::positive("ratio", 0.05, 0.5),
         EffectId::Modulus => Size::signed("relative", 0.03, 0.3),
         EffectId::Length => Size::signed("relative", 0.007, 0.1),
+        EffectId::Density => Size::signed("relative", 0.03, 0.3),
+        EffectId::Thickness => Size::signed("relative", 0.015, 0.2),
         EffectId::Timebase => Size::signed("relative", 0.001, 0.05),
         EffectId::AddedMass => Size::positive("mass", 0.02 * mass, 0.3 * mass),
         EffectId::LocalCrack => Size::positive("compliance", 0.025, 0.5),
@@ -286,7 +288,13 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<Candidate
         },
         EffectId::ShearRotary => Size::positive("factor", 1.5, 10.0),
         EffectId::Resolution => Size::signed("offset", 0.125, 2.0),
-        EffectId::JointDrift => return None,
+        EffectId::JointDrift
+        | EffectId::JointCompliance
+        | EffectId::SensorPosition
+        | EffectId::SensorPolarity
+        | EffectId::SensorSwap
+        | EffectId::SensorScale
+        | EffectId::TapPosition => return None,
     };
     let range = match effect {
         EffectId::JointMass => Some((LocationKind::Gyration, 0.003, 0.03, 2)),

@@ -24,12 +24,18 @@ pub enum EffectId {
     JointDamping,
     /// The joint's stiffness differs between visits.
     JointDrift,
+    /// A joint that is described as rigid gives.
+    JointCompliance,
     /// A flexible base with a mode of its own.
     Fixture,
     /// The beam's modulus differs from the description.
     Modulus,
     /// The beam's length differs from the description.
     Length,
+    /// The beam's density differs from the description.
+    Density,
+    /// The beam's thickness differs from the description.
+    Thickness,
     /// The recorder's clock runs fast or slow.
     Timebase,
     /// A mass on the beam.
@@ -42,6 +48,16 @@ pub enum EffectId {
     ShearRotary,
     /// A constant bias of the reading of frequencies.
     Resolution,
+    /// A sensor is not where the description has it.
+    SensorPosition,
+    /// A sensor points the other way.
+    SensorPolarity,
+    /// The channels of two sensors are interchanged.
+    SensorSwap,
+    /// The calibration of a sensor is wrong.
+    SensorScale,
+    /// The hammer does not strike where the description has it.
+    TapPosition,
 }
 
 /// Where an effect sits.
@@ -86,10 +102,12 @@ impl Place {
 pub enum Group {
     /// One effect alone.
     Own(EffectId),
-    /// Modulus, length, time base: one common factor on all frequencies.
+    /// Modulus, length, density, thickness, time base: one common factor on all frequencies.
     Scale,
     /// Axial load and reading bias: nearly the same number of Hz on every frequency.
     Offset,
+    /// Sensors and hammer are not as described: shapes are wrong, frequencies hardly.
+    SetUp,
 }
 
 impl Group {
@@ -99,13 +117,14 @@ impl Group {
             Self::Own(id) => id.name(),
             Self::Scale => "scale",
             Self::Offset => "offset",
+            Self::SetUp => "set-up",
         }
     }
 }
 
 impl EffectId {
     /// All effects.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 24] = [
         Self::SensorMass,
         Self::SensorCable,
         Self::CrossCoupling,
@@ -113,15 +132,23 @@ impl EffectId {
         Self::JointNonlinearity,
         Self::JointDamping,
         Self::JointDrift,
+        Self::JointCompliance,
         Self::Fixture,
         Self::Modulus,
         Self::Length,
+        Self::Density,
+        Self::Thickness,
         Self::Timebase,
         Self::AddedMass,
         Self::LocalCrack,
         Self::AxialLoad,
         Self::ShearRotary,
         Self::Resolution,
+        Self::SensorPosition,
+        Self::SensorPolarity,
+        Self::SensorSwap,
+        Self::SensorScale,
+        Self::TapPosition,
     ];
 
     /// As results and the command line name it.
@@ -134,15 +161,23 @@ impl EffectId {
             Self::JointNonlinearity => "joint-nonlinearity",
             Self::JointDamping => "joint-damping",
             Self::JointDrift => "joint-drift",
+            Self::JointCompliance => "joint-compliance",
             Self::Fixture => "fixture",
             Self::Modulus => "modulus",
             Self::Length => "length",
+            Self::Density => "density",
+            Self::Thickness => "thickness",
             Self::Timebase => "timebase",
             Self::AddedMass => "added-mass",
             Self::LocalCrack => "local-crack",
             Self::AxialLoad => "axial-load",
             Self::ShearRotary => "shear-rotary",
             Self::Resolution => "resolution",
+            Self::SensorPosition => "sensor-position",
+            Self::SensorPolarity => "sensor-polarity",
+            Self::SensorSwap => "sensor-swap",
+            Self::SensorScale => "sensor-scale",
+            Self::TapPosition => "tap-position",
         }
     }
 
@@ -170,23 +205,39 @@ impl EffectId {
             | Self::JointMass
             | Self::JointNonlinearity
             | Self::JointDamping
-            | Self::JointDrift => Place::Joint,
+            | Self::JointDrift
+            | Self::JointCompliance => Place::Joint,
             Self::Fixture => Place::Fixture,
             Self::Modulus
             | Self::Length
+            | Self::Density
+            | Self::Thickness
             | Self::AddedMass
             | Self::LocalCrack
             | Self::AxialLoad
             | Self::ShearRotary => Place::Body,
-            Self::Timebase | Self::Resolution => Place::Acquisition,
+            Self::Timebase
+            | Self::Resolution
+            | Self::SensorPosition
+            | Self::SensorPolarity
+            | Self::SensorSwap
+            | Self::SensorScale
+            | Self::TapPosition => Place::Acquisition,
         }
     }
 
     /// Returns its group.
     pub fn group(self) -> Group {
         match self {
-            Self::Modulus | Self::Length | Self::Timebase => Group::Scale,
+            Self::Modulus | Self::Length | Self::Density | Self::Thickness | Self::Timebase => {
+                Group::Scale
+            }
             Self::AxialLoad | Self::Resolution => Group::Offset,
+            Self::SensorPosition
+            | Self::SensorPolarity
+            | Self::SensorSwap
+            | Self::SensorScale
+            | Self::TapPosition => Group::SetUp,
             _ => Group::Own(self),
         }
     }
@@ -201,15 +252,23 @@ impl EffectId {
             Self::JointNonlinearity => "stiffness and damping of the joint depend on the tap level",
             Self::JointDamping => "the joint dissipates more than the model says",
             Self::JointDrift => "the joint's stiffness differs between visits",
+            Self::JointCompliance => "the joint gives, although it is described as rigid",
             Self::Fixture => "the base under the joint gives and has a mode of its own",
             Self::Modulus => "the beam is stiffer or softer than described",
             Self::Length => "the beam is longer or shorter than described",
+            Self::Density => "the beam is heavier or lighter than described",
+            Self::Thickness => "the beam is thicker or thinner than described",
             Self::Timebase => "the recorder's clock is off",
             Self::AddedMass => "there is a mass on the beam",
             Self::LocalCrack => "the beam bends more easily at one place",
             Self::AxialLoad => "preload or gravity pulls or presses along the beam",
             Self::ShearRotary => "shear deformation and rotary inertia count",
             Self::Resolution => "frequencies are read with a constant bias",
+            Self::SensorPosition => "a sensor is not where the description has it",
+            Self::SensorPolarity => "a sensor points the other way",
+            Self::SensorSwap => "the channels of two sensors are interchanged",
+            Self::SensorScale => "the calibration of a sensor is wrong",
+            Self::TapPosition => "the hammer does not strike where the description has it",
         }
     }
 }
@@ -392,6 +451,22 @@ const JOINT_DRIFT: &[ParameterInfo] = &[size(
     0.5,
     0.01,
 )];
+const JOINT_COMPLIANCE: &[ParameterInfo] = &[
+    size(
+        "rotation",
+        D::None,
+        "E I/L of the beam over the rotational stiffness in series with the joint",
+        10.0,
+        0.02,
+    ),
+    size(
+        "translation",
+        D::None,
+        "E I/L^3 of the beam over the translational stiffness in series with the joint",
+        10.0,
+        0.0,
+    ),
+];
 const FIXTURE: &[ParameterInfo] = &[
     ParameterInfo {
         lowest: 1.0,
@@ -424,6 +499,20 @@ const LENGTH: &[ParameterInfo] = &[signed(
     "relative change of the length",
     0.2,
     0.005,
+)];
+const DENSITY: &[ParameterInfo] = &[signed(
+    "relative",
+    D::None,
+    "relative change of the density",
+    0.5,
+    0.02,
+)];
+const THICKNESS: &[ParameterInfo] = &[signed(
+    "relative",
+    D::None,
+    "relative change of the thickness",
+    0.5,
+    0.01,
 )];
 const TIMEBASE: &[ParameterInfo] = &[signed(
     "relative",
@@ -472,6 +561,68 @@ const RESOLUTION: &[ParameterInfo] = &[signed(
     0.25,
 )];
 
+/// Returns a parameter that counts things from `lowest`, which is usual.
+const fn number(name: &'static str, meaning: &'static str, lowest: f64) -> ParameterInfo {
+    ParameterInfo {
+        lowest,
+        scale: Linear,
+        ..size(name, D::None, meaning, 1e4, lowest)
+    }
+}
+
+const SENSOR: ParameterInfo = number("sensor", "number of the sensor in the description", 1.0);
+const RECORDING: ParameterInfo = number(
+    "recording",
+    "recordings with the same place as this one, by number; 0 = all",
+    0.0,
+);
+const SENSOR_POSITION: &[ParameterInfo] = &[
+    signed(
+        "offset",
+        D::Length,
+        "true less described position of the sensor",
+        1e3,
+        0.01,
+    ),
+    SENSOR,
+    RECORDING,
+];
+const SENSOR_POLARITY: &[ParameterInfo] = &[SENSOR];
+const SENSOR_SWAP: &[ParameterInfo] = &[
+    SENSOR,
+    ParameterInfo {
+        typical: Some(2.0),
+        ..number("other", "number of the other sensor", 1.0)
+    },
+];
+const SENSOR_SCALE: &[ParameterInfo] = &[
+    ParameterInfo {
+        lowest: -0.99,
+        ..signed(
+            "relative",
+            D::None,
+            "relative change of the sensor's signal",
+            100.0,
+            0.1,
+        )
+    },
+    number(
+        "sensor",
+        "number of the sensor in the description; 0 = all, as by the hammer's calibration",
+        0.0,
+    ),
+];
+const TAP_POSITION: &[ParameterInfo] = &[
+    signed(
+        "offset",
+        D::Length,
+        "true less described position of the taps",
+        1e3,
+        0.01,
+    ),
+    RECORDING,
+];
+
 impl EffectId {
     /// Returns its parameters. The first one measures its size, but for the fixture.
     pub fn parameters(self) -> &'static [ParameterInfo] {
@@ -483,22 +634,33 @@ impl EffectId {
             Self::JointNonlinearity => JOINT_NONLINEARITY,
             Self::JointDamping => JOINT_DAMPING,
             Self::JointDrift => JOINT_DRIFT,
+            Self::JointCompliance => JOINT_COMPLIANCE,
             Self::Fixture => FIXTURE,
             Self::Modulus => MODULUS,
             Self::Length => LENGTH,
+            Self::Density => DENSITY,
+            Self::Thickness => THICKNESS,
             Self::Timebase => TIMEBASE,
             Self::AddedMass => ADDED_MASS,
             Self::LocalCrack => LOCAL_CRACK,
             Self::AxialLoad => AXIAL_LOAD,
             Self::ShearRotary => SHEAR_ROTARY,
             Self::Resolution => RESOLUTION,
+            Self::SensorPosition => SENSOR_POSITION,
+            Self::SensorPolarity => SENSOR_POLARITY,
+            Self::SensorSwap => SENSOR_SWAP,
+            Self::SensorScale => SENSOR_SCALE,
+            Self::TapPosition => TAP_POSITION,
         }
     }
 
-    /// The parameters that measure its size: with all of them 0 the effect is absent.
+    /// The parameters that measure its size: with all of them 0 the effect is absent. Empty for an effect that has no
+    /// size.
     pub fn size_parameters(self) -> &'static [&'static str] {
         match self {
             Self::JointMass => &["mass", "inertia"],
+            Self::JointCompliance => &["rotation", "translation"],
+            Self::SensorPolarity | Self::SensorSwap => &[],
             Self::Fixture => &["ratio"],
             _ => std::slice::from_ref(&self.parameters()[0].name),
         }

@@ -289,6 +289,17 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
                 joint.coupling += first;
             }
         }
+        // In series with the joint, by the nominal (left) beam.
+        EffectId::JointCompliance => {
+            let beam = nominal.body.beams()[0];
+            let length = nominal.body.length();
+            let rotation = first * length / beam.bending_stiffness();
+            let translation = second * length.powi(3) / beam.bending_stiffness();
+            if let Some(joint) = &mut specimen.joint {
+                joint.kr = (joint.kr.recip() + rotation).recip();
+                joint.kt = (joint.kt.recip() + translation).recip();
+            }
+        }
         EffectId::JointMass => {
             specimen.joint_mass.mass += first;
             specimen.joint_mass.inertia += second;
@@ -321,6 +332,16 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
                 beam.modulus *= 1.0 + first;
             }
         }
+        EffectId::Density => {
+            for beam in specimen.body.beams_mut() {
+                beam.density *= 1.0 + first;
+            }
+        }
+        EffectId::Thickness => {
+            for beam in specimen.body.beams_mut() {
+                beam.thickness *= 1.0 + first;
+            }
+        }
         // After all others, by `stretch`.
         EffectId::Length => {}
         EffectId::Timebase => seen.frequency_scale *= 1.0 + first,
@@ -336,6 +357,12 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
         EffectId::AxialLoad => specimen.axial_force += first,
         EffectId::ShearRotary => specimen.shear_rotary += first,
         EffectId::Resolution => seen.frequency_offset += first,
+        // The structure is as described; where sensors and hammer are is the set-up's affair.
+        EffectId::SensorPosition
+        | EffectId::SensorPolarity
+        | EffectId::SensorSwap
+        | EffectId::SensorScale
+        | EffectId::TapPosition => {}
     }
 }
 

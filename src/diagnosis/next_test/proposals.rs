@@ -414,7 +414,7 @@ fn confirming(effect: EffectId) -> String {
     let text = match effect {
         // These tests separate causes as well.
         EffectId::SensorMass => return sentence(&Proposal::WeighSensor),
-        EffectId::Modulus | EffectId::Length => return sentence(&Proposal::Calipers),
+        EffectId::Modulus | EffectId::Length | EffectId::Density | EffectId::Thickness => return sentence(&Proposal::Calipers),
         EffectId::Timebase => return sentence(&Proposal::ReferenceTone),
         EffectId::SensorCable => {
             "lead the sensor's cable another way or take its support off, the joint untouched, and tap again"
@@ -450,6 +450,18 @@ fn confirming(effect: EffectId) -> String {
             "describe the beam with shear, rotary inertia and width (beam = \"timoshenko\" in [joint]), and diagnose again"
         }
         EffectId::Resolution => "read the frequencies by a curve fit, or on closer lines",
+        EffectId::JointCompliance => {
+            "leave kt and kr out of [joint], so that the joint's stiffnesses are estimated, and diagnose again"
+        }
+        EffectId::SensorPosition => "measure where the sensor sits, and diagnose again",
+        EffectId::SensorPolarity => {
+            "look which way the sensor points, turn it or give it a negative scale, and diagnose again"
+        }
+        EffectId::SensorSwap => "follow both cables to their channels, and diagnose again",
+        EffectId::SensorScale => {
+            "compare the sensor's calibration sheet with its scale, or shake it with a calibrator"
+        }
+        EffectId::TapPosition => "measure where the hammer strikes, and diagnose again",
     };
     text.into()
 }

@@ -40,6 +40,8 @@ pub struct Diagnosis {
     pub unlocated: Option<UnlocatedSensors>,
     /// Common factor that the frequencies ask for; `None` where they do not fix it.
     pub common_factor: Option<CommonFactor>,
+    /// Why no data could be spared for the closure; `None` where some were.
+    pub closure_reason: Option<String>,
     /// Tests that would decide between the hypotheses, those with most information per cost first.
     pub next_tests: Vec<NextTest>,
 }

@@ -125,7 +125,7 @@ pub struct GapSettings {
     /// Number of modes from which on the two highest are spared for the closure alone: 8, so that five are left to fit and one
     /// to test.
     pub spare_modes_from: usize,
-    /// Number of recordings from which on two are spared for the closure alone, if as many others were taken alike: 5.
+    /// Number of recordings from which on two are spared for the closure alone, if others were taken alike: 6, so that four are left.
     pub spare_recordings_from: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
@@ -184,7 +184,7 @@ impl Default for GapSettings {
             withhold_from: 6,
             withheld_modes: 1,
             spare_modes_from: 8,
-            spare_recordings_from: 5,
+            spare_recordings_from: 6,
             unknown_positions: 12,
             seed: 0,
         }

@@ -75,6 +75,13 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         amplitude_dependence: amplitude_dependence(dataset, &comparison.baseline),
         fitted_modes: dataset.fitted_modes,
         common_factor: common_factor(dataset),
+        closure_reason: dataset.spare.is_empty().then(|| {
+            format!(
+                "neither two modes nor two recordings can be spared: that needs {} modes, or {} recordings of which two \
+                 repeat the sensors of others",
+                dataset.settings.spare_modes_from, dataset.settings.spare_recordings_from
+            )
+        }),
         unlocated,
     }
 }

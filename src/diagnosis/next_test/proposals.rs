@@ -414,7 +414,9 @@ fn confirming(effect: EffectId) -> String {
     let text = match effect {
         // These tests separate causes as well.
         EffectId::SensorMass => return sentence(&Proposal::WeighSensor),
-        EffectId::Modulus | EffectId::Length | EffectId::Density | EffectId::Thickness => return sentence(&Proposal::Calipers),
+        EffectId::Modulus | EffectId::Length | EffectId::Density | EffectId::Thickness => {
+            return sentence(&Proposal::Calipers);
+        }
         EffectId::Timebase => return sentence(&Proposal::ReferenceTone),
         EffectId::SensorCable => {
             "lead the sensor's cable another way or take its support off, the joint untouched, and tap again"

@@ -94,7 +94,9 @@ fn size(beam: &Beam, id: EffectId, sign: f64, random: &mut ChaCha8Rng) -> Vec<(&
             ("frequency", log_uniform(65.0, 800.0, random)),
             ("ratio", log_uniform(0.005, 0.08, random)),
         ],
-        EffectId::Modulus | EffectId::Density => vec![("relative", sign * log_uniform(0.003, 0.03, random))],
+        EffectId::Modulus | EffectId::Density => {
+            vec![("relative", sign * log_uniform(0.003, 0.03, random))]
+        }
         EffectId::Length => vec![("relative", sign * log_uniform(0.0012, 0.007, random))],
         EffectId::Thickness => vec![("relative", sign * log_uniform(0.0015, 0.015, random))],
         EffectId::Timebase => vec![("relative", sign * log_uniform(2e-5, 1e-3, random))],

@@ -1,0 +1,471 @@
+//! Scores of a set of tests: rates with their intervals, calibration of the stated probabilities, closure.
+
+use super::trial::{Answer, Explained, Trial};
+use serde_json::{Map, Value, json};
+use tapjoint::effects::{Effect, EffectId, Group};
+use tapjoint::gap::{SET_PROBABILITY, Verdict};
+use tapjoint::study::blind_check::Rate;
+
+/// Least errors of the set-up that are worth a name: 5 mm of a position, 10 % of a scale.
+const LEAST_OFFSET: f64 = 5e-3;
+const LEAST_SCALE: f64 = 0.1;
+/// Standard uncertainties within which a stated size should hold the truth.
+const HOLDS: f64 = 2.0;
+/// Bins of a reliability table, equal in width.
+pub const BINS: usize = 10;
+
+/// A test with a diagnosis.
+type Answered<'a> = (&'a Trial, &'a Answer);
+
+/// A rate under its name.
+pub struct NamedRate {
+    /// As the JSON has it.
+    pub key: &'static str,
+    /// As the table has it.
+    pub title: &'static str,
+    pub rate: Rate,
+    /// What an observer reaches who knows all distributions; not computed yet.
+    pub ideal: Option<f64>,
+}
+
+impl NamedRate {
+    /// Counts the tests of which `hit` says something.
+    fn of(
+        answered: &[Answered],
+        key: &'static str,
+        title: &'static str,
+        hit: fn(&Trial, &Answer) -> Option<bool>,
+    ) -> Self {
+        Self {
+            key,
+            title,
+            rate: Rate::of(answered, |(trial, answer)| hit(trial, answer)),
+            ideal: None,
+        }
+    }
+}
+
+/// All scores of a set of tests.
+pub struct Scores {
+    pub tests: usize,
+    /// Tests without a diagnosis.
+    pub failed: usize,
+    pub rates: Vec<NamedRate>,
+    /// Mean number of classes in the list that holds 90 %.
+    pub list_size: Option<f64>,
+    pub closure: Closures,
+    /// Calibration of the first class of every test.
+    pub first: Calibration,
+    /// Calibration of all stated probabilities.
+    pub every: Calibration,
+    /// Mean over tests of the sum over classes of (p - truth)^2.
+    pub brier: Option<f64>,
+    /// Mean probability of what is true.
+    pub truth_probability: Option<f64>,
+    pub verdicts: Vec<(&'static str, usize)>,
+    pub seconds: f64,
+}
+
+/// Closure on hold-out data where one effect is planted and something is named.
+pub struct Closures {
+    pub median: Option<f64>,
+    pub tenth_percentile: Option<f64>,
+    pub stated: usize,
+    /// Named tests without a closure.
+    pub nulls: usize,
+}
+
+/// Kinds of verdicts.
+const VERDICTS: [&str; 6] = [
+    "no-gap",
+    "named",
+    "group",
+    "set",
+    "unknown",
+    "not-enough-data",
+];
+
+impl Scores {
+    pub fn of(trials: &[&Trial]) -> Self {
+        let answered = trials
+            .iter()
+            .filter_map(|trial| Some((*trial, trial.answer.as_ref().ok()?)));
+        let answered: Vec<Answered> = answered.collect();
+        let listed: Vec<f64> = answered
+            .iter()
+            .filter(|(trial, _)| trial.truth.effects.len() < 2)
+            .map(|(_, answer)| answer.list(SET_PROBABILITY).len() as f64)
+            .collect();
+        let stated = answered
+            .iter()
+            .map(|(trial, answer)| probability_of(answer, &trial.truth.explained()));
+        let stated: Vec<f64> = stated.collect();
+        let verdicts = VERDICTS.map(|kind| {
+            let same = answered.iter();
+            let count = same.filter(|(_, answer)| answer.verdict.kind() == kind);
+            (kind, count.count())
+        });
+        Self {
+            tests: trials.len(),
+            failed: trials.len() - answered.len(),
+            rates: rates(&answered),
+            list_size: mean(&listed),
+            closure: closures(&answered),
+            first: Calibration::of(&answered, |answer| {
+                &answer.classes[..answer.classes.len().min(1)]
+            }),
+            every: Calibration::of(&answered, |answer| &answer.classes),
+            brier: mean(&answered.iter().map(brier).collect::<Vec<f64>>()),
+            truth_probability: mean(&stated),
+            verdicts: verdicts.to_vec(),
+            seconds: trials.iter().map(|trial| trial.seconds).sum(),
+        }
+    }
+
+    pub fn json(&self) -> Value {
+        let mut rates = Map::new();
+        for one in &self.rates {
+            let interval = one.rate.interval();
+            rates.insert(
+                one.key.to_owned(),
+                json!({
+                    "hits": one.rate.hits,
+                    "cases": one.rate.of,
+                    "rate": one.rate.value(),
+                    "low": interval.map(|interval| interval.0),
+                    "high": interval.map(|interval| interval.1),
+                    "ideal": one.ideal,
+                }),
+            );
+        }
+        let verdicts = self.verdicts.iter();
+        let verdicts: Map<String, Value> = verdicts
+            .map(|(kind, count)| ((*kind).to_owned(), json!(count)))
+            .collect();
+        json!({
+            "tests": self.tests,
+            "failed": self.failed,
+            "seconds": self.seconds,
+            "rates": rates,
+            "list_size": self.list_size,
+            "closure": {
+                "median": self.closure.median,
+                "tenth_percentile": self.closure.tenth_percentile,
+                "stated": self.closure.stated,
+                "nulls": self.closure.nulls,
+            },
+            "brier": self.brier,
+            "truth_probability": self.truth_probability,
+            "first_class": self.first.json(),
+            "every_class": self.every.json(),
+            "verdicts": verdicts,
+        })
+    }
+}
+
+fn rates(answered: &[Answered]) -> Vec<NamedRate> {
+    vec![
+        NamedRate::of(
+            answered,
+            "first_class_right",
+            "first class right",
+            |trial, answer| {
+                Some(answer.classes.first().map(|first| &first.0) == Some(&trial.truth.explained()))
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "first_group_right",
+            "first group right",
+            |trial, answer| {
+                trial
+                    .truth
+                    .is_single()
+                    .then(|| first_group_is_right(trial, answer))
+            },
+        ),
+        NamedRate::of(answered, "place_right", "place right", |trial, answer| {
+            trial
+                .truth
+                .is_single()
+                .then(|| place_is_right(trial, answer))
+        }),
+        NamedRate::of(answered, "named", "named", |_, answer| {
+            Some(answer.named().is_some())
+        }),
+        NamedRate::of(
+            answered,
+            "names_right",
+            "names that are right",
+            |trial, answer| {
+                let named = answer.named()?;
+                Some(named == trial.truth.explained())
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "singles_named_right",
+            "one effect: named rightly",
+            |trial, answer| {
+                trial
+                    .truth
+                    .is_single()
+                    .then(|| answer.named() == Some(trial.truth.explained()))
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "singles_named_wrong",
+            "one effect: named wrongly",
+            |trial, answer| {
+                let wrong = answer
+                    .named()
+                    .is_some_and(|named| named != trial.truth.explained());
+                trial.truth.is_single().then_some(wrong)
+            },
+        ),
+        NamedRate::of(answered, "nulls_named", "nulls named", |trial, answer| {
+            let named = matches!(answer.verdict, Verdict::Named(_) | Verdict::Group(_));
+            trial.truth.is_null().then_some(named)
+        }),
+        NamedRate::of(
+            answered,
+            "outside_named",
+            "outside named",
+            |trial, answer| trial.truth.outside.map(|_| answer.named().is_some()),
+        ),
+        NamedRate::of(
+            answered,
+            "outside_unknown",
+            "outside called unknown",
+            |trial, answer| {
+                trial
+                    .truth
+                    .outside
+                    .map(|_| answer.verdict == Verdict::Unknown)
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "pairs_found_or_refused",
+            "pairs both found or refused",
+            |trial, answer| {
+                let refused =
+                    matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData(_));
+                let found = answer.named() == Some(trial.truth.explained());
+                (trial.truth.effects.len() == 2).then_some(refused || found)
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "pairs_found",
+            "pairs both found",
+            |trial, answer| {
+                let found = answer.named() == Some(trial.truth.explained());
+                (trial.truth.effects.len() == 2).then_some(found)
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "list_holds",
+            "90 % list holds the truth",
+            |trial, answer| {
+                let truth = trial.truth.explained();
+                let holds = answer
+                    .list(SET_PROBABILITY)
+                    .iter()
+                    .any(|one| one.0 == truth);
+                (trial.truth.effects.len() < 2).then_some(holds)
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "set_up_named",
+            "set-up errors named",
+            |trial, answer| {
+                let is_named = answer.named() == Some(Explained::Groups(vec![Group::SetUp]));
+                worthy_set_up(trial).map(|_| is_named)
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "set_up_member_right",
+            "set-up errors, kind right",
+            |trial, answer| worthy_set_up(trial).map(|effect| is_named_as(answer, effect)),
+        ),
+        NamedRate::of(
+            answered,
+            "set_up_sizes_hold",
+            "set-up sizes within 2 std",
+            |trial, answer| {
+                let effect = worthy_set_up(trial)?;
+                is_named_as(answer, effect).then(|| size_holds(effect, answer))?
+            },
+        ),
+        NamedRate::of(
+            answered,
+            "sizes_hold",
+            "sizes of names within 2 std",
+            |trial, answer| {
+                let effect = trial.truth.effects.first()?;
+                (trial.truth.is_single() && is_named_as(answer, effect))
+                    .then(|| size_holds(effect, answer))?
+            },
+        ),
+    ]
+}
+
+/// Returns whether the most probable group of effects is the planted one.
+fn first_group_is_right(trial: &Trial, answer: &Answer) -> bool {
+    let mut classes = answer.classes.iter();
+    let first = classes.find(|one| matches!(one.0, Explained::Groups(_)));
+    first.is_some_and(|first| first.0 == trial.truth.explained())
+}
+
+/// Returns whether the most probable place is that of a member of the planted group: data cannot separate them.
+fn place_is_right(trial: &Trial, answer: &Answer) -> bool {
+    let group = trial.truth.effects[0].id.group();
+    let mut members = EffectId::ALL.iter().filter(|id| id.group() == group);
+    members.any(|id| Some(id.place()) == answer.place)
+}
+
+/// Returns the planted error of the set-up where it is worth a name.
+fn worthy_set_up(trial: &Trial) -> Option<&Effect> {
+    let [effect] = trial.truth.effects.as_slice() else {
+        return None;
+    };
+    let worthy = match effect.id {
+        EffectId::SensorPosition | EffectId::TapPosition => {
+            effect.value("offset").unwrap_or(0.0).abs() >= LEAST_OFFSET
+        }
+        EffectId::SensorScale => effect.value("relative").unwrap_or(0.0).abs() >= LEAST_SCALE,
+        EffectId::SensorPolarity | EffectId::SensorSwap => true,
+        _ => false,
+    };
+    worthy.then_some(effect)
+}
+
+/// Returns whether this effect alone is named, or its group with it in the first place.
+fn is_named_as(answer: &Answer, effect: &Effect) -> bool {
+    let named = Explained::Groups(vec![effect.id.group()]);
+    answer.named() == Some(named) && answer.first == [effect.id]
+}
+
+/// Returns whether the planted size lies within the stated uncertainty. `None` where the effect has no size or none is
+/// bounded.
+fn size_holds(effect: &Effect, answer: &Answer) -> Option<bool> {
+    let planted = effect.id.size_parameters().iter();
+    let (name, truth) = planted
+        .filter_map(|name| Some((*name, effect.value(name)?)))
+        .find(|(_, value)| *value != 0.0)?;
+    let mut parameters = answer.parameters.iter();
+    let found = parameters.find(|one| one.effect == effect.id && one.name == name)?;
+    Some((found.value - truth).abs() <= HOLDS * found.std?)
+}
+
+fn closures(answered: &[Answered]) -> Closures {
+    let named = answered
+        .iter()
+        .filter(|(trial, answer)| trial.truth.is_single() && answer.named().is_some());
+    let all: Vec<Option<f64>> = named.map(|(_, answer)| answer.closure).collect();
+    let mut stated: Vec<f64> = all.iter().flatten().copied().collect();
+    stated.sort_by(f64::total_cmp);
+    Closures {
+        median: quantile(&stated, 0.5),
+        tenth_percentile: quantile(&stated, 0.1),
+        nulls: all.len() - stated.len(),
+        stated: stated.len(),
+    }
+}
+
+/// Returns the value that a share of the sorted values does not exceed.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let at = share * last as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    Some(low + at.fract() * (high - low))
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+fn probability_of(answer: &Answer, class: &Explained) -> f64 {
+    let mut classes = answer.classes.iter();
+    classes.find(|one| one.0 == *class).map_or(0.0, |one| one.1)
+}
+
+fn brier((trial, answer): &Answered) -> f64 {
+    let truth = trial.truth.explained();
+    let others = answer.classes.iter().filter(|one| one.0 != truth);
+    (1.0 - probability_of(answer, &truth)).powi(2) + others.map(|one| one.1.powi(2)).sum::<f64>()
+}
+
+/// How far stated probabilities can be trusted.
+pub struct Calibration {
+    pub bins: Vec<Bin>,
+}
+
+/// Statements of about one probability.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Bin {
+    /// Statements, and those that are right.
+    pub rate: Rate,
+    /// Sum of the stated probabilities.
+    pub sum: f64,
+}
+
+impl Bin {
+    /// Returns the mean stated probability.
+    pub fn stated(&self) -> Option<f64> {
+        (self.rate.of > 0).then(|| self.sum / self.rate.of as f64)
+    }
+}
+
+impl Calibration {
+    /// Bins the statements that these tests make of classes.
+    fn of(
+        answered: &[Answered],
+        statements: impl for<'a> Fn(&'a Answer) -> &'a [(Explained, f64)],
+    ) -> Self {
+        let mut bins = vec![Bin::default(); BINS];
+        for (trial, answer) in answered {
+            let truth = trial.truth.explained();
+            for (class, probability) in statements(answer) {
+                let bin = &mut bins[((probability * BINS as f64) as usize).min(BINS - 1)];
+                bin.rate.of += 1;
+                bin.rate.hits += usize::from(*class == truth);
+                bin.sum += probability;
+            }
+        }
+        Self { bins }
+    }
+
+    /// Returns the mean distance of stated probability and share of right statements.
+    pub fn error(&self) -> Option<f64> {
+        let all: usize = self.bins.iter().map(|bin| bin.rate.of).sum();
+        let distances = self.bins.iter();
+        let sum: f64 = distances
+            .map(|bin| (bin.sum - bin.rate.hits as f64).abs())
+            .sum();
+        (all > 0).then(|| sum / all as f64)
+    }
+
+    fn json(&self) -> Value {
+        let bins = self.bins.iter().enumerate().map(|(index, bin)| {
+            let interval = bin.rate.interval();
+            json!({
+                "from": index as f64 / BINS as f64,
+                "cases": bin.rate.of,
+                "stated": bin.stated(),
+                "right": bin.rate.value(),
+                "low": interval.map(|interval| interval.0),
+                "high": interval.map(|interval| interval.1),
+            })
+        });
+        json!({
+            "expected_calibration_error": self.error(),
+            "reliability": bins.collect::<Vec<Value>>(),
+        })
+    }
+}

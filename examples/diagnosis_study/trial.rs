@@ -1,0 +1,292 @@
+//! One test: drawn, observed, diagnosed.
+
+use super::draws::ErrorShape;
+use super::outside::OutsideKind;
+use super::plans::{PlanKind, PlannedTest};
+use super::plants::{Class, draw_effects, is_within_tolerance, plan_needs, structure_needs};
+use super::structures::{Structure, Support, Tolerances};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::time::Instant;
+use tapjoint::effects::{Effect, EffectId, Group, Place};
+use tapjoint::gap::{
+    Diagnosis, GapSettings, Hypothesis, ParameterValue, Verdict, diagnose, observe,
+};
+
+/// What is true of a test.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    pub class: Class,
+    pub effects: Vec<Effect>,
+    /// Kind and size of a fault outside the catalogue.
+    pub outside: Option<(OutsideKind, f64)>,
+    /// All frequencies are off by less than two standard uncertainties of their common factor, and nothing else is: the
+    /// description is as good as it says.
+    pub within_tolerance: bool,
+}
+
+/// What is explained: the classes between which probabilities are shared out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Explained {
+    Nothing,
+    /// Groups of the effects, in order.
+    Groups(Vec<Group>),
+    Unknown,
+}
+
+impl Truth {
+    pub fn is_null(&self) -> bool {
+        self.explained() == Explained::Nothing
+    }
+
+    pub fn is_single(&self) -> bool {
+        self.effects.len() == 1 && !self.within_tolerance
+    }
+
+    pub fn explained(&self) -> Explained {
+        if self.outside.is_some() {
+            Explained::Unknown
+        } else if self.effects.is_empty() || self.within_tolerance {
+            Explained::Nothing
+        } else {
+            Explained::of(self.effects.iter().map(|effect| effect.id.group()))
+        }
+    }
+
+    /// Returns what is planted in a few words.
+    pub fn describe(&self) -> String {
+        let mut parts = Vec::new();
+        for effect in &self.effects {
+            let values = effect.values();
+            let values: Vec<String> = values
+                .map(|(info, value)| format!("{}={value:.3e}", info.name))
+                .collect();
+            parts.push(format!("{}({})", effect.id.name(), values.join(" ")));
+        }
+        if let Some((kind, size)) = self.outside {
+            parts.push(format!("{}({size:.3e})", kind.name()));
+        }
+        if self.within_tolerance {
+            parts.push("within tolerance".to_owned());
+        }
+        match parts.is_empty() {
+            true => "nothing".to_owned(),
+            false => parts.join(" + "),
+        }
+    }
+}
+
+impl Explained {
+    /// Returns these groups, each once.
+    fn of(groups: impl Iterator<Item = Group>) -> Self {
+        let mut groups: Vec<Group> = groups.collect();
+        groups.sort();
+        groups.dedup();
+        Self::Groups(groups)
+    }
+
+    fn by(hypothesis: &Hypothesis) -> Self {
+        match hypothesis {
+            Hypothesis::None => Self::Nothing,
+            Hypothesis::Unknown => Self::Unknown,
+            Hypothesis::Effects(effects) => Self::of(effects.iter().map(|effect| effect.group())),
+        }
+    }
+
+    pub fn name(&self) -> String {
+        match self {
+            Self::Nothing => "none".to_owned(),
+            Self::Unknown => "unknown".to_owned(),
+            Self::Groups(groups) => {
+                let names: Vec<&str> = groups.iter().map(|group| group.name()).collect();
+                names.join("+")
+            }
+        }
+    }
+}
+
+/// What the diagnosis made of a test.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    pub verdict: Verdict,
+    /// Probability of every class, the most probable first.
+    pub classes: Vec<(Explained, f64)>,
+    /// The most probable place.
+    pub place: Option<Place>,
+    /// Parameters of the most probable hypothesis of effects.
+    pub parameters: Vec<ParameterValue>,
+    /// Effects of that hypothesis.
+    pub first: Vec<EffectId>,
+    /// Closure on hold-out data by that hypothesis.
+    pub closure: Option<f64>,
+}
+
+impl Answer {
+    fn of(found: &Diagnosis) -> Self {
+        let mut classes: Vec<(Explained, f64)> = Vec::new();
+        for one in &found.hypotheses {
+            let class = Explained::by(&one.hypothesis);
+            match classes.iter_mut().find(|known| known.0 == class) {
+                Some(known) => known.1 += one.probability,
+                None => classes.push((class, one.probability)),
+            }
+        }
+        classes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let named = match &found.verdict {
+            Verdict::Named(effects) => Some(Hypothesis::Effects(effects.clone())),
+            _ => None,
+        };
+        let mut hypotheses = found.hypotheses.iter();
+        // That which is named; else the most probable one that has effects.
+        let first = hypotheses.find(|one| match &named {
+            Some(named) => one.hypothesis == *named,
+            None => matches!(one.hypothesis, Hypothesis::Effects(_)),
+        });
+        Self {
+            verdict: found.verdict.clone(),
+            classes,
+            place: found.locations.ranked()[0].0,
+            parameters: first.map_or_else(Vec::new, |one| one.parameters.clone()),
+            first: first.map_or_else(Vec::new, |one| match &one.hypothesis {
+                Hypothesis::Effects(effects) => effects.clone(),
+                _ => Vec::new(),
+            }),
+            closure: first
+                .and_then(|one| one.closure)
+                .map(|closure| closure.value),
+        }
+    }
+
+    /// Returns the groups that the answer names; a group of effects that data cannot separate counts as its name.
+    pub fn named(&self) -> Option<Explained> {
+        let effects = match &self.verdict {
+            Verdict::Named(effects) | Verdict::Group(effects) => effects,
+            _ => return None,
+        };
+        let named = Explained::of(effects.iter().map(|effect| effect.group()));
+        match (&self.verdict, &named) {
+            // Members of several groups are a list, not a name.
+            (Verdict::Group(_), Explained::Groups(groups)) if groups.len() > 1 => None,
+            _ => Some(named),
+        }
+    }
+
+    /// Returns the most probable classes that hold this probability together.
+    pub fn list(&self, share: f64) -> &[(Explained, f64)] {
+        let mut sum = 0.0;
+        let enough = self.classes.iter().position(|one| {
+            sum += one.1;
+            sum >= share
+        });
+        &self.classes[..enough.map_or(self.classes.len(), |last| last + 1)]
+    }
+}
+
+/// One test and its answer.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    pub number: usize,
+    pub truth: Truth,
+    pub support: Support,
+    pub tolerances: Tolerances,
+    pub errors: ErrorShape,
+    pub plan: PlanKind,
+    pub recordings: usize,
+    pub modes: usize,
+    /// The answer, or the reason why there is none.
+    pub answer: Result<Answer, String>,
+    /// Time of the diagnosis (s).
+    pub seconds: f64,
+}
+
+impl Trial {
+    /// Draws and diagnoses a test. `None` where the structure cannot be: it buckles.
+    pub fn run(class: Class, number: usize, seed: u64) -> Option<Self> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let ids = class.draw_ids(&mut random);
+        let structure = Structure::draw(&mut random, &structure_needs(&ids));
+        let mut needs = plan_needs(&ids);
+        needs.several_recordings = class == Class::Outside(OutsideKind::Temperature);
+        let test = PlannedTest::draw(&mut random, &structure, &needs);
+        let effects = draw_effects(&mut random, &ids, &structure, &test)?;
+        let mut truth = test.nominal(&structure, false);
+        let outside = match class {
+            Class::Outside(kind) => {
+                let size = kind.plant(&mut random, &structure, &mut truth.specimen);
+                Some((kind, size))
+            }
+            _ => None,
+        };
+        let mut observed = observe(&test.plan, &truth, &effects, random.random()).ok()?;
+        test.state(&mut observed);
+        test.drift_heavily(&mut random, &truth.specimen, &mut observed);
+        if let Some((kind, size)) = outside {
+            kind.change(&mut random, size, &mut observed);
+        }
+        let within_tolerance = is_within_tolerance(&effects, &structure);
+        let described = test.nominal(&structure, true);
+        let begin = Instant::now();
+        // A panic is a defect of the diagnosis, and no reason to lose all other tests.
+        let found =
+            std::panic::catch_unwind(|| diagnose(&observed, &described, &GapSettings::default()));
+        let answer = match found {
+            Ok(Ok(found)) => Ok(Answer::of(&found)),
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err("the diagnosis panicked".to_owned()),
+        };
+        Some(Self {
+            number,
+            truth: Truth {
+                class,
+                effects,
+                outside,
+                within_tolerance,
+            },
+            support: structure.support,
+            tolerances: structure.tolerances,
+            errors: structure.errors,
+            plan: test.kind,
+            recordings: test.stated.len(),
+            modes: test.plan.modes,
+            answer,
+            seconds: begin.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Returns one line: what is true, the verdict, the first hypotheses.
+    pub fn line(&self) -> String {
+        let head = format!(
+            "{} {} {} {}/{} {} {} recordings, {} modes, {:.1} s: {}",
+            self.truth.class.name(),
+            self.number,
+            self.support.name(),
+            self.tolerances.name(),
+            self.errors.name(),
+            self.plan.name(),
+            self.recordings,
+            self.modes,
+            self.seconds,
+            self.truth.describe(),
+        );
+        let answer = match &self.answer {
+            Err(reason) => return format!("{head} -> no diagnosis: {reason}"),
+            Ok(answer) => answer,
+        };
+        let classes: Vec<String> = answer.classes[..answer.classes.len().min(4)]
+            .iter()
+            .map(|(class, probability)| format!("{} {probability:.2}", class.name()))
+            .collect();
+        let names: Vec<String> = answer
+            .verdict
+            .hypotheses()
+            .iter()
+            .map(Hypothesis::name)
+            .collect();
+        format!(
+            "{head} -> {} {} [{}]",
+            answer.verdict.kind(),
+            names.join(", "),
+            classes.join(", ")
+        )
+    }
+}

@@ -10,9 +10,9 @@ use crate::evidence::{
 use crate::fixture::with_peaks;
 use crate::forward::Forward;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
-use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior, Size};
+use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
 use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
-use crate::structure::COUPLING;
+use crate::structure::{COUPLING, ModalModel};
 use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_numerics::stats::root_mean_square;
 
@@ -32,8 +32,20 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
 
 /// Largest size from which a search begins, over its scale.
 const LARGEST_STEP: f64 = 10.0;
-/// Sizes of errors of the set-up from which a search may begin, over their scale: 1 mm to 15 cm, 2 % to 30-fold.
-const START_SET_UP_SIZES: [f64; 9] = [0.2, 0.6, 1.2, 2.0, 3.5, 6.0, 10.0, 30.0, 90.0];
+/// Sizes of errors of the set-up that are tried, over their scale: from 0.1, each 1.4 times the one before, to 80. These are
+/// 0.5 mm to 40 cm, and 1 % to a factor of 9.
+const SMALLEST_ERROR: f64 = 0.1;
+const ERROR_RATIO: f64 = 1.4;
+const SET_UP_STEPS: i32 = 21;
+
+/// Error of the set-up with everything else held.
+struct Screened {
+    candidate: CandidateEffect,
+    /// Best size.
+    size: f64,
+    log_evidence: f64,
+}
+
 /// Nodes of a location at which the true model is fitted.
 const CORRECTED: usize = 6;
 
@@ -55,6 +67,9 @@ impl<'a> Search<'a> {
     /// Fits an effect beside those of the fit without it: on each of the things that it may act on, which are equally
     /// probable.
     pub fn add_any(&self, variants: &[CandidateEffect]) -> Option<Fit> {
+        if variants[0].effect.group() == Group::SetUp {
+            return self.add_set_up_error(variants);
+        }
         let fits: Vec<Fit> = variants.iter().filter_map(|one| self.add(*one)).collect();
         let mut logs: Vec<f64> = fits.iter().map(|fit| fit.log_evidence).collect();
         // A fit that failed has no evidence.
@@ -66,6 +81,93 @@ impl<'a> Search<'a> {
         Some(Fit {
             log_evidence,
             ..best
+        })
+    }
+
+    /// Fits an error of the set-up where that promises most; the others count with all but their size held.
+    fn add_set_up_error(&self, variants: &[CandidateEffect]) -> Option<Fit> {
+        let models = self.model_with(&[]).solve(self.without.parameters())?;
+        let screened = variants.iter().map(|one| self.screened(*one, &models));
+        let mut screened = screened.collect::<Option<Vec<Screened>>>()?;
+        screened.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        let mut logs = Vec::new();
+        let mut best: Option<Fit> = None;
+        for (rank, one) in screened.iter().enumerate() {
+            if rank >= FOLLOWED {
+                logs.push(one.log_evidence);
+                continue;
+            }
+            let forward = self.model_with(&[one.candidate]);
+            let start = start_with(self.without, &forward.layout, one.size, None);
+            let fit = self.fit_from(&forward, &start);
+            logs.push(
+                fit.as_ref()
+                    .map_or(f64::NEG_INFINITY, |fit| fit.log_evidence),
+            );
+            if let Some(fit) = fit
+                && best
+                    .as_ref()
+                    .is_none_or(|best| fit.log_evidence > best.log_evidence)
+            {
+                best = Some(fit);
+            }
+        }
+        Some(Fit {
+            log_evidence: log_mean(&logs),
+            ..best?
+        })
+    }
+
+    /// Returns the best size of an error of the set-up with everything else held, and the evidence with that: the integral of
+    /// prior times likelihood over a row of sizes from small to gross.
+    fn screened(&self, candidate: CandidateEffect, models: &[ModalModel]) -> Option<Screened> {
+        let forward = self.model_with(&[candidate]);
+        let size = &candidate.size;
+        let mut sizes = vec![0.0];
+        if size.is_fixed() {
+            sizes = vec![size.low];
+        } else {
+            for step in 0..SET_UP_STEPS {
+                let share = SMALLEST_ERROR * ERROR_RATIO.powi(step);
+                sizes.extend([-share * size.scale, share * size.scale]);
+            }
+            sizes.retain(|x| (size.low..=size.high).contains(x));
+            sizes.sort_by(f64::total_cmp);
+        }
+        let (data, without) = (&self.dataset.data, &self.without.best.optimum);
+        let mut held = self.without.best.priors.clone();
+        held.insert(forward.layout.last_size(), Prior::held(0.0));
+        let (mut best, mut logs): (Option<[f64; 2]>, Vec<f64>) = (None, Vec::new());
+        for &value in &sizes {
+            let at = start_with(self.without, &forward.layout, value, None);
+            let predicted = forward.predict_set_up(&at, models)?;
+            let gain = without.objective - objective_at(data, &held, &at, &predicted);
+            logs.push(gain + size.log_density(value));
+            if best.is_none_or(|[most, _]| gain > most) {
+                best = Some([gain, value]);
+            }
+        }
+        // By trapezoids; an error that is there or not has no width.
+        let widths = (0..sizes.len()).map(|k| {
+            let (before, after) = (
+                sizes[k.saturating_sub(1)],
+                sizes[(k + 1).min(sizes.len() - 1)],
+            );
+            if size.is_fixed() {
+                1.0
+            } else {
+                0.5 * (after - before)
+            }
+        });
+        let parts: Vec<f64> = logs
+            .iter()
+            .zip(widths)
+            .map(|(log, width)| log + width.ln())
+            .collect();
+        Some(Screened {
+            candidate,
+            size: best?[1],
+            log_evidence: self.without.log_evidence + log_sum(&parts),
         })
     }
 
@@ -158,9 +260,6 @@ impl<'a> Search<'a> {
         if size.is_fixed() {
             return vec![size.low];
         }
-        if candidate.effect.group() == Group::SetUp {
-            return self.set_up_sizes(forward, size);
-        }
         // One step of Gauss-Newton from nothing of it, not stopped by a bound.
         let mut priors = forward.priors();
         (priors[at].low, priors[at].high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -179,27 +278,6 @@ impl<'a> Search<'a> {
         } else {
             vec![asked, other]
         }
-    }
-
-    /// Returns the sizes of an error of the set-up from which the search begins: the best of a row from small to gross.
-    /// Shapes bend within a few centimetres, so that the slopes at nothing lead nowhere.
-    fn set_up_sizes(&self, forward: &Forward<'_>, size: &Size) -> Vec<f64> {
-        let rows = START_SET_UP_SIZES.iter().flat_map(|share| [*share, -share]);
-        let rows = rows.map(|share| share * size.scale);
-        let mut tried: Vec<(f64, f64)> = Vec::new();
-        for size in rows.filter(|x| (size.low..=size.high).contains(x)) {
-            let start = start_with(self.without, &forward.layout, size, None);
-            if let Some((predicted, _)) = forward.predict(&start) {
-                let data = &self.dataset.data;
-                tried.push((
-                    objective_at(data, &forward.priors(), &start, &predicted),
-                    size,
-                ));
-            }
-        }
-        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        tried.truncate(FOLLOWED);
-        tried.into_iter().map(|one| one.1).collect()
     }
 
     /// Fits the linearised model at every node of the location's range; then the true one, free, from the best.

@@ -40,31 +40,7 @@ impl Model for Forward<'_> {
     type Solution = Solution;
 
     fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
-        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
-        let models = self.solve(parameters)?;
-        let base = self.predictions_of(&models, parameters)?;
-        let mut predicted = base.clone();
-        let mut slopes = DMatrix::zeros(base.len(), parameters.len());
-        let first = self.layout.first_nuisance();
-        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
-            let nuisance = nuisance.parameter;
-            // These enter the solution itself.
-            let is_solved = matches!(nuisance, Damping | DampingTilt | Amplitude);
-            for (row, observable) in self.observables.iter().enumerate() {
-                let slope =
-                    self.nuisance_slope(observable, nuisance, &models, base[row], parameters);
-                slopes[(row, first + k)] = slope;
-                if !is_solved {
-                    predicted[row] += parameters[first + k] * slope;
-                }
-            }
-        }
-        let solution = Solution {
-            models,
-            base,
-            slopes,
-        };
-        Some((predicted, solution))
+        self.predict_with(self.solve(parameters)?, parameters)
     }
 
     fn slopes(
@@ -114,6 +90,50 @@ impl Model for Forward<'_> {
 const WIDE_STEP: f64 = 1e-2;
 
 impl<'a> Forward<'a> {
+    /// Returns the predictions with the errors of the set-up that the parameters state, by modes that are solved. A sensor's
+    /// mass stays where it was.
+    pub fn predict_set_up(&self, parameters: &[f64], solved: &[ModalModel]) -> Option<Vec<f64>> {
+        let arrangements = self.dataset.arrangements.iter();
+        let models = solved.iter().zip(arrangements);
+        let models = models.map(|(model, arrangement)| ModalModel {
+            set_up: SetUp::new(arrangement, &self.layout, parameters),
+            ..model.clone()
+        });
+        Some(self.predict_with(models.collect(), parameters)?.0)
+    }
+
+    /// Returns the predictions by the modal models of all configurations.
+    fn predict_with(
+        &self,
+        models: Vec<ModalModel>,
+        parameters: &[f64],
+    ) -> Option<(Vec<f64>, Solution)> {
+        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
+        let base = self.predictions_of(&models, parameters)?;
+        let mut predicted = base.clone();
+        let mut slopes = DMatrix::zeros(base.len(), parameters.len());
+        let first = self.layout.first_nuisance();
+        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
+            let nuisance = nuisance.parameter;
+            // These enter the solution itself.
+            let is_solved = matches!(nuisance, Damping | DampingTilt | Amplitude);
+            for (row, observable) in self.observables.iter().enumerate() {
+                let slope =
+                    self.nuisance_slope(observable, nuisance, &models, base[row], parameters);
+                slopes[(row, first + k)] = slope;
+                if !is_solved {
+                    predicted[row] += parameters[first + k] * slope;
+                }
+            }
+        }
+        let solution = Solution {
+            models,
+            base,
+            slopes,
+        };
+        Some((predicted, solution))
+    }
+
     /// Returns the model of the fitted observables with these effects.
     pub fn new(dataset: &'a Dataset, effects: &[CandidateEffect]) -> Self {
         Forward {

@@ -50,6 +50,8 @@ mod optimum;
 mod parameters;
 mod result;
 mod set_up;
+#[cfg(test)]
+mod set_up_tests;
 mod settings;
 mod spare;
 mod structure;

@@ -7,7 +7,7 @@ use crate::result::{Block, Closure, Hypothesis, LocationProbabilities, Verdict};
 use crate::settings::{
     ANOTHER_LEVEL, BLOCK_MISFIT, CLOSED_SHARE, DETECTED, DOUBLED_ERRORS, LISTED_SHARE, LONGEST_SET,
     MISFIT, NAMED_PROBABILITY, NO_GAP_PRIOR, PREDICTED, RIGID_PRIOR, SEPARATE, SET_PROBABILITY,
-    SIZED, SMALLEST_P_VALUE, SPARE_DATA,
+    SIZED, SMALLEST_P_VALUE, SPARE_DATA, UNKNOWN_PRIOR,
 };
 use crate::structure::Arrangement;
 use crate::validate::{Residuals, holdout_goodness};
@@ -233,8 +233,8 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
     all.find(|one| one.hypothesis == Hypothesis::None)
 }
 
-/// Gives every group the same prior probability, split evenly inside; `unknown` is a group, `none`
-/// has [`NO_GAP_PRIOR`] of them. The pairs that were `tried` share one unit among themselves, the accepted
+/// Gives every group the same prior probability, split evenly inside; `none` has that of [`NO_GAP_PRIOR`] groups, `unknown`
+/// of [`UNKNOWN_PRIOR`], a joint that gives although it is described as rigid of [`RIGID_PRIOR`]. The pairs that were `tried` share one unit among themselves, the accepted
 /// and the others. Sorts the most probable first.
 pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
     for k in 0..candidates.len() {
@@ -248,6 +248,7 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
             });
             let weight = match one.effects() {
                 _ if one.hypothesis == Hypothesis::None => NO_GAP_PRIOR,
+                _ if one.is_unknown() => UNKNOWN_PRIOR,
                 [EffectId::JointCompliance] => RIGID_PRIOR,
                 _ => 1.0,
             };

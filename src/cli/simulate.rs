@@ -40,16 +40,12 @@ fn list_of_effects() -> String {
     for id in possible.filter(|id| *id != EffectId::Resolution) {
         let mut parameters = Vec::new();
         for info in id.parameters() {
-            let unit = info.dimension.unit();
-            let unit = if unit.is_empty() {
-                String::new()
-            } else {
-                format!(" {unit}")
-            };
-            parameters.push(match info.typical {
-                Some(typical) => format!("{}={typical}{unit}", info.name),
-                None => format!("{} (needed{unit})", info.name),
-            });
+            let (name, unit) = (info.name, info.dimension.unit());
+            let value = info.typical.map_or_else(
+                || format!("{name} must be given ({unit})"),
+                |typical| format!("{name}={typical} {unit}"),
+            );
+            parameters.push(value.trim_end().to_owned());
         }
         let _ = writeln!(text, "  {}: {}", id.name(), id.meaning());
         let _ = writeln!(text, "      {}", parameters.join(", "));

@@ -301,6 +301,9 @@ fn prop_a_joint_described_as_rigid_stays_so_and_gives() {
     assert_eq!(joint.kt, None);
 }
 
+/// Description, effect, parameters.
+type Refused<'a> = (&'a str, EffectId, &'a [(&'a str, f64)]);
+
 #[test]
 fn regress_set_ups_that_cannot_be() {
     use EffectId::{
@@ -310,7 +313,7 @@ fn regress_set_ups_that_cannot_be() {
         "[[sensor]]\nname = \"B\"\nchannel = 3\nscale = 2000\nposition = 0.205\n",
         "",
     );
-    let cases: [(&str, EffectId, &[(&str, f64)]); 14] = [
+    let cases: [Refused; 14] = [
         (CANTILEVER, SensorPosition, &[("sensor", 1.5)]),
         (CANTILEVER, SensorPosition, &[("sensor", 3.0)]),
         (CANTILEVER, SensorPosition, &[("recording", 3.0)]),
@@ -345,7 +348,7 @@ fn regress_set_ups_that_cannot_be() {
         let sensors = description.sensors.len();
         let _ = writeln!(
             messages,
-            "{} {pairs:?}, {sensors} sensors\n    {error}",
+            "{} {pairs:?}; sensors: {sensors}\n    {error}",
             id.name()
         );
     }

@@ -103,9 +103,9 @@ pub enum SetUpError {
     },
     /// A place would not be on the beam.
     #[error(
-        "`{effect}`: offset is {offset} m, which moves {thing} from {place} m to {} m in recording {recording}; \
+        "`{effect}`: offset is {offset} m, which moves {thing} from {} m to {} m in recording {recording}; \
          the beam reaches from 0 to {length} m; give an offset from {} to {} m",
-        rounded(.place + .offset), rounded(.allowed[0]), rounded(.allowed[1])
+        rounded(*.place), rounded(.place + .offset), rounded(.allowed[0]), rounded(.allowed[1])
     )]
     OffTheBeam {
         /// The effect.

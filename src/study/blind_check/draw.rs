@@ -416,8 +416,8 @@ impl DrawnTest {
             return Ok(truth);
         }
         // The misfit of each effect without the others; none where one is no hypothesis of such a test.
-        let misfits = self.effects.iter().map(|effect| {
-            let own = Hypothesis::Effects(vec![effect.id]);
+        let misfits = truth.catalogue().map(|(id, _)| {
+            let own = Hypothesis::Effects(vec![id]);
             let mut all = found.hypotheses.iter();
             all.find(|one| one.hypothesis == own)?.misfit
         });

@@ -3,7 +3,7 @@
 
     pip install numpy scipy numba
     python3 scripts/independent_tests.py OUT [--singles 66] [--nulls 24] [--outside 18] [--pairs 12]
-                                             [--seed 1] [--noise 60] [--drift 0.01] [--jobs 1] [--only KIND]
+                                             [--seed 1] [--noise 60] [--drift 0.01] [--jobs 1] [--only KIND] [--mean]
     python3 scripts/independent_tests.py --check
     tapjoint blind-check --folder OUT/tests --truth OUT/truth.json
 
@@ -106,7 +106,7 @@ def draw_test(rng, effects, arguments):
         if effect in draws.SCALE:
             planted[effect] = {"relative": draws.draw_scale(rng, effect)}
     errors = {effect: values["relative"] for effect, values in planted.items() if effect in draws.SCALE}
-    strip = draws.true_strip(rng, stated, tolerances, errors)
+    strip = replace(draws.true_strip(rng, stated, tolerances, errors), feels_mean=arguments.mean)
     plan = draws.draw_plan(rng, bar, modes, effects)
     loads = Loads()
     for effect in effects:
@@ -482,6 +482,8 @@ def parse():
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--noise", type=float, default=60.0, help="dB below the response's rms, in the median")
     parser.add_argument("--drift", type=float, default=0.01, help="largest standard deviation of the joint's drift (relative)")
+    parser.add_argument("--mean", action="store_true",
+                        help="sensors and hammer feel the mean over the width, not the middle line, which curls less far")
     kinds = [*draws.SINGLES, *draws.OUTSIDE, "null", "pair"]
     parser.add_argument("--only", choices=kinds, metavar="KIND", help=f"tests of one kind: {', '.join(kinds)}")
     parser.add_argument("--check", action="store_true", help="compare the finite elements with closed forms, and make no tests")

@@ -172,6 +172,8 @@ def make_rigid(rng, bar, gives):
     which = [("kt",), ("kr",), ("kt", "kr")][rng.choice(3, p=[0.35, 0.25, 0.4])]
     bar.rigid = which
     parameters = {}
+    # A part of the width alone would be a joint that gives: the plate beside it bends.
+    bar.joint.grip = 1.0
     if "kr" in which:
         bar.joint.ky = RIGID_ROTATION
     if "kt" in which:

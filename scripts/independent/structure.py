@@ -41,6 +41,8 @@ class Strip:
     # Share of shear and rotary inertia.
     shear_rotary: float = 0.0
     shear_coefficient: float | None = None
+    # Sensors, hammer and masses feel the mean over the width instead of the middle line.
+    feels_mean: bool = False
 
     @property
     def bending(self):
@@ -280,7 +282,7 @@ class Model:
         index = max(int(np.searchsorted(self.starts, x, side="right")) - 1, 0)
         where, h = self.elements[index]
         row = np.zeros(self.size)
-        for of in range(self.fields):
+        for of in range(1 if self.strip.feels_mean else self.fields):
             row[where[of]] = CENTRE[of] * self.shapes(of, (x - self.starts[index]) / h, h)[2 if slope else 0]
         return row
 

@@ -20,7 +20,7 @@ sensors, several places of the taps, two levels, known masses; 4 to 9 modes, 3 t
 their tolerances. Joint and temperature differ a little between recordings. A third of the tests with a cantilever's joint that
 need not be fitted describe it as rigid, and most of these are right.
 
-OUT/details.json says how each test was made, with the natural frequencies of every recording. A test of a kind is the same
+OUT/details.json says how each test was made, with true places and natural frequencies of every recording. A test of a kind is the same
 whatever else is made with it: `--only KIND` (an effect, `null` or `pair`) makes those of one kind again.
 """
 import os
@@ -328,7 +328,7 @@ def instruments(rng, test, channels, gains):
 
 
 def record_all(rng, test):
-    """All recordings, and the frequencies of each."""
+    """All recordings, with what is true of each."""
     runs, sensors = actual_set_up(rng, test)
     hot = test.parameters("temperature")
     # A laboratory keeps its temperature to a few tenths of a kelvin.
@@ -354,7 +354,8 @@ def record_all(rng, test):
         instruments(rng, test, channels, gains)
         recordings.append(channels)
     skip = 0 if test.bar.kind == "cantilever" else 2
-    return recordings, [lab.frequencies[skip:skip + test.plan.modes].tolist() for lab in labs]
+    actual = [asdict(lab.run) | {"frequencies": lab.frequencies[skip:skip + test.plan.modes].tolist()} for lab in labs]
+    return recordings, actual
 
 
 # Files.
@@ -422,14 +423,15 @@ def truth_of(test, name):
     return truth
 
 
-def details_of(test, name, frequencies):
+def details_of(test, name, actual):
+    """Entry of details.json. `actual`: true places, masses and frequencies of each recording."""
     bar = test.bar
     joint = asdict(bar.joint) if bar.kind != "free" else None
     return {"name": name, "kind": bar.kind, "theory": bar.stated.theory, "rigid": bar.rigid, "joint": joint,
             "beam": asdict(test.strip), "tolerances": test.tolerances.regime, "errors": test.tolerances.law,
             "modes": test.plan.modes, "rate": test.rate, "taps": test.plan.taps, "interval": test.interval,
             "sensors": [asdict(sensor) for sensor in test.plan.sensors], "drift": test.drift, "noise": test.decibel,
-            "csv": test.unit, "frequencies": frequencies}
+            "csv": test.unit, "recordings": actual}
 
 
 def make_test(task):
@@ -441,11 +443,11 @@ def make_test(task):
         effects = {"null": [], "pair": draw_pair(rng)}.get(kind, [kind])
         try:
             test = draw_test(rng, effects, arguments)
-            recordings, frequencies = record_all(rng, test)
+            recordings, actual = record_all(rng, test)
         except Unsuitable:
             continue
         write_test(test, arguments.out / "tests" / name, recordings)
-        return truth_of(test, name), details_of(test, name, frequencies)
+        return truth_of(test, name), details_of(test, name, actual)
     sys.exit(f"{name}: no suitable test of kind {kind} in {MOST_ATTEMPTS} draws; try another seed")
 
 

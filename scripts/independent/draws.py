@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .structure import RIGID_ROTATION, RIGID_TRANSLATION, Joint, Loads, Section, Strip
+from .structure import RIGID_ROTATION, RIGID_TRANSLATION, Joint, Section, Strip
 
 # Weight, modulus (Pa), density (kg/m3), Poisson's ratio, usual damping ratio, modulus' change per kelvin.
 MATERIALS = [

@@ -2,541 +2,516 @@
 """Virtual tap tests made without tapjoint, with effects that their descriptions leave out.
 
     pip install numpy scipy numba
-    python3 scripts/independent_tests.py OUT [--singles 60] [--nulls 20] [--outside 12] [--pairs 12]
-                                             [--seed 1] [--noise 60] [--drift 0.01]
+    python3 scripts/independent_tests.py OUT [--singles 66] [--nulls 24] [--outside 18] [--pairs 12]
+                                             [--seed 1] [--noise 60] [--drift 0.01] [--jobs 1] [--only KIND] [--mean]
+    python3 scripts/independent_tests.py --check
     tapjoint blind-check --folder OUT/tests --truth OUT/truth.json
 
-The program's own blind check draws tests with its own simulator, whose definitions of the effects
-the diagnosis shares. Here everything is written again, in another way: finite elements with a joint
-given by its stiffness matrix, pulses of another shape, responses integrated at five times the
-sample rate and decimated as a converter does, a non-linear joint stepped in time. Every test has
-five recordings of five taps with two sensors: three tap positions, one recording with sensor A
-moved, one tapped harder. Between recordings the joint drifts.
+The program's own blind check draws tests with its own simulator, whose definitions of the effects the diagnosis shares.
+Here everything is written again, in another way (folder `independent`):
+- `structure.py`: finite elements. Euler's beam, or a strip of plate whose section curls as Kirchhoff's energy wants it, with
+  Cowper's shear coefficient and rotary inertia. The joint is a stiffness matrix on every fibre of its grip, or jaws.
+- `recording.py`: pulses of another shape, exact decays, a converter that decimates, a non-linear joint stepped in time.
+- `draws.py`: materials, slenderness, plans, tolerances and sizes of effects, drawn from other distributions.
+- `checks.py`: the elements beside closed forms and published values (`--check`).
+
+Tests differ in everything: cantilevers, lap joints and free bars; one to six recordings with one to three sensors, moved
+sensors, several places of the taps, two levels, known masses; 4 to 9 modes, 3 to 8 taps; WAV or CSV. Descriptions are wrong by
+their tolerances. Joint and temperature differ a little between recordings. A third of the tests with a cantilever's joint that
+need not be fitted describe it as rigid, and most of these are right.
+
+OUT/details.json says how each test was made, with true places and natural frequencies of every recording. A test of a kind is the same
+whatever else is made with it: `--only KIND` (an effect, `null` or `pair`) makes those of one kind again.
 """
+import os
+
+# One thread for linear algebra: the same digits on every machine with any number of jobs.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"
+
 import argparse
 import json
 import math
+import multiprocessing
 import sys
+import zlib
+from copy import deepcopy
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numba
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.linalg import eigh
-from scipy.signal import lfilter, resample_poly
 
-OVERSAMPLING = 5
-# Draws of one test whose nonlinear joint does not settle in steps of that length.
-MOST_ATTEMPTS = 20
-TAPS, INTERVAL, LEAD = 5, 4.5, 0.6
-SINGLES = ["sensor-mass", "sensor-cable", "cross-coupling", "joint-mass", "joint-nonlinearity", "fixture",
-           "scale", "added-mass", "local-crack", "axial-load", "shear-rotary", "joint-damping"]
-OUTSIDE = ["second-support", "patch-mass", "stiff-patch", "taper", "rotary-lump", "sprung-mass"]
+from independent import checks, draws, recording
+from independent.structure import RIGID_ROTATION, RIGID_TRANSLATION, Loads, Model
 
-
-def log_uniform(rng, low, high):
-    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+# Draws of one test that no engineer would make, or whose nonlinear joint does not settle.
+MOST_ATTEMPTS = 40
+# Signal before the first tap (s).
+LEAD = 0.5
+HIGHEST_RATE, MOST_SAMPLES = 16_000, 240_000
+# Some sensor of the first recording shows each mode: product of the shapes at sensor and tap over the largest one.
+LEAST_SHAPE = 0.04
 
 
-class Beam:
-    """Geometry, material and joint of one test, and what was planted in it."""
+@dataclass
+class Test:
+    """A test as drawn."""
 
-    def __init__(self, rng):
-        self.length = rng.uniform(0.32, 0.60)
-        self.width = rng.uniform(0.022, 0.055)
-        self.thickness = self.length * rng.uniform(0.0070, 0.0125)
-        steel = rng.random() < 0.6
-        self.modulus, self.density, self.poisson = (207e9, 7850.0, 0.29) if steel else (70e9, 2700.0, 0.33)
-        self.kx = 1400 * math.exp(0.5 * rng.standard_normal())
-        self.ky = 4.8 * math.exp(0.3 * rng.standard_normal())
-        self.extra = {}
+    bar: draws.Bar
+    tolerances: draws.Tolerances
+    strip: object
+    loads: Loads
+    plan: draws.Plan
+    # (effect, parameters)
+    planted: list
+    rate: int
+    # Natural frequencies of the described structure (Hz).
+    expected: np.ndarray
+    damping: np.ndarray
+    interval: float
+    drift: float
+    decibel: float
+    # Unit of accelerations in a CSV file; None: WAV files.
+    unit: str | None
 
-    @property
-    def bending(self):
-        return self.modulus * self.width * self.thickness**3 / 12
-
-    @property
-    def mass(self):
-        return self.density * self.width * self.thickness * self.length
-
-
-def element(h, bending, per_length, inertia, phi):
-    """Timoshenko element (Przemieniecki); phi = 0 and inertia = 0 give Euler's."""
-    k = bending / (h**3 * (1 + phi)) * np.array([
-        [12, 6 * h, -12, 6 * h],
-        [6 * h, (4 + phi) * h * h, -6 * h, (2 - phi) * h * h],
-        [-12, -6 * h, 12, -6 * h],
-        [6 * h, (2 - phi) * h * h, -6 * h, (4 + phi) * h * h]])
-    # Shape functions integrated by Gauss points: another way to the consistent mass.
-    m = np.zeros((4, 4))
-    points, weights = np.polynomial.legendre.leggauss(5)
-    for x, weight in zip((points + 1) / 2, weights / 2):
-        shape = displacement(x, h, phi)
-        turn = rotation(x, h, phi)
-        m += weight * h * (per_length * np.outer(shape, shape) + inertia * np.outer(turn, turn))
-    return k, m
+    def parameters(self, effect):
+        """Parameters of a planted effect; none where it was not planted."""
+        return dict(self.planted).get(effect)
 
 
-def displacement(x, h, phi):
-    return np.array([1 - 3 * x**2 + 2 * x**3 + phi * (1 - x), h * (x - 2 * x**2 + x**3 + phi * (x - x**2) / 2),
-                     3 * x**2 - 2 * x**3 + phi * x, h * (x**3 - x**2 - phi * (x - x**2) / 2)]) / (1 + phi)
+class Unsuitable(Exception):
+    """A draw that is drawn again."""
 
 
-def rotation(x, h, phi):
-    return np.array([6 * (x**2 - x) / h, 1 - 4 * x + 3 * x**2 + phi * (1 - x),
-                     6 * (x - x**2) / h, 3 * x**2 - 2 * x + phi * x]) / (1 + phi)
+def draw_test(rng, effects, arguments):
+    """Draws everything but noise and errors of single recordings."""
+    kinds = set(draws.KINDS)
+    for effect in effects:
+        kinds &= set(draws.SINGLES.get(effect) or draws.OUTSIDE[effect])
+    kind = "cantilever"
+    if rng.random() < 0.3 and len(kinds) > 1:
+        kind = str(rng.choice(sorted(kinds - {"cantilever"})))
+    theory = "timoshenko" if rng.random() < 0.6 and "shear-rotary" not in effects else "euler"
+    bar = draws.draw_bar(rng, kind, theory)
+    stated = bar.stated
+    planted = {}
+    if "joint-compliance" in effects:
+        planted["joint-compliance"] = draws.make_rigid(rng, bar, True)
+    elif kind == "cantilever" and not set(effects) & set(draws.OF_A_SPRING) and rng.random() < 0.33:
+        draws.make_rigid(rng, bar, False)
+    expected, rate = expected_modes(rng, bar)
+    modes = len(expected) - 1
+    tolerances = draws.draw_tolerances(rng, stated)
+    for effect in effects:
+        if effect in draws.SCALE:
+            planted[effect] = {"relative": draws.draw_scale(rng, effect)}
+    errors = {effect: values["relative"] for effect, values in planted.items() if effect in draws.SCALE}
+    strip = replace(draws.true_strip(rng, stated, tolerances, errors), feels_mean=arguments.mean)
+    plan = draws.draw_plan(rng, bar, modes, effects)
+    loads = Loads()
+    for effect in effects:
+        if effect in planted:
+            continue
+        if effect in draws.SET_UP:
+            planted[effect] = draws.draw_set_up_error(rng, effect, plan, stated.length)
+        elif effect in draws.OUTSIDE:
+            planted[effect] = draws.plant_outside(rng, effect, bar, loads, expected)
+        elif effect in ("sensor-mass", "sensor-cable", "joint-nonlinearity", "joint-damping", "shear-rotary"):
+            planted[effect] = draw_other(rng, effect, bar, plan)
+        else:
+            planted[effect] = draws.plant_in_structure(rng, effect, bar, loads, expected)
+    if "shear-rotary" in planted:
+        strip = replace(strip, shear_rotary=planted["shear-rotary"]["factor"])
+    damping = bar.damping * math.exp(0.4 * rng.standard_normal())
+    tilt = 0.3 * rng.standard_normal()
+    ratios = damping * (np.arange(1, 41) / 3.0) ** (2 * tilt) * np.exp(0.3 * rng.standard_normal(40))
+    ratios = np.clip(ratios, 3e-4, 0.02)
+    # Until mode 1 has fallen to a tenth, but no hammer waits longer than four seconds.
+    interval = float(np.clip(2.3 / (ratios[0] * 2 * math.pi * expected[0]), 1.2, 4.0)) * rng.uniform(0.9, 1.1)
+    interval = max(interval, 12 / expected[0])
+    most = MOST_SAMPLES / rate
+    plan.taps = max(3, min(plan.taps, int((most - LEAD) / interval)))
+    interval = min(interval, (most - LEAD) / plan.taps)
+    values = plan.taps * interval * rate * (1 + len(plan.sensors)) * len(plan.runs)
+    return Test(bar=bar, tolerances=tolerances, strip=strip, loads=loads, plan=plan,
+                planted=[(effect, planted[effect]) for effect in effects], rate=rate, expected=expected[:modes],
+                damping=ratios, interval=interval, drift=arguments.drift * draws.log_triangular(rng, 0.03, 0.3, 1.0),
+                decibel=arguments.noise + float(np.clip(4 * rng.standard_normal(), -8, 8)),
+                unit=str(rng.choice(["g", "m/s2"])) if values < 1.5e6 and rng.random() < 0.4 else None)
 
 
-class Model:
-    """Matrices of one recording's structure."""
-
-    def __init__(self, beam, drift, sensors, elements=80):
-        extra = beam.extra
-        length = beam.length * (1 + extra.get("length", 0.0))
-        bending = beam.bending * (1 + extra.get("modulus", 0.0))
-        factor = extra.get("shear-rotary", 0.0)
-        inertia = factor * beam.density * beam.width * beam.thickness**3 / 12
-        shear = 5 / 6 * beam.modulus / (2 * (1 + beam.poisson)) * beam.width * beam.thickness
-        crack = extra.get("local-crack")
-        nodes = np.linspace(0, length, elements + 1)
-        split = None
-        if crack:
-            split = int(np.argmin(abs(nodes - crack["position"])))
-            nodes[split] = crack["position"]
-        self.nodes, self.split, self.length, self.phi = nodes, split, length, []
-        size = 2 * (elements + 1) + (1 if split is not None else 0) + 2
-        self.k, self.m = np.zeros((size, size)), np.zeros((size, size))
-        self.absorber, self.base = size - 1, size - 2
-        for index in range(elements):
-            h = nodes[index + 1] - nodes[index]
-            middle = (nodes[index] + h / 2) / length
-            stiff, heavy = section(extra, middle)
-            phi = factor * 12 * bending / (shear * h * h)
-            self.phi.append(phi)
-            k, m = element(h, bending * stiff, beam.density * beam.width * beam.thickness * heavy, inertia, phi)
-            k = k + extra.get("axial-load", 0.0) * geometric(h)
-            where = self.equations(index)
-            self.k[np.ix_(where, where)] += k
-            self.m[np.ix_(where, where)] += m
-        if split is not None:
-            self.spring_between(2 * split + 1, size - 3, bending / (crack["compliance"] * length))
-        self.attach(beam, bending, sensors)
-        self.joint(beam, drift)
-        self.free = self.used()
-
-    def equations(self, index):
-        where = [2 * index, 2 * index + 1, 2 * index + 2, 2 * index + 3]
-        if self.split is not None and index == self.split:
-            # The far side of the crack has a rotation of its own.
-            where[1] = self.k.shape[0] - 3
-        return where
-
-    def spring_between(self, a, b, stiffness):
-        self.k[a, a] += stiffness
-        self.k[b, b] += stiffness
-        self.k[a, b] -= stiffness
-        self.k[b, a] -= stiffness
-
-    def row(self, x, of=displacement):
-        """The motion at x as a row over all equations."""
-        x = min(x, self.length * (1 - 1e-12))
-        index = min(int(np.searchsorted(self.nodes, x, side="right")) - 1, len(self.nodes) - 2)
-        h = self.nodes[index + 1] - self.nodes[index]
-        row = np.zeros(self.k.shape[0])
-        row[self.equations(index)] = of((x - self.nodes[index]) / h, h, self.phi[index])
-        return row
-
-    def attach(self, beam, bending, sensors):
-        extra = beam.extra
-        for x in sensors:
-            row = self.row(x)
-            self.m += extra.get("sensor-mass", 0.0) * np.outer(row, row)
-            self.k += extra.get("sensor-cable", 0.0) * np.outer(row, row)
-        if "added-mass" in extra:
-            row = self.row(extra["added-mass"]["position"])
-            self.m += extra["added-mass"]["mass"] * np.outer(row, row)
-        if "joint-mass" in extra:
-            self.m[0, 0] += extra["joint-mass"]["mass"]
-            self.m[1, 1] += extra["joint-mass"]["inertia"]
-        if "second-support" in extra:
-            row = self.row(extra["second-support"]["position"])
-            self.k += extra["second-support"]["stiffness"] * np.outer(row, row)
-        if "rotary-lump" in extra:
-            row = self.row(extra["rotary-lump"]["position"], rotation)
-            self.m += extra["rotary-lump"]["inertia"] * np.outer(row, row)
-        if "sprung-mass" in extra:
-            sprung = extra["sprung-mass"]
-            row = self.row(sprung["position"])
-            row[self.absorber] = -1.0
-            self.k += sprung["mass"] * (2 * math.pi * sprung["frequency"]) ** 2 * np.outer(row, row)
-            self.m[self.absorber, self.absorber] += sprung["mass"]
-
-    def joint(self, beam, drift):
-        """Springs from the nominal beam's units; the coupling by the inverse of the compliance."""
-        nominal = beam.bending
-        kx, ky = beam.kx * drift[0], beam.ky * drift[1]
-        cross = beam.extra.get("cross-coupling", 0.0) / math.sqrt(kx * ky)
-        compliance = np.array([[1 / kx, -cross], [-cross, 1 / ky]])
-        unit = np.diag([math.sqrt(nominal / beam.length**3), math.sqrt(nominal / beam.length)])
-        stiffness = unit @ np.linalg.inv(compliance) @ unit
-        self.rotational = stiffness[1, 1]
-        self.joint_stiffness = stiffness
-        fixture = beam.extra.get("fixture")
-        if fixture is None:
-            self.k[:2, :2] += stiffness
-            return
-        # A base that turns: the rotational spring acts between beam and base.
-        self.k[0, 0] += stiffness[0, 0]
-        self.spring_between(1, self.base, stiffness[1, 1])
-        ground = stiffness[1, 1] / fixture["ratio"]
-        self.k[self.base, self.base] += ground
-        self.m[self.base, self.base] += ground / (2 * math.pi * fixture["frequency"]) ** 2
-
-    def used(self):
-        return np.flatnonzero(self.m.diagonal() > 0)
-
-    def modes(self, highest):
-        k, m = self.k[np.ix_(self.free, self.free)], self.m[np.ix_(self.free, self.free)]
-        squares, vectors = eigh(k, m)
-        keep = squares < (2 * math.pi * highest) ** 2
-        full = np.zeros((self.k.shape[0], int(keep.sum())))
-        full[self.free] = vectors[:, keep]
-        return np.sqrt(squares[keep]) / (2 * math.pi), full
-
-
-def section(extra, middle):
-    """Relative bending stiffness and mass per length at a relative position."""
-    stiff = heavy = 1.0
-    if "patch-mass" in extra and abs(middle - extra["patch-mass"]["centre"]) < extra["patch-mass"]["width"] / 2:
-        heavy += extra["patch-mass"]["share"]
-    if "stiff-patch" in extra and abs(middle - extra["stiff-patch"]["centre"]) < extra["stiff-patch"]["width"] / 2:
-        stiff += extra["stiff-patch"]["share"]
-    if "taper" in extra:
-        thick = 1 + extra["taper"]["slope"] * (middle - 0.5)
-        stiff, heavy = stiff * thick**3, heavy * thick
-    return stiff, heavy
-
-
-def geometric(h):
-    return np.array([[36, 3 * h, -36, 3 * h], [3 * h, 4 * h * h, -3 * h, -h * h],
-                     [-36, -3 * h, 36, -3 * h], [3 * h, -h * h, -3 * h, 4 * h * h]]) / (30 * h)
-
-
-def plant(rng, beam, effect):
-    """Draws an effect's size, adds it to the beam, returns id and parameters as the contract names them."""
-    length, bending, extra = beam.length, beam.bending, beam.extra
-    sign = 1 if rng.random() < 0.5 else -1
+def draw_other(rng, effect, bar, plan):
+    """Size of an effect that sensors, damping or the joint's law carry."""
+    stated = bar.stated
     if effect == "sensor-mass":
-        extra[effect] = beam.mass / 0.83 * log_uniform(rng, 0.002, 0.024)
-        return effect, {"mass": extra[effect]}
+        mass = stated.mass * draws.log_normal(rng, 0.005, 1.0, 1e-4, 0.06)
+        radius = rng.uniform(0.004, 0.010)
+        for sensor in plan.sensors:
+            sensor.mass, sensor.radius = mass, radius
+        return {"mass": mass}
     if effect == "sensor-cable":
-        extra[effect] = log_uniform(rng, 0.01, 0.3) * bending / length**3
-        return effect, {"stiffness": extra[effect]}
-    if effect == "cross-coupling":
-        extra[effect] = sign * log_uniform(rng, 0.03, 0.35)
-        return effect, {"coupling": extra[effect]}
-    if effect == "joint-mass":
-        mass = beam.mass / 0.83 * log_uniform(rng, 0.010, 0.100)
-        extra[effect] = {"mass": mass, "inertia": mass * 0.015**2}
-        return effect, dict(extra[effect])
-    if effect == "joint-nonlinearity":
-        slip = rng.random() < 0.5
-        ratio = -log_uniform(rng, 0.006, 0.06) if slip else sign * log_uniform(rng, 0.006, 0.06)
-        extra[effect] = {"ratio": ratio, "exponent": 1.0 if slip else 2.0}
-        return effect, dict(extra[effect])
-    if effect == "fixture":
-        extra[effect] = {"frequency": log_uniform(rng, 65, 800), "ratio": log_uniform(rng, 0.005, 0.08)}
-        return effect, dict(extra[effect])
-    if effect == "scale":
-        kind = ["modulus", "length", "timebase"][rng.integers(3)]
-        low, high = {"modulus": (0.003, 0.03), "length": (0.0012, 0.007), "timebase": (2e-5, 1e-3)}[kind]
-        extra[kind] = sign * log_uniform(rng, low, high)
-        return kind, {"relative": extra[kind]}
-    if effect == "added-mass":
-        extra[effect] = {"mass": beam.mass / 0.83 * log_uniform(rng, 0.002, 0.024),
-                         "position": length * rng.uniform(0.15, 1.0)}
-        return effect, dict(extra[effect])
-    if effect == "local-crack":
-        extra[effect] = {"compliance": log_uniform(rng, 0.003, 0.04), "position": length * rng.uniform(0.08, 0.75)}
-        return effect, dict(extra[effect])
-    if effect == "axial-load":
-        extra[effect] = sign * log_uniform(rng, 0.02, 0.5) * bending / length**2
-        return effect, {"force": extra[effect]}
-    if effect == "shear-rotary":
-        extra[effect] = log_uniform(rng, 0.5, 3.0)
-        return effect, {"factor": extra[effect]}
+        return {"stiffness": draws.log_normal(rng, 0.03, 1.3, 5e-4, 2.0) * stated.spring}
     if effect == "joint-damping":
-        extra[effect] = log_uniform(rng, 0.003, 0.05)
-        return effect, {"loss_factor": extra[effect]}
-    if effect == "second-support":
-        extra[effect] = {"position": length * rng.uniform(0.55, 0.95),
-                         "stiffness": log_uniform(rng, 0.5, 8) * bending / length**3}
-    elif effect == "patch-mass":
-        extra[effect] = {"centre": rng.uniform(0.2, 0.8), "width": rng.uniform(0.2, 0.4), "share": log_uniform(rng, 0.02, 0.2)}
-    elif effect == "stiff-patch":
-        extra[effect] = {"centre": rng.uniform(0.2, 0.8), "width": rng.uniform(0.2, 0.4), "share": log_uniform(rng, 0.03, 0.4)}
-    elif effect == "taper":
-        extra[effect] = {"slope": sign * log_uniform(rng, 0.02, 0.15)}
-    elif effect == "rotary-lump":
-        extra[effect] = {"position": length * rng.uniform(0.3, 1.0),
-                         "inertia": beam.mass * length**2 * log_uniform(rng, 2e-5, 1e-3)}
-    else:
-        extra[effect] = {"position": length * rng.uniform(0.4, 1.0), "mass": beam.mass * log_uniform(rng, 0.005, 0.03),
-                         "frequency": log_uniform(rng, 60, 400)}
-    return effect, dict(extra[effect])
+        return {"loss_factor": draws.log_normal(rng, 0.008, 1.1, 2e-4, 0.2)}
+    if effect == "shear-rotary":
+        # What is left out is the full effect; a soft matrix or a core gives in shear several times as much.
+        return {"factor": 1.0 if rng.random() < 0.5 else draws.log_normal(rng, 1.5, 0.7, 0.3, 8.0)}
+    slips = rng.random() < 0.6
+    ratio = draws.log_normal(rng, 0.015, 1.0, 5e-4, 0.25)
+    return {"ratio": -ratio if slips else draws.sign(rng) * ratio, "exponent": 1.0 if slips else 2.0}
 
 
-def pulses(rng, rate, count, level, width):
-    """Force at the internal rate: half sines to the power 1.5, and when they begin."""
-    force = np.zeros(count)
-    for tap in range(TAPS):
-        begin = LEAD + tap * INTERVAL + rng.uniform(0, 0.05)
-        duration = width * rng.uniform(0.92, 1.08)
-        first = int(begin * rate)
-        t = np.arange(first, int((begin + duration) * rate) + 1) / rate - begin
-        inside = (t > 0) & (t < duration)
-        force[first:first + len(t)][inside] += (level * rng.uniform(0.85, 1.15)
-                                               * np.sin(np.pi * t[inside] / duration) ** 1.5)
-    return force
+def expected_modes(rng, bar):
+    """Frequencies (Hz) of the described structure, one more than the band has, and the sample rate."""
+    modes = int(rng.integers(4, 10))
+    frequencies = Model(bar.kind, bar.stated, bar.joint, Loads(), modes + 1).bending_modes(modes + 1)
+    if frequencies[0] < 4.0:
+        raise Unsuitable
+    while modes >= 4:
+        rate = round(2.62 * math.sqrt(frequencies[modes - 1] * frequencies[modes]))
+        if rate <= HIGHEST_RATE:
+            return frequencies[:modes + 1], rate
+        modes -= 1
+    raise Unsuitable
 
 
-def linear(force, frequencies, damping, tap, sensors, rate):
-    """Accelerations: each mode stepped exactly for a force that is linear between samples."""
-    out = np.zeros((len(sensors[0]), len(force)))
-    for k, (frequency, zeta) in enumerate(zip(frequencies, damping)):
-        omega = 2 * math.pi * frequency
-        damped = omega * math.sqrt(1 - zeta**2)
-        pole = complex(-zeta * omega, damped)
-        advance, hold, ramp = stepping(pole, rate)
-        z = lfilter([ramp, hold - ramp], [1, -advance], tap[k] * force)
-        q = z.imag / damped
-        out += np.outer(sensors[k], tap[k] * force - 2 * zeta * omega * (z.real + pole.real * q) - omega**2 * q)
-    return out
+# The set-up as it is.
 
 
-def stepping(pole, rate):
-    advance = np.exp(pole / rate)
-    hold = (advance - 1) / pole
-    return advance, hold, (hold * rate - 1) / pole
+def on_beam(test, places, offset):
+    """An offset that keeps these places on the beam: turned round, then made smaller, where it must be."""
+    length = min(test.bar.stated.length, test.strip.length)
+    for _ in range(20):
+        for sign in (1.0, -1.0):
+            if all(0.01 * length <= place + sign * offset <= length for place in places):
+                return sign * offset
+        offset *= 0.6
+    raise Unsuitable
 
 
-@numba.njit(cache=True)
-def step_nonlinear(drive, turn, poles, advance, hold, ramp, cubic, sliders, slip):
-    """Modal coordinates z with a joint moment: cubic in the rotation, or sliders that give way.
-
-    Returns modal forces with the joint's moment; the moment beyond the linear spring is corrected once.
-    """
-    steps, modes = drive.shape
-    z = np.zeros(modes, dtype=np.complex128)
-    before = np.zeros(modes)
-    forces = np.zeros((steps, modes))
-    set_points = np.zeros(len(slip))
-    moment = 0.0
-    for n in range(steps):
-        trial = z.copy()
-        for _ in range(2):
-            theta = 0.0
-            for k in range(modes):
-                total = drive[n, k] - turn[k] * moment
-                trial[k] = advance[k] * z[k] + hold[k] * before[k] + ramp[k] * (total - before[k])
-                theta += turn[k] * trial[k].imag / poles[k].imag
-            moment = cubic * theta**3
-            for i in range(len(slip)):
-                # A slider carries at most its slip; beyond, it moves along and its share is missing.
-                stretch = theta - set_points[i]
-                if stretch > slip[i]:
-                    stretch = slip[i]
-                elif stretch < -slip[i]:
-                    stretch = -slip[i]
-                moment += sliders[i] * (stretch - theta)
-        for k in range(modes):
-            forces[n, k] = drive[n, k] - turn[k] * moment
-            z[k] = advance[k] * z[k] + hold[k] * before[k] + ramp[k] * (forces[n, k] - before[k])
-            before[k] = forces[n, k]
-        theta = 0.0
-        for k in range(modes):
-            theta += turn[k] * z[k].imag / poles[k].imag
-        for i in range(len(slip)):
-            if theta - set_points[i] > slip[i]:
-                set_points[i] = theta - slip[i]
-            elif theta - set_points[i] < -slip[i]:
-                set_points[i] = theta + slip[i]
-    return forces
+def actual_set_up(rng, test):
+    """Runs with the true places and masses, and the true masses of the sensors. Planted errors take the place of draws."""
+    plan, tolerances = test.plan, test.tolerances
+    length = test.strip.length
+    runs, sensors = deepcopy(plan.runs), deepcopy(plan.sensors)
+    wrong = test.parameters("sensor-position")
+    for index, sensor in enumerate(sensors):
+        errors = {place: tolerances.error(rng, tolerances.positions) for place in {run.places[index] for run in plan.runs}}
+        if wrong and wrong["sensor"] == index + 1:
+            wrong["offset"] = on_beam(test, errors, wrong["offset"])
+            errors = dict.fromkeys(errors, wrong["offset"])
+        for run, described in zip(runs, plan.runs):
+            place = described.places[index]
+            run.places[index] = min(max(place + errors[place], 0.0), length)
+        if sensor.stated_mass:
+            sensor.mass = sensor.stated_mass * (1 + tolerances.error(rng, tolerances.masses))
+    wrong = test.parameters("tap-position")
+    moved = {run.tap for number, run in enumerate(plan.runs, 1) if wrong and wrong["recording"] in (0, number)}
+    if wrong:
+        wrong["offset"] = on_beam(test, moved, wrong["offset"])
+    for run, described in zip(runs, plan.runs):
+        error = tolerances.error(rng, tolerances.positions)
+        run.tap = described.tap + (wrong["offset"] if described.tap in moved else error)
+        run.tap = min(max(run.tap, 0.0), length)
+        run.masses = [(min(max(x + tolerances.error(rng, tolerances.positions), 0.0), length),
+                       mass * (1 + tolerances.error(rng, tolerances.masses))) for x, mass in described.masses]
+    return runs, sensors
 
 
-def joint_law(law, rotational, amplitude):
-    """Cubic coefficient, sliders' stiffness and slips for a secant change `ratio` at this amplitude."""
-    if law["exponent"] == 2.0:
-        # Describing function of c theta^3: 3/4 c a^2.
-        return law["ratio"] * rotational / (0.75 * amplitude**2), np.zeros(0), np.zeros(0)
-    count = 30
-    slip = amplitude * 2.0 * (np.arange(count) + 0.5) / count
-    # By the tips of the loop a slider that gives way at s is as stiff as s/a.
-    secant = np.where(amplitude > slip, slip / amplitude, 1.0).mean()
-    share = -law["ratio"] * rotational / (1 - secant)
-    return 0.0, np.full(count, share / count), slip
+def build(rng, test, run, sensors, kelvin):
+    """Model of one recording's structure."""
+    bar, stated = test.bar, test.bar.stated
+    strip = replace(test.strip, modulus=test.strip.modulus * (1 + bar.per_kelvin * kelvin))
+    loads = deepcopy(test.loads)
+    for sensor, place in zip(sensors, run.places):
+        loads.masses.append((place, sensor.mass, sensor.mass * sensor.radius**2))
+        cable = test.parameters("sensor-cable")
+        if cable:
+            loads.springs.append((place, cable["stiffness"]))
+    loads.masses += [(x, mass, 0.0) for x, mass in run.masses]
+    factors = np.exp(test.drift * rng.standard_normal(2))
+    kx, ky = bar.joint.kx, bar.joint.ky
+    # Springs are those in the units of the described beam. A rigid one does not drift.
+    joint = replace(bar.joint, kx=kx * stated.spring / strip.spring * (factors[0] if kx < RIGID_TRANSLATION else 1),
+                    ky=ky * stated.bending / stated.length / (strip.bending / strip.length)
+                    * (factors[1] if ky < RIGID_ROTATION else 1))
+    return Model(bar.kind, strip, joint, loads, test.plan.modes)
 
 
-def record(rng, beam, damping, place, noise, rates, hardest):
-    """One recording: channels in physical units."""
-    tap, sensors, level, drift = place
-    rate, inner = rates
-    model = Model(beam, drift, sensors)
-    frequencies, vectors = model.modes(1.6 * rate)
-    zeta = np.array([damping[min(k, len(damping) - 1)] for k in range(len(frequencies))])
-    theta, w = vectors[1], vectors[0]
-    if beam.extra.get("fixture"):
-        theta = theta - vectors[model.base]
-    if "joint-damping" in beam.extra:
-        joint = np.stack([w, theta])
-        energy = np.einsum("ik,ij,jk->k", joint, model.joint_stiffness, joint)
-        zeta = zeta + beam.extra["joint-damping"] / 2 * energy / (2 * np.pi * frequencies) ** 2
-    shape_tap = model.row(tap) @ vectors
-    shape_sensors = np.array([model.row(x) @ vectors for x in sensors]).T
-    seconds = LEAD + TAPS * INTERVAL + 0.3
-    count = int(seconds * inner)
-    force = pulses(rng, inner, count, level, 1.1 / frequencies[min(5, len(frequencies) - 1)])
-    law = beam.extra.get("joint-nonlinearity")
+# The recordings.
+
+
+@dataclass
+class Lab:
+    """One recording before it is recorded."""
+
+    model: Model
+    run: draws.Run
+    frequencies: np.ndarray
+    vectors: np.ndarray
+
+    def shape(self, x):
+        return self.model.row(x) @ self.vectors
+
+    def rotation(self):
+        """Rotation across the joint in each mode."""
+        return self.model.rotation @ self.vectors if self.model.kind != "free" else np.zeros(len(self.frequencies))
+
+
+def joint_amplitude(test, lab, width):
+    """Joint's rotation in mode 1 after the pulse of this recording, were the joint linear."""
+    first = 0 if lab.model.kind == "cantilever" else 2
+    omega = 2 * math.pi * lab.frequencies[first]
+    t = np.linspace(0, width, 2001)
+    impulse = abs(np.sum(np.sin(np.pi * t / width) ** 1.5 * np.exp(1j * omega * t))) * (t[1] - t[0])
+    return float(abs(lab.rotation()[first] * lab.shape(lab.run.tap)[first]) * impulse / omega) * lab.run.level
+
+
+def check_shapes(test, lab):
+    """Refuses a first recording that hides a mode: an engineer tries another place."""
+    first = 0 if lab.model.kind == "cantilever" else 2
+    modes = slice(first, first + test.plan.modes)
+    everywhere = np.array([lab.shape(x)[modes] for x in np.linspace(0, lab.model.strip.length, 60)])
+    largest = abs(everywhere).max(axis=0)
+    seen = np.max([abs(lab.shape(x)[modes]) for x in lab.run.places], axis=0)
+    if np.any(seen * abs(lab.shape(lab.run.tap)[modes]) < LEAST_SHAPE * largest**2):
+        raise Unsuitable
+
+
+def record(rng, test, lab, sensors, peak, width, law):
+    """Channels of one recording (N, m/s2 or m/s): hammer first."""
+    rate, plan = test.rate, test.plan
+    clock = 1 + (test.parameters("timebase") or {"relative": 0.0})["relative"]
+    inner = rate * recording.OVERSAMPLING / clock
+    skip = 0 if lab.model.kind == "cantilever" else 2
+    # Modes beyond the band are drawn on; those on cords are damped by them.
+    numbers = np.minimum(np.maximum(np.arange(len(lab.frequencies)) - skip, 0), len(test.damping) - 1)
+    damping = np.where(np.arange(len(lab.frequencies)) < skip, 0.05, test.damping[numbers])
+    loss = test.parameters("joint-damping")
+    if loss:
+        energy = np.sum(lab.vectors * (lab.model.k_joint @ lab.vectors), axis=0)
+        damping = damping + loss["loss_factor"] / 2 * energy / (2 * np.pi * lab.frequencies) ** 2
+    seen = np.array([lab.shape(x) for x in lab.run.places])
+    modal = recording.ModalModel(lab.frequencies, damping, seen, [sensor.kind == "velocity" for sensor in sensors],
+                                 lab.rotation(), clock / rate)
+    count = int((LEAD + plan.taps * test.interval) * rate)
+    pulses = []
+    for tap in range(plan.taps):
+        begin = (LEAD + tap * test.interval + rng.uniform(0, 0.05 * test.interval)) * clock
+        strength = peak * lab.run.level * math.exp(0.12 * rng.standard_normal())
+        first, force = recording.half_sine(rng, begin, width * rng.uniform(0.92, 1.08), strength, inner)
+        # A hand does not strike the same place twice.
+        place = lab.run.tap + 0.3 * test.tolerances.error(rng, test.tolerances.positions)
+        pulses.append(recording.Pulse(first, force, lab.shape(min(max(place, 0.0), lab.model.strip.length))))
     if law is None:
-        response = linear(force, frequencies, zeta, shape_tap, shape_sensors, inner)
+        channels = recording.respond(modal, pulses, count)
     else:
-        response = nonlinear(force, (frequencies, zeta), (shape_tap, shape_sensors, theta), inner,
-                             joint_law(law, model.rotational, hardest))
-    clock = 1 + beam.extra.get("timebase", 0.0)
-    if clock != 1:
-        # A clock that runs slow by the factor: what it calls one second lasts longer, frequencies read high.
-        old = np.arange(force.size)
-        new = np.arange(int(force.size / clock)) * clock
-        force = np.interp(new, old, force)
-        response = np.array([np.interp(new, old, channel) for channel in response])
-    channels = [resample_poly(x, 1, OVERSAMPLING) for x in [force, *response]]
-    for index, channel in enumerate(channels):
-        size = np.sqrt(np.mean(channel**2)) if index else abs(channel).max()
-        channel += size * 10 ** (-(noise if index else noise + 10) / 20) * rng.standard_normal(channel.size)
+        channels = recording.respond_nonlinear(modal, pulses, count, law)
+    recording.add_noise(rng, channels, test.decibel)
     return channels
 
 
-def nonlinear(force, modes, shapes, inner, law):
-    (frequencies, zeta), (tap, sensors, turn) = modes, shapes
-    omega = 2 * np.pi * frequencies
-    poles = -zeta * omega + 1j * omega * np.sqrt(1 - zeta**2)
-    advance, hold, ramp = stepping(poles, inner)
-    forces = step_nonlinear(np.outer(force, tap), turn, poles, advance, hold, ramp, *law)
-    out = np.zeros((sensors.shape[1], len(force)))
-    for k in range(len(omega)):
-        z = lfilter([ramp[k], hold[k] - ramp[k]], [1, -advance[k]], forces[:, k])
-        q = z.imag / poles[k].imag
-        velocity = z.real + poles[k].real * q
-        out += np.outer(sensors[k], forces[:, k] - 2 * zeta[k] * omega[k] * velocity - omega[k] ** 2 * q)
-    return out
+def instruments(rng, test, channels, gains):
+    """Errors of calibration, and planted ones of the set-up."""
+    for index, gain in enumerate(gains):
+        channels[index] *= np.float32(gain * math.exp(0.008 * rng.standard_normal()))
+    wrong = test.parameters("sensor-scale")
+    if wrong:
+        channels[wrong["sensor"]] *= np.float32(1 + wrong["relative"])
+    wrong = test.parameters("sensor-polarity")
+    if wrong:
+        channels[wrong["sensor"]] *= np.float32(-1)
+    wrong = test.parameters("sensor-swap")
+    if wrong:
+        pair = [wrong["sensor"], wrong["other"]]
+        channels[pair] = channels[pair[::-1]]
 
 
-def make_test(rng, folder, effects, arguments):
-    """Writes one test's recordings and description; returns the planted effects with their parameters.
+def record_all(rng, test):
+    """All recordings, with what is true of each."""
+    runs, sensors = actual_set_up(rng, test)
+    hot = test.parameters("temperature")
+    # A laboratory keeps its temperature to a few tenths of a kelvin.
+    kelvin = (hot["kelvin"] if hot else 0.2) * rng.standard_normal(len(runs))
+    labs = []
+    for run, warmth in zip(runs, kelvin):
+        model = build(rng, test, run, sensors, warmth)
+        frequencies, vectors = model.modes(1.4 * test.rate)
+        labs.append(Lab(model, run, frequencies, vectors))
+    check_shapes(test, labs[0])
+    width = rng.uniform(0.7, 1.2) / test.expected[-1]
+    peak = draws.log_normal(rng, 25.0, 0.5)
+    nonlinear, law = test.parameters("joint-nonlinearity"), None
+    if nonlinear:
+        amplitude = peak * max(joint_amplitude(test, lab, width) for lab in labs)
+        law = recording.JointLaw.of(nonlinear["ratio"], nonlinear["exponent"], labs[0].model.rotational, amplitude)
+    gains = [1.0] + [math.exp(0.015 * rng.standard_normal()) for _ in sensors]
+    recordings = []
+    for lab in labs:
+        channels = record(rng, test, lab, sensors, peak, width, law)
+        if not np.isfinite(channels).all():
+            raise Unsuitable
+        instruments(rng, test, channels, gains)
+        recordings.append(channels)
+    skip = 0 if test.bar.kind == "cantilever" else 2
+    actual = [asdict(lab.run) | {"frequencies": lab.frequencies[skip:skip + test.plan.modes].tolist()} for lab in labs]
+    return recordings, actual
 
-    None, and nothing written, where the stepping of a nonlinear joint did not settle."""
-    beam = Beam(rng)
-    length = beam.length
-    nominal = Model(beam, (1, 1), [])
-    expected, _ = nominal.modes(1e5)
-    rate = round(2.62 * math.sqrt(expected[5] * expected[6]))
-    planted = [plant(rng, beam, effect) for effect in effects]
-    damping = [log_uniform(rng, 0.0015, 0.006) for _ in range(8)]
-    sensors = [0.8 * length * rng.uniform(0.98, 1.02), 0.45 * length * rng.uniform(0.98, 1.02)]
-    moved = 0.42 * length * rng.uniform(0.97, 1.03)
-    taps = [x * length * rng.uniform(0.98, 1.0) for x in (0.12, 0.50, 0.95)]
-    hard = rng.uniform(3, 5)
-    plan = [(taps[0], sensors, 20.0), (taps[1], sensors, 20.0), (taps[2], sensors, 20.0),
-            (taps[2], [moved, sensors[1]], 20.0), (taps[2], sensors, 20.0 * hard)]
-    text = [f'name = "{folder.name}"', "", "[beam]"]
-    text += [f"{key} = {getattr(beam, key):.9g}" for key in ("length", "width", "thickness", "modulus", "density", "poisson")]
-    text += ["", "[joint]", 'kind = "cantilever"', 'model = "2p"', 'beam = "euler"']
-    drift = (1.0, 1.0)
-    hardest = None
-    channels = []
-    for index, (tap, places, level) in enumerate(plan):
-        if index == 3:
-            drift = tuple(math.exp(arguments.drift * rng.standard_normal() / 2) for _ in range(2))
-        elif index == 4:
-            drift = (1.0, 1.0)
-        if hardest is None and "joint-nonlinearity" in beam.extra:
-            # The hardest taps fall on the tip; the joint's amplitude there sets the law.
-            hardest = 20 * hard * rotation_per_newton(beam, taps[2], expected[5])
-        recorded = record(rng, beam, damping, (tap, places, level, drift),
-                          arguments.noise, (rate, rate * OVERSAMPLING), hardest)
-        channels.append(recorded)
-    if not all(np.isfinite(x).all() for recorded in channels for x in recorded):
-        return None
+
+# Files.
+
+
+def describe(test, name, scales):
+    """Text of test.toml. `scales`: per channel; none for CSV, whose headers have units."""
+    bar, stated, plan = test.bar, test.bar.stated, test.plan
+    text = [f'name = "{name}"', "", "[beam]"]
+    text += [f"{key} = {getattr(stated, key):.9g}" for key in ("length", "width", "thickness", "modulus", "density", "poisson")]
+    text += test.tolerances.text()
+    text += ["", "[joint]", f'kind = "{bar.kind}"']
+    text += ['model = "2p"'] if bar.kind == "cantilever" else []
+    text += [f'{key} = "rigid"' for key in bar.rigid]
+    text += [f'beam = "{stated.theory}"']
+    text += ["", "[hammer]", "channel = 1" if scales else 'channel = "force"']
+    text += [f"scale = {scales[0]:.9g}"] if scales else []
+    for index, sensor in enumerate(plan.sensors):
+        text += ["", "[[sensor]]", f'name = "{sensor.name}"']
+        text += [f"channel = {index + 2}", f"scale = {scales[index + 1]:.9g}"] if scales else []
+        text += [f"position = {sensor.position:.6g}"]
+        text += [f'kind = "{sensor.kind}"'] if sensor.kind != "acceleration" else []
+        text += [f"mass = {sensor.stated_mass:.6g}"] if sensor.stated_mass is not None else []
+    for index, run in enumerate(plan.runs):
+        text += ["", "[[recording]]", f'file = "r{index + 1}.{"wav" if scales else "csv"}"', f"tap = {run.tap:.6g}"]
+        moved = [f"{sensor.name} = {place:.6g}" for sensor, place in zip(plan.sensors, run.places) if place != sensor.position]
+        text += [f"at = {{ {', '.join(moved)} }}"] if moved else []
+        masses = [f"{{ position = {x:.6g}, mass = {mass:.6g} }}" for x, mass in run.masses]
+        text += [f"mass = [{', '.join(masses)}]"] if masses else []
+    return "\n".join(text) + "\n"
+
+
+def write_test(test, folder, recordings):
     folder.mkdir(parents=True)
-    scales = [1.3 * max(abs(r[0]).max() for r in channels)]
-    scales += [1.3 * max(max(abs(r[1]).max(), abs(r[2]).max()) for r in channels)] * 2
-    text += ["", "[hammer]", "channel = 1", f"scale = {scales[0]:.9g}"]
-    for name, channel, x in (("A", 2, sensors[0]), ("B", 3, sensors[1])):
-        text += ["", "[[sensor]]", f'name = "{name}"', f"channel = {channel}", f"scale = {scales[1]:.9g}",
-                 f"position = {x:.6g}"]
-    for index, (recorded, (tap, places, _)) in enumerate(zip(channels, plan)):
-        write_wav(folder / f"r{index + 1}.wav", rate, [c / s for c, s in zip(recorded, scales)])
-        text += ["", "[[recording]]", f'file = "r{index + 1}.wav"', f"tap = {tap:.6g}"]
-        if index == 3:
-            text += [f"at = {{ A = {places[0]:.6g} }}"]
-    (folder / "test.toml").write_text("\n".join(text) + "\n")
-    return planted
+    plan = test.plan
+    if test.unit:
+        names, factors = ["force (N)"], [1.0]
+        for sensor in plan.sensors:
+            unit = "mm/s" if sensor.kind == "velocity" else test.unit
+            names.append(f"{sensor.name} ({unit})")
+            factors.append({"mm/s": 1e-3, "g": recording.STANDARD_GRAVITY, "m/s2": 1.0}[unit])
+        for index, channels in enumerate(recordings):
+            values = [channel / np.float32(factor) for channel, factor in zip(channels, factors)]
+            recording.write_csv(folder / f"r{index + 1}.csv", test.rate, names, values)
+        scales = None
+    else:
+        scales = [1.3 * float(abs(np.concatenate(same)).max()) for same in zip(*recordings)]
+        for index, channels in enumerate(recordings):
+            values = [channel / scale for channel, scale in zip(channels.astype(np.float64), scales)]
+            recording.write_wav(folder / f"r{index + 1}.wav", test.rate, values)
+    (folder / "test.toml").write_text(describe(test, folder.name, scales))
 
 
-def rotation_per_newton(beam, tap, sixth):
-    """Joint rotation in mode 1 after a pulse of 1 N at the tap, of the linear structure."""
-    model = Model(beam, (1, 1), [])
-    frequencies, vectors = model.modes(1e4)
-    omega, width = 2 * math.pi * frequencies[0], 1.1 / sixth
-    t = np.linspace(0, width, 4001)
-    impulse = abs(trapezoid(np.sin(np.pi * t / width) ** 1.5 * np.exp(1j * omega * t), t))
-    return float(abs(vectors[1, 0] * (model.row(tap) @ vectors[:, 0]) * impulse / omega))
+def truth_of(test, name):
+    """Entry of truth.json."""
+    planted = test.planted
+    parameters = planted[0][1] if len(planted) == 1 else dict(planted)
+    truth = {"name": name, "effects": [effect for effect, _ in planted], "params": parameters}
+    if len(planted) == 1 and planted[0][0] in draws.SCALE:
+        effect, values = planted[0]
+        change = abs(draws.FREQUENCY_POWER[effect] * values["relative"])
+        # Below two standard deviations of what the stated tolerances leave open, nothing contradicts the description.
+        if change < 2 * test.tolerances.of_frequencies():
+            truth["within_tolerance"] = True
+    return truth
 
 
-def write_wav(path, rate, channels):
-    """24-bit PCM."""
-    data = np.clip(np.round(np.stack(channels, axis=1) * (2**23 - 1)), -2**23, 2**23 - 1).astype("<i4")
-    raw = data.reshape(-1, 1).view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
-    count = len(channels)
-    header = (b"RIFF" + (36 + len(raw)).to_bytes(4, "little") + b"WAVEfmt " + (16).to_bytes(4, "little")
-              + (1).to_bytes(2, "little") + count.to_bytes(2, "little") + rate.to_bytes(4, "little")
-              + (rate * count * 3).to_bytes(4, "little") + (count * 3).to_bytes(2, "little")
-              + (24).to_bytes(2, "little") + b"data" + len(raw).to_bytes(4, "little"))
-    path.write_bytes(header + raw + (b"\0" if len(raw) % 2 else b""))
+def details_of(test, name, actual):
+    """Entry of details.json. `actual`: true places, masses and frequencies of each recording."""
+    bar = test.bar
+    joint = asdict(bar.joint) if bar.kind != "free" else None
+    return {"name": name, "kind": bar.kind, "theory": bar.stated.theory, "rigid": bar.rigid, "joint": joint,
+            "beam": asdict(test.strip), "tolerances": test.tolerances.regime, "errors": test.tolerances.law,
+            "modes": test.plan.modes, "rate": test.rate, "taps": test.plan.taps, "interval": test.interval,
+            "sensors": [asdict(sensor) for sensor in test.plan.sensors], "drift": test.drift, "noise": test.decibel,
+            "csv": test.unit, "recordings": actual}
+
+
+def make_test(task):
+    """Writes one test; returns its truth and its details."""
+    arguments, name, kind, number = task
+    for attempt in range(MOST_ATTEMPTS):
+        # A stream of its own, so that a test does not depend on what else is made.
+        rng = np.random.default_rng([arguments.seed, zlib.crc32(kind.encode()), number, attempt])
+        effects = {"null": [], "pair": draw_pair(rng)}.get(kind, [kind])
+        try:
+            test = draw_test(rng, effects, arguments)
+            recordings, actual = record_all(rng, test)
+        except Unsuitable:
+            continue
+        write_test(test, arguments.out / "tests" / name, recordings)
+        return truth_of(test, name), details_of(test, name, actual)
+    sys.exit(f"{name}: no suitable test of kind {kind} in {MOST_ATTEMPTS} draws; try another seed")
+
+
+def draw_pair(rng):
+    """Two effects of different groups. Damping is none of them: frequencies do not show it."""
+    names = [name for name in draws.SINGLES if name != "joint-damping"]
+    groups = {name: "scale" if name in draws.SCALE else "set-up" if name in draws.SET_UP else name for name in names}
+    while True:
+        pair = [str(name) for name in rng.choice(names, 2, replace=False)]
+        springs = [name for name in pair if name in draws.OF_A_SPRING]
+        # A joint that is described as rigid is not fitted.
+        if groups[pair[0]] != groups[pair[1]] and not ("joint-compliance" in pair and springs):
+            return pair
+
+
+def cases_of(arguments):
+    """(kind, number within the kind) of every test."""
+    dealt = [(list(draws.SINGLES), arguments.singles), (["null"], arguments.nulls), (list(draws.OUTSIDE), arguments.outside),
+             (["pair"], arguments.pairs)]
+    cases = []
+    for names, count in dealt:
+        if arguments.only in names:
+            names = [arguments.only]
+        elif arguments.only:
+            continue
+        cases += [(names[k % len(names)], k // len(names)) for k in range(count)]
+    return cases
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, nargs="?")
+    for name, default in (("singles", 66), ("nulls", 24), ("outside", 18), ("pairs", 12), ("seed", 1), ("jobs", 1)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--noise", type=float, default=60.0, help="dB below the response's rms, in the median")
+    parser.add_argument("--drift", type=float, default=0.01, help="largest standard deviation of the joint's drift (relative)")
+    parser.add_argument("--mean", action="store_true",
+                        help="sensors and hammer feel the mean over the width, not the middle line, which curls less far")
+    kinds = [*draws.SINGLES, *draws.OUTSIDE, "null", "pair"]
+    parser.add_argument("--only", choices=kinds, metavar="KIND", help=f"tests of one kind: {', '.join(kinds)}")
+    parser.add_argument("--check", action="store_true", help="compare the finite elements with closed forms, and make no tests")
+    arguments = parser.parse_args()
+    if not arguments.check and arguments.out is None:
+        parser.error("give the folder of the tests, or --check")
+    return arguments
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    for name, default in (("singles", 60), ("nulls", 20), ("outside", 12), ("pairs", 12), ("seed", 1)):
-        parser.add_argument(f"--{name}", type=int, default=default)
-    parser.add_argument("--noise", type=float, default=60.0, help="dB below the response's rms")
-    parser.add_argument("--drift", type=float, default=0.01, help="largest drift of the joint (relative, about)")
-    arguments = parser.parse_args()
-    rng = np.random.default_rng(arguments.seed)
-    cases = [[SINGLES[k % len(SINGLES)]] for k in range(arguments.singles)]
-    cases += [[] for _ in range(arguments.nulls)]
-    cases += [[OUTSIDE[k % len(OUTSIDE)]] for k in range(arguments.outside)]
-    cases += [list(rng.choice(SINGLES[:-1], 2, replace=False)) for _ in range(arguments.pairs)]
-    order = rng.permutation(len(cases))
-    truths = []
-    for number, which in enumerate(order):
-        name = f"t{number:03d}"
-        # A stream of its own, so that a test does not depend on how many come before it.
-        planted, attempt = None, 0
-        while planted is None and attempt < MOST_ATTEMPTS:
-            own = np.random.default_rng([arguments.seed, int(which)] + [attempt] * (attempt > 0))
-            planted = make_test(own, arguments.out / "tests" / name, cases[which], arguments)
-            attempt += 1
-        if planted is None:
-            sys.exit(f"{name}: the stepping of its joint did not settle in {MOST_ATTEMPTS} draws")
-        if attempt > 1:
-            print(f"{name}: drawn {attempt} times, until the stepping of its joint settled", file=sys.stderr)
-        params = planted[0][1] if len(planted) == 1 else {key: values for key, values in planted}
-        truths.append({"name": name, "effects": [key for key, _ in planted], "params": params})
-        print(name, flush=True)
+    arguments = parse()
+    if arguments.check:
+        return checks.main()
+    cases = cases_of(arguments)
+    order = np.random.default_rng(arguments.seed).permutation(len(cases))
+    tasks = [(arguments, f"t{number:03d}", *cases[which]) for number, which in enumerate(order)]
+    truths, details = [], []
+    with multiprocessing.Pool(arguments.jobs) as pool:
+        for truth, detail in pool.imap(make_test, tasks):
+            truths.append(truth)
+            details.append(detail)
+            print(truth["name"], flush=True)
     (arguments.out / "truth.json").write_text(json.dumps(truths, indent=1) + "\n")
+    (arguments.out / "details.json").write_text(json.dumps(details, indent=1) + "\n")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Parts of `scripts/independent_tests.py`: virtual tap tests that share no code with tapjoint."""

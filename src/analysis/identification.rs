@@ -400,7 +400,9 @@ pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
     let positions = positions(&specimen.body);
     let mut shapes = Vec::with_capacity(modes.len());
     for (mode, &frequency) in modes.frequencies().iter().enumerate() {
-        let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
+        let raw = positions
+            .iter()
+            .map(|(_, x)| modes.middle_displacement(mode, *x));
         let raw: Vec<f64> = raw.collect();
         // A free end is no node, so that its sign fixes that of the shape.
         let sign = raw.last().map_or(1.0, |tip| 1f64.copysign(*tip));

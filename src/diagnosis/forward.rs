@@ -1,7 +1,7 @@
 //! Predictions of all observables under a hypothesis, with their slopes.
 
 use crate::dataset::{Dataset, Observable, ObservableKind};
-use crate::description::{SectionSlopes, free_slope, mass_slope};
+use crate::description::{SectionSlopes, free_slope, mass_slope, property_of};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
@@ -108,7 +108,7 @@ impl<'a> Forward<'a> {
         models: Vec<ModalModel>,
         parameters: &[f64],
     ) -> Option<(Vec<f64>, Solution)> {
-        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
+        use NuisanceParameter::{Amplitude, Damping, DampingTilt, Property};
         let base = self.predictions_of(&models, parameters)?;
         let mut predicted = base.clone();
         let mut slopes = DMatrix::zeros(base.len(), parameters.len());
@@ -116,8 +116,10 @@ impl<'a> Forward<'a> {
         for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
             let nuisance = nuisance.parameter;
             // These enter the solution itself.
-            let is_solved = matches!(nuisance, Damping | DampingTilt | Amplitude);
+            let always = matches!(nuisance, Damping | DampingTilt | Amplitude);
+            let is_property = matches!(nuisance, Property { .. });
             for (row, observable) in self.observables.iter().enumerate() {
+                let is_solved = always || is_property && !observable.is_of_bar();
                 let slope =
                     self.nuisance_slope(observable, nuisance, &models, base[row], parameters);
                 slopes[(row, first + k)] = slope;
@@ -241,7 +243,8 @@ impl<'a> Forward<'a> {
         let mut all: Vec<ModalModel> = Vec::with_capacity(self.dataset.arrangements.len());
         for (configuration, arrangement) in self.dataset.arrangements.iter().enumerate() {
             let (specimen, carried) = loaded(arrangement, &self.layout, parameters);
-            let nominal = with_joint(&specimen, &self.layout.joint, parameters);
+            let mut nominal = with_joint(&specimen, &self.layout.joint, parameters);
+            self.set_properties(&mut nominal, parameters);
             let motion = arrangement.joint_motion.as_ref().zip(law.as_ref());
             let stiffness_changes = motion.map(|(motion, law)| motion.stiffness_changes(law));
             let circumstances = Circumstances {
@@ -249,7 +252,8 @@ impl<'a> Forward<'a> {
                 level: self.level(arrangement, stiffness_changes.as_ref(), parameters),
                 ..Circumstances::default()
             };
-            let seen = apply(&effects, &nominal, &circumstances);
+            let mut seen = apply(&effects, &nominal, &circumstances);
+            keep_on_beam(&mut seen.specimen);
             let mut solved = all.iter();
             let (own, frequencies) = match solved.find(|one| one.seen.specimen == seen.specimen) {
                 Some(other) => (other.own.clone(), other.frequencies.clone()),
@@ -264,6 +268,20 @@ impl<'a> Forward<'a> {
             });
         }
         Some(all)
+    }
+
+    /// Gives the beams the properties of the parameters. All places stay where they are.
+    fn set_properties(&self, specimen: &mut Specimen, parameters: &[f64]) {
+        let values = &parameters[self.layout.first_nuisance()..];
+        for (nuisance, value) in self.dataset.nuisances.iter().zip(values) {
+            if let NuisanceParameter::Property { property } = nuisance.parameter {
+                for beam in specimen.body.beams_mut() {
+                    if let Some(own) = property_of(beam, property) {
+                        *own *= value.exp();
+                    }
+                }
+            }
+        }
     }
 
     fn modes_of(&self, specimen: &Specimen) -> Option<Arc<BeamModes>> {
@@ -288,7 +306,7 @@ impl<'a> Forward<'a> {
                     (frequency > 0.0).then(|| frequency.ln() + own)
                 }
                 ObservableKind::Constant { sensor } => {
-                    Some(place.at_sensor(sensor) * place.displacement(one.set_up.tap?))
+                    Some(place.at_sensor(sensor) * place.on_line(one.set_up.tap?))
                 }
                 ObservableKind::Ratio { sensor, reference } => {
                     Some(place.at_sensor(sensor) / place.at_sensor(reference))
@@ -500,6 +518,17 @@ impl<'a> Forward<'a> {
     }
 }
 
+/// Keeps what sits at the end of a beam on it, where the beam is shorter than described.
+fn keep_on_beam(specimen: &mut Specimen) {
+    let length = specimen.body.length();
+    let masses = specimen.masses.iter_mut().map(|one| &mut one.position);
+    let springs = specimen.springs.iter_mut().map(|one| &mut one.position);
+    let hinges = specimen.hinges.iter_mut().map(|one| &mut one.position);
+    for position in masses.chain(springs).chain(hinges) {
+        *position = position.min(length);
+    }
+}
+
 /// Damping ratio of a mode.
 struct DampingRatio {
     /// With the losses in the joint.
@@ -541,7 +570,12 @@ impl<'a> ModeInPlace<'a> {
 
     fn at_sensor(&self, sensor: usize) -> f64 {
         let channel = self.channel(sensor);
-        channel.factor * self.displacement(channel.position)
+        channel.factor * self.on_line(channel.position)
+    }
+
+    /// Displacement on the middle line, where sensors sit and the hammer strikes.
+    fn on_line(&self, position: f64) -> f64 {
+        self.model.modes().middle_displacement(self.index, position)
     }
 
     fn displacement(&self, position: f64) -> f64 {
@@ -658,10 +692,12 @@ impl<'a> ModeInPlace<'a> {
             NuisanceParameter::SensorPosition { position }
                 if arrangement.positions[channel.sensor] == position =>
             {
-                channel.factor * self.slope(x) * self.displacement(tap)
+                channel.factor * self.slope(x) * self.on_line(tap)
             }
+            // Of unit modal mass, which is that of the beam.
+            NuisanceParameter::Property { property } => -predicted * mass_slope(property),
             NuisanceParameter::TapPosition { setup } if arrangement.setup == setup => {
-                channel.factor * self.displacement(x) * self.slope(tap)
+                channel.factor * self.on_line(x) * self.slope(tap)
             }
             _ => 0.0,
         }
@@ -675,7 +711,7 @@ impl<'a> ModeInPlace<'a> {
                 if self.arrangement.positions[self.channel(sensor).sensor] == position =>
             {
                 let x = self.channel(sensor).position;
-                self.slope(x) / self.displacement(x)
+                self.slope(x) / self.on_line(x)
             }
             _ => 0.0,
         }

@@ -521,9 +521,11 @@ impl ModalModel {
             };
             let rotation = self.modes().joint_motion(index)[ROTATION];
             let sensor = configuration.sensors.get(reference)?.position?;
-            let at_sensor = self.modes().displacement(index, sensor);
+            let at_sensor = self.modes().middle_displacement(index, sensor);
             let tap = arrangement.tap;
-            let at_tap = tap.map_or(at_sensor, |tap| self.modes().displacement(index, tap));
+            let at_tap = tap.map_or(at_sensor, |tap| {
+                self.modes().middle_displacement(index, tap)
+            });
             let omega = TAU * mode.frequency;
             let size = (amplitude * rotation / at_sensor).abs();
             if size.is_finite() {
@@ -550,7 +552,7 @@ pub fn joint_amplitude(
 ) -> f64 {
     let squares = which.map(|mode| {
         let omega = TAU * modes.frequencies()[mode];
-        (modes.displacement(mode, tap) * modes.joint_motion(mode)[ROTATION] / omega).powi(2)
+        (modes.middle_displacement(mode, tap) * modes.joint_motion(mode)[ROTATION] / omega).powi(2)
     });
     level * squares.sum::<f64>().sqrt()
 }
@@ -575,9 +577,11 @@ pub fn fixture_strength(
 ) -> Option<FixtureStrength> {
     let mut all: Vec<f64> = Vec::new();
     for mode in numbers.iter().chain([&fixture]) {
-        let at_sensors = sensors.iter().map(|x| modes.displacement(*mode, *x).abs());
+        let at_sensors = sensors
+            .iter()
+            .map(|x| modes.middle_displacement(*mode, *x).abs());
         let most = at_sensors.fold(0.0, f64::max);
-        let at_tap = tap.map_or(most, |tap| modes.displacement(*mode, tap).abs());
+        let at_tap = tap.map_or(most, |tap| modes.middle_displacement(*mode, tap).abs());
         all.push((most * at_tap).ln());
     }
     let own = all.pop()?;

@@ -264,7 +264,9 @@ impl VirtualTest<'_> {
         let true_frequency = own.frequencies()[mode] * seen.frequency_scale + seen.frequency_offset;
         let frequency = self.measured(true_frequency, true_frequency * self.plan.frequency_std);
         let positions = actual.sensors.iter();
-        let true_ones: Vec<f64> = positions.map(|x| own.displacement(mode, *x)).collect();
+        let true_ones: Vec<f64> = positions
+            .map(|x| own.middle_displacement(mode, *x))
+            .collect();
         let channels = actual.channels.iter();
         let at_sensors: Vec<f64> = channels.map(|channel| channel.of(&true_ones)).collect();
         let strongest = (0..at_sensors.len())
@@ -273,7 +275,7 @@ impl VirtualTest<'_> {
         // Shapes of unit modal mass are about 2/sqrt(mass) large.
         let size = 2.0 / self.truth.beam_mass();
         let constant = reference.map(|(sensor, std)| {
-            let value = at_sensors[sensor] * own.displacement(mode, actual.tap);
+            let value = at_sensors[sensor] * own.middle_displacement(mode, actual.tap);
             self.measured(value, size * std)
         });
         let mut shape = Vec::new();

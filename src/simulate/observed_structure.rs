@@ -78,7 +78,7 @@ impl ObservedStructure {
                 damping_ratio,
                 at_sensors: sensors
                     .iter()
-                    .map(|&x| modes.displacement(mode, x))
+                    .map(|&x| modes.middle_displacement(mode, x))
                     .collect(),
                 at_joint: modes.joint_motion(mode)[1],
             });
@@ -128,12 +128,12 @@ impl ObservedStructure {
         let (modes, moving) = (&self.modes, self.reduced.modes.len());
         let to_sensors = self.sensors.iter().map(|&x| {
             beyond(modes, moving, |mode| {
-                modes.displacement(mode, x) * modes.displacement(mode, position)
+                modes.middle_displacement(mode, x) * modes.middle_displacement(mode, position)
             })
         });
         StruckPlace {
             at_modes: (0..moving)
-                .map(|mode| modes.displacement(mode, position))
+                .map(|mode| modes.middle_displacement(mode, position))
                 .collect(),
             to_sensors: to_sensors.collect(),
             to_joint: joint_to(modes, moving, position),
@@ -155,7 +155,7 @@ fn beyond(modes: &SpecimenModes, moving: usize, product: impl Fn(usize) -> f64) 
 
 fn joint_to(modes: &SpecimenModes, moving: usize, position: f64) -> f64 {
     beyond(modes, moving, |mode| {
-        modes.joint_motion(mode)[1] * modes.displacement(mode, position)
+        modes.joint_motion(mode)[1] * modes.middle_displacement(mode, position)
     })
 }
 

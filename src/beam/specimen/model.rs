@@ -180,6 +180,8 @@ impl Energies {
 /// The equal elements of one beam.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
+    /// Displacement of the middle line against the mean over the width, for a unit of curvature across it.
+    middle: f64,
     /// Where it begins, in the model's units.
     pub(super) start: f64,
     pub(super) elements: usize,
@@ -265,6 +267,7 @@ impl Model {
             let last = runs.last();
             let (shear_rotary, axial_force) = (specimen.shear_rotary, specimen.axial_force);
             runs.push(Run {
+                middle: (beam.width / units.length).powi(2) / 24.0,
                 start: last.map_or(0.0, |_| beams[0].length / units.length),
                 elements,
                 first_node: last.map_or(0, |run| run.elements + 1),
@@ -394,6 +397,17 @@ impl Model {
             weights,
             inner,
         }
+    }
+
+    /// Returns a b^2/24 (model's units) at a position (m), of the curvature a across the width b; 0 where that is not followed.
+    pub(super) fn curvature_across(&self, motion: &Motion, position: f64) -> f64 {
+        if !self.numbering.stiffened {
+            return 0.0;
+        }
+        let (run, index, within) = self.locate(position);
+        let node = self.runs[run].first_node + index;
+        let [.., a0, a1] = motion.all_ends(node);
+        self.runs[run].middle * (a0 + within * (a1 - a0))
     }
 
     fn hinged_at(&self, node: usize) -> Option<&HingedElement> {

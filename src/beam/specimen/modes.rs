@@ -180,13 +180,22 @@ impl SpecimenModes {
         self.frequencies.is_empty()
     }
 
-    /// Returns the displacement (1/sqrt(kg)) at a position (m).
+    /// Returns the displacement (1/sqrt(kg)), the mean over the width, at a position (m).
     pub fn displacement(&self, mode: usize, position: f64) -> f64 {
         let place = self.model.place(position);
         let Mode { square, motion, .. } = &self.modes[mode];
         let ends = motion.ends(place.node);
         let inner: f64 = place.inner.iter().zip(&ends).map(|(a, b)| a * b).sum();
         (place.displacement(&ends) + square * inner) / self.model.units.mass.sqrt()
+    }
+
+    /// Returns the displacement (1/sqrt(kg)) on the middle line of the beam at a position (m), where sensors sit and hammers
+    /// strike: w - a b^2/24, with w the mean over the width b and a the curvature across it.
+    pub fn middle_displacement(&self, mode: usize, position: f64) -> f64 {
+        let curvature = self
+            .model
+            .curvature_across(&self.modes[mode].motion, position);
+        self.displacement(mode, position) - curvature / self.model.units.mass.sqrt()
     }
 
     /// Returns the rotation of the cross-section (rad/m per sqrt(kg)) at a position (m): dw/dx without shear.

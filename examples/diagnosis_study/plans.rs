@@ -192,7 +192,7 @@ impl PlannedTest {
             return;
         };
         let tails = StudentT::new(3.0).expect("three degrees of freedom");
-        let Ok(own) = truth.modes(self.plan.modes, Mesh::DIAGNOSIS) else {
+        let Ok(own) = truth.beam_modes(self.plan.modes, Mesh::DIAGNOSIS) else {
             return;
         };
         for configuration in &mut observed.configurations {
@@ -202,12 +202,13 @@ impl PlannedTest {
                 *kt *= factors[0];
                 *kr *= factors[1];
             }
-            let Ok(moved) = drifted.modes(self.plan.modes, Mesh::DIAGNOSIS) else {
+            let Ok(moved) = drifted.beam_modes(self.plan.modes, Mesh::DIAGNOSIS) else {
                 continue;
             };
             for mode in &mut configuration.modes {
-                let index = mode.mode - 1;
-                mode.frequency *= moved.frequencies()[index] / own.frequencies()[index];
+                let [moved, own] = [&moved, &own]
+                    .map(|modes| modes.modes.frequencies()[modes.numbers[mode.mode - 1]]);
+                mode.frequency *= moved / own;
             }
         }
     }

@@ -212,7 +212,7 @@ impl Trial {
         let mut truth = test.nominal(&structure, false);
         let outside = match class {
             Class::Outside(kind) => {
-                let size = kind.plant(&mut random, &structure, &mut truth.specimen);
+                let size = kind.plant(&mut random, &mut truth.specimen);
                 Some((kind, size))
             }
             _ => None,
@@ -221,7 +221,7 @@ impl Trial {
         test.state(&mut observed);
         test.drift_heavily(&mut random, &truth.specimen, &mut observed);
         if let Some((kind, size)) = outside {
-            kind.change(&mut random, size, &mut observed);
+            kind.change(&mut random, size, &truth.specimen, &mut observed);
         }
         let within_tolerance = is_within_tolerance(&effects, &structure);
         let described = test.nominal(&structure, true);

@@ -154,7 +154,7 @@ impl EffectTest {
         let specimen = Specimen::jointed(theory, &beam, Assembly::Cantilever, &lap, Some(joint));
         let count = random.random_range(5..9);
         let effects: Vec<Effect> = planted
-            .map(|id| draw_effect(&beam, &[id], random).expect("a size within its range"))
+            .map(|id| draw_effect(&beam, &[], &[id], random).expect("a size within its range"))
             .into_iter()
             .collect();
         let sensors = [PointMass::new(position.min(beam.length), 0.0)];

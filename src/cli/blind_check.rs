@@ -71,7 +71,8 @@ pub(super) struct BlindCheckArguments {
     #[arg(long, value_name = "DIR", requires = "truth")]
     folder: Option<PathBuf>,
     /// True effects of the existing tests, as --keep writes them. JSON list of {"name", "effects", "params"},
-    /// with "detectable" and "refutable" (true or false) if known. Parameters of two effects stand in
+    /// with "detectable" and "refutable" (true or false) if known. "within_tolerance": true marks a common factor on
+    /// all frequencies that the description's tolerances cover, and that is no effect then. Parameters of two effects stand in
     /// braces: {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,

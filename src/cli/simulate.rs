@@ -27,6 +27,39 @@ use tapjoint::simulate::{
 };
 use tapjoint::study::updated_model::described_effects;
 
+const EXAMPLES: &str = "Examples:
+  tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g
+  tapjoint simulate test.toml --out virtual --with sensor-position:offset=8mm,sensor=2,recording=1
+  tapjoint simulate test.toml --out virtual --kx 1400 --ky 4.8 --with joint-nonlinearity:ratio=-0.1,exponent=1 --seed 7
+  tapjoint run virtual/test.toml";
+
+/// Returns the effects with their parameters and typical values, and the examples.
+fn list_of_effects() -> String {
+    let mut text = "Effects, with the values of parameters that are not given:\n".to_owned();
+    let possible = EffectId::ALL.into_iter();
+    for id in possible.filter(|id| *id != EffectId::Resolution) {
+        let mut parameters = Vec::new();
+        for info in id.parameters() {
+            let unit = info.dimension.unit();
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            };
+            parameters.push(match info.typical {
+                Some(typical) => format!("{}={typical}{unit}", info.name),
+                None => format!("{} (needed{unit})", info.name),
+            });
+        }
+        let _ = writeln!(text, "  {}: {}", id.name(), id.meaning());
+        let _ = writeln!(text, "      {}", parameters.join(", "));
+    }
+    text + "\nSensors and recordings are numbered from 1, as in TEST. sensor=0 means all sensors. recording=0 means all \
+            recordings; another number means those with the same described place as this one. An error of the set-up \
+            leaves the places in test.toml as they are described in TEST.\n\n"
+        + EXAMPLES
+}
+
 /// Make the recordings of a virtual test.
 ///
 /// They are what a laboratory would record of the described structure. TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. The output
@@ -34,9 +67,7 @@ use tapjoint::study::updated_model::described_effects;
 /// knows it: effects of --with are left out, and the joint is to be fitted. A list of checksums lets the
 /// next `tapjoint simulate` replace these files.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g\n  tapjoint simulate test.toml --out virtual --kx 1400 --ky 4.8 --with joint-nonlinearity:ratio=-0.1,exponent=1 --seed 7\n  tapjoint run virtual/test.toml"
-)]
+#[command(after_help = EXAMPLES, after_long_help = list_of_effects())]
 pub(super) struct SimulateArguments {
     /// Test description (.toml); its recordings need not exist
     #[arg(value_name = "TEST")]

@@ -1,21 +1,21 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
 use crate::amplitude::set_joint_motions;
-use crate::dataset::{Dataset, MORE_MODES, ObservableKind};
+use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
-use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
+use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, add_by_multi_start, fit_nominal};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
 use crate::result::{Hypothesis, UnlocatedSensors};
 use crate::settings::{GapError, GapSettings};
 use crate::structure::Nominal;
+use crate::unknown::fit_unknown;
 use crate::validate::Residuals;
 use crate::verdict::{Candidate, set_probabilities};
 use rayon::prelude::*;
-use tapjoint_beam::effects::EffectId;
+use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_identify::observation::{Observations, ObservedSensor};
-use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits of all hypotheses.
 pub struct ModelComparison {
@@ -183,15 +183,15 @@ pub fn set_section_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
 /// Fits all hypotheses but pairs of effects.
 fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     let (dataset, none) = prepared(test)?;
-    let effects = candidate_effects(&dataset.nominal, &dataset.arrangements);
+    let effects = candidate_effects(&dataset);
     let search = Search {
         dataset: &dataset,
         without: &none,
     };
-    let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add(*one)).collect();
+    let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add_any(one)).collect();
     let mut candidates: Vec<Candidate> = Vec::new();
-    for (effect, fit) in effects.iter().zip(fits) {
-        candidates.extend(fit.map(|fit| single(effect.effect, fit)));
+    for (variants, fit) in effects.iter().zip(fits) {
+        candidates.extend(fit.map(|fit| single(variants[0].effect, fit)));
     }
     let one_stands = candidates.iter().any(|one| stands(&dataset, &one.fit));
     if !one_stands && !stands(&dataset, &none) {
@@ -238,9 +238,15 @@ fn single(effect: EffectId, fit: Fit) -> Candidate {
 /// can reach.
 fn add_large_effects(
     search: &Search<'_>,
-    effects: &[CandidateEffect],
+    effects: &[Vec<CandidateEffect>],
     candidates: &mut Vec<Candidate>,
 ) {
+    // Errors of the set-up hardly move the frequencies, which are all that such a search looks at.
+    let effects = effects.iter().flatten();
+    let effects: Vec<CandidateEffect> = effects
+        .filter(|one| one.effect.group() != Group::SetUp)
+        .copied()
+        .collect();
     let found: Vec<Option<Fit>> = effects
         .par_iter()
         .map(|effect| {
@@ -265,7 +271,7 @@ fn add_large_effects(
 const EXACT: f64 = 1e-8;
 
 /// Fits the nominal model with some nuisance parameters taken as exact.
-fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) -> Option<Fit> {
+pub fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) -> Option<Fit> {
     let mut exact = dataset.clone();
     for nuisance in &mut exact.nuisances {
         if is_exact(nuisance.parameter) {
@@ -285,50 +291,13 @@ fn is_described(nuisance: NuisanceParameter) -> bool {
     is_mass || is_geometry(nuisance)
 }
 
-fn is_geometry(nuisance: NuisanceParameter) -> bool {
+/// Returns whether a nuisance parameter belongs to the beam and its model.
+pub fn is_geometry(nuisance: NuisanceParameter) -> bool {
     use NuisanceParameter::{Discrepancy, Poisson, Property, Shear, WidthHold};
     matches!(
         nuisance,
         Property { .. } | Poisson | WidthHold | Shear | Discrepancy { .. }
     )
-}
-
-/// Spreads of a discrepancy that no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
-const DISCREPANCIES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
-
-/// Fits a discrepancy outside the catalogue: every mode's frequency off by an amount of its own,
-/// the same in all configurations, with a tenth of it for each datum and twice of it in the shapes.
-fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
-    let pairs = dataset.observables.iter().zip(&dataset.data);
-    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
-    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
-    let size = root_mean_square(&values);
-    let mut found: Vec<LocalOptimum> = Vec::new();
-    for spread in DISCREPANCIES {
-        // No prediction is better than the spread.
-        let mut loose = dataset.clone();
-        for mode in 1..=dataset.fitted_modes {
-            loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
-        }
-        for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
-            let extra = match observable.kind {
-                ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
-                    2.0 * spread * size
-                }
-                // Damping may be anything if the cause is not known.
-                ObservableKind::Damping => 50.0 * spread,
-                ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
-                ObservableKind::BeamMass | ObservableKind::FreeScale => 0.0,
-            };
-            datum.std = datum.std.hypot(extra);
-        }
-        let forward = Forward::new(&loose, &[]);
-        let priors = forward.priors();
-        let mut start = nominal.parameters().to_vec();
-        start.resize(priors.len(), 0.0);
-        found.extend(evaluate(&forward, &priors, &start));
-    }
-    Fit::of_variants(found)
 }
 
 /// Spreads of the joint between set-ups that are no longer a nuisance (1).

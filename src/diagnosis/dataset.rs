@@ -13,6 +13,7 @@ use crate::observations::{
 };
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::settings::{DISTINCT_AMPLITUDES, GapSettings};
+use crate::spare::SpareData;
 use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -255,6 +256,8 @@ pub struct Dataset {
     pub nominal: Nominal,
     /// One for each configuration.
     pub arrangements: Vec<Arrangement>,
+    /// Their sensors, masses and places of the hammer, each once.
+    pub inventory: Inventory,
     /// Observables that are fitted.
     pub observables: Vec<Observable>,
     /// Their data.
@@ -269,8 +272,10 @@ pub struct Dataset {
     pub settings: GapSettings,
     /// Modes above this one are held out.
     pub fitted_modes: usize,
-    /// Frequencies that take no part in the fit.
+    /// Frequencies that take no part in the fit, and test it.
     pub holdout: Vec<(Observable, Datum)>,
+    /// Frequencies that take no part in anything but the closure.
+    pub spare: Vec<(Observable, Datum)>,
     /// Change of a frequency's logarithm for one standard deviation of the taps' common scatter, by configuration and
     /// mode.
     pub scatter: BTreeMap<(usize, usize), f64>,
@@ -297,6 +302,10 @@ const AMPLITUDE_STD: f64 = 0.25;
 /// Number of modes that a next test may add.
 pub const MORE_MODES: usize = 2;
 
+/// Standard deviation of a size in the search, over its scale: far beyond what the size's own prior, which replaces it in
+/// the evidence, makes probable (3 % of Cauchy's distribution).
+const SIZE_REACH: f64 = 20.0;
+
 /// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
 const COUPLING_STD: f64 = 0.5;
 
@@ -305,7 +314,9 @@ impl Dataset {
     pub fn new(observations: &Observations, nominal: &Nominal, settings: &GapSettings) -> Self {
         let highest = highest_mode(observations).min(settings.highest_mode);
         let observations = &up_to(highest, observations);
-        let held_out = if highest >= settings.withhold_from {
+        let spare = SpareData::new(observations, highest, settings);
+        let tested = highest - spare.modes;
+        let held_out = if tested >= settings.withhold_from {
             settings.withheld_modes
         } else {
             0
@@ -318,26 +329,30 @@ impl Dataset {
         let mut dataset = Dataset {
             nominal: nominal.clone(),
             arrangements,
+            inventory,
             observables: Vec::new(),
             data: Vec::new(),
             nuisances: Vec::new(),
             modes: highest,
             elements: ELEMENTS,
             settings: settings.clone(),
-            fitted_modes: highest.saturating_sub(held_out),
+            fitted_modes: tested.saturating_sub(held_out),
             holdout: Vec::new(),
+            spare: Vec::new(),
             scatter: BTreeMap::new(),
             section: SectionSlopes::default(),
             shape_slopes: None,
             tilts: BTreeMap::new(),
             peaks: UnpairedPeaks::new(observations),
         };
-        dataset.add_frequencies(observations);
+        dataset.add_frequencies(observations, &spare);
+        // What else these recordings show takes no part either.
+        let observations = &spare.without(observations);
         dataset.add_shapes(observations);
         dataset.add_damping(observations);
         dataset.add_slopes(observations);
         dataset.add_checks();
-        dataset.add_nuisances(&inventory);
+        dataset.add_nuisances();
         dataset
     }
 
@@ -346,7 +361,7 @@ impl Dataset {
         self.data.push(datum);
     }
 
-    fn add_frequencies(&mut self, observations: &Observations) {
+    fn add_frequencies(&mut self, observations: &Observations, spare: &SpareData) {
         let mut observed: Vec<(usize, &ObservedMode)> = Vec::new();
         let mut data = Vec::new();
         for (configuration, one) in observations.configurations.iter().enumerate() {
@@ -377,7 +392,9 @@ impl Dataset {
             let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
             let observable = Observable::frequency(configuration, mode);
-            if mode > self.fitted_modes {
+            if mode > spare.highest || spare.recordings.contains(&one.recording) {
+                self.spare.push((observable, datum));
+            } else if mode > self.fitted_modes {
                 self.holdout.push((observable, datum));
             } else {
                 self.push(observable, datum);
@@ -542,11 +559,12 @@ impl Dataset {
         }
     }
 
-    fn add_nuisances(&mut self, inventory: &Inventory) {
+    fn add_nuisances(&mut self) {
         use NuisanceParameter::{
             AddedInertia, Amplitude, Damping, DampingTilt, Drift, Gain, Scatter, SensorInertia,
             SensorMass, SensorPosition, TapPosition, Temperature,
         };
+        let inventory = self.inventory.clone();
         let setups = self.setups();
         let position_std = self.nominal.uncertainty.positions;
         self.add_description();
@@ -612,6 +630,19 @@ impl Dataset {
         );
         let parameter = NuisanceParameter::FastenedPosition { fastened };
         self.add_nuisance(parameter, 0.0, known.positions);
+    }
+
+    /// Returns whether there are modal constants, and whether there are ratios of shapes.
+    pub fn kinds_of_shapes(&self) -> [bool; 2] {
+        let kinds = self.observables.iter().map(|one| one.kind);
+        [
+            kinds
+                .clone()
+                .any(|kind| matches!(kind, ObservableKind::Constant { .. })),
+            kinds
+                .clone()
+                .any(|kind| matches!(kind, ObservableKind::Ratio { .. })),
+        ]
     }
 
     /// Numbers of the set-ups, ascending.
@@ -682,7 +713,7 @@ impl Dataset {
             all.push(Prior {
                 low: effect.size.low,
                 high: effect.size.high,
-                ..Prior::normal(effect.size.neutral, 3.0 * effect.size.scale)
+                ..Prior::normal(effect.size.neutral, SIZE_REACH * effect.size.scale)
             });
             if let Some(range) = effect.location {
                 let (low, high) = range.searched_bounds();

@@ -3,9 +3,9 @@
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
 use crate::fit::{CoarseModel, Search, Start, settle, unexplained};
-use crate::parameters::{CandidateEffect, LocationKind};
+use crate::parameters::CandidateEffect;
 use crate::result::Hypothesis;
-use crate::settings::{LEAST_DATA_FOR_PAIRS, MISSED_HOLDOUT, PROMISED_BY_SECOND, SECOND_EFFECT};
+use crate::settings::{LEAST_DATA_FOR_PAIRS, PROMISED_BY_SECOND, SECOND_EFFECT};
 use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
 use crate::verdict::{Candidate, GoodnessOfFit, refutes_by_holdout, set_probabilities};
 use rayon::prelude::*;
@@ -53,7 +53,6 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     }
     let found: Vec<Option<Candidate>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
     candidates.extend(distinct(found.into_iter().flatten().collect()));
-    compare_with_unknown(dataset, candidates);
     set_probabilities(candidates, tried);
 }
 
@@ -149,9 +148,6 @@ impl<'a> PairSearch<'a> {
                     all.push((a, b));
                 }
             }
-            if is_local(&effect_of(singles[b])) {
-                all.push((b, b));
-            }
         }
         let found: Vec<Pair<'a>> = all
             .par_iter()
@@ -181,13 +177,7 @@ impl<'a> PairSearch<'a> {
                 }
             })
             .collect();
-        // Two of a kind are no name, but `unknown` may look like them.
-        let (alike, others): (Vec<Pair<'a>>, Vec<Pair<'a>>) = best_pairs(found, FINER_PAIRS)
-            .into_iter()
-            .partition(|pair| pair.first.effects() == pair.second.effects());
-        let mut pairs = best_pairs(others, FITTED_PAIRS);
-        pairs.extend(best_pairs(alike, 1));
-        (all.len(), pairs)
+        (all.len(), best_pairs(found, FITTED_PAIRS))
     }
 
     /// Fits a pair, if it is accepted: it has to beat the better of the two by
@@ -257,56 +247,6 @@ fn best_pairs(mut pairs: Vec<Pair<'_>>, count: usize) -> Vec<Pair<'_>> {
     pairs
 }
 
-/// Returns whether an effect sits somewhere along the beam.
-fn is_local(effect: &CandidateEffect) -> bool {
-    let location = effect.location;
-    location.is_some_and(|location| location.kind == LocationKind::Position)
-}
-
-/// Gives `unknown` the evidence of pairs that imitate it, and removes pairs of one kind.
-///
-/// An unknown change may be spread over a part of the beam. Two changes at locations of their own imitate every such
-/// change, with as many parameters as its location, extent, mass and stiffness: it explains what they explain, and
-/// these data cannot separate them. So does one such change beside a fixture at any frequency. So do the best two
-/// effects of any kind, if they miss the hold-out data by more than its noise. Two of the same kind are no hypothesis
-/// of their own: they are one way of being unknown.
-fn compare_with_unknown(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
-    let pairs = candidates.iter().filter(|one| one.effects().len() > 1);
-    let fits: Vec<&Fit> = pairs.map(|one| &one.fit).collect();
-    let best = (fits.iter()).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
-    // The hold-out data are missed by more than their own uncertainty, however large that of the prediction.
-    let failing = best.filter(|fit| {
-        let errors = HoldoutErrors::new(dataset, fit);
-        // An error that is no number counts as a miss.
-        errors.is_some_and(|errors| !errors.rms().le(&(MISSED_HOLDOUT * errors.floor())))
-    });
-    // As many free parameters as a change that is spread over the beam: all effects choose their locations, or a
-    // frequency that no peak states, which is known to a standard deviation; else only its range is.
-    let imitating = fits.iter().filter(|fit| {
-        let layout = dataset.layout(&fit.effects);
-        let mut effects = fit.effects.iter().enumerate();
-        let all_choose = effects.all(|(k, effect)| {
-            let is_fixture = effect.effect == EffectId::Fixture;
-            let stated = layout
-                .location(k)
-                .map(|at| fit.best.priors[at].std.is_finite());
-            is_local(effect) || is_fixture && stated == Some(false)
-        });
-        all_choose && fit.effects.iter().any(is_local)
-    });
-    let most = imitating
-        .chain(failing)
-        .map(|fit| fit.log_evidence)
-        .fold(f64::NEG_INFINITY, f64::max);
-    if let Some(unknown) = candidates.iter_mut().find(|one| one.is_unknown()) {
-        unknown.fit.log_evidence = unknown.fit.log_evidence.max(most);
-    }
-    candidates.retain(|one| match one.effects() {
-        [first, second] => first != second,
-        _ => true,
-    });
-}
-
 /// Returns the more probable of the same two effects in either order.
 fn distinct(found: Vec<Candidate>) -> Vec<Candidate> {
     let mut pairs: Vec<Candidate> = Vec::new();
@@ -327,34 +267,4 @@ fn distinct(found: Vec<Candidate>) -> Vec<Candidate> {
 /// Returns whether neither the fitted data refute a fit nor the hold-out data.
 pub fn stands(dataset: &Dataset, fit: &Fit) -> bool {
     GoodnessOfFit::new(dataset, fit).is_some_and(|one| one.refuting_p_value().is_none())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tests::fitted;
-
-    /// Two effects that chance did not favour: where they miss the hold-out data by more than their uncertainty,
-    /// an unknown cause explains the others as well.
-    #[test]
-    fn regress_two_effects_that_predict_badly_are_as_good_as_something_unknown() {
-        let (mut dataset, fit) = fitted();
-        let exact = HoldoutErrors::new(&dataset, &fit).unwrap();
-        assert!(exact.rms() <= MISSED_HOLDOUT * exact.floor(), "{exact:?}");
-        let unknown_beside = |dataset: &Dataset| {
-            let pair = vec![EffectId::CrossCoupling, EffectId::SensorMass];
-            let mut candidates = vec![
-                Candidate::new(Hypothesis::Effects(pair), fit.clone()),
-                Candidate::new(Hypothesis::Unknown, fit.clone()),
-            ];
-            candidates[1].fit.log_evidence -= 50.0;
-            compare_with_unknown(dataset, &mut candidates);
-            candidates[1].fit.log_evidence - fit.log_evidence
-        };
-        assert_eq!(unknown_beside(&dataset), -50.0);
-        for (_, datum) in &mut dataset.holdout {
-            datum.value += 2.0 * MISSED_HOLDOUT * datum.std;
-        }
-        assert_eq!(unknown_beside(&dataset), 0.0);
-    }
 }

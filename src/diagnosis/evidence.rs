@@ -295,10 +295,12 @@ fn log_integral(size: &Size, from: f64, to: f64, log_likelihood: impl Fn(f64) ->
     if from >= to {
         return f64::NEG_INFINITY;
     }
-    // The prior bends within two fifths of its scale; cut inside, the pieces are smooth.
-    let near = 0.2 * size.scale;
+    // The prior bends at its scale and falls over decades; cut between, the pieces are smooth.
+    let aside = [0.2, 1.0, 4.0, 20.0].map(|share| share * size.scale);
+    let below = aside.iter().rev().map(|away| size.neutral - away);
+    let above = aside.iter().map(|away| size.neutral + away);
     let mut cuts = vec![from];
-    for cut in [size.neutral - near, size.neutral, size.neutral + near] {
+    for cut in below.chain([size.neutral]).chain(above) {
         if cut > from && cut < to {
             cuts.push(cut);
         }
@@ -338,6 +340,9 @@ pub fn profile_correction(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
     profile_gain(forward, found, &effect.size, variance).unwrap_or(0.0)
 }
 
+/// Sizes over their scale between which the profile is followed: 97 % of the prior.
+const PROFILE_REACH: f64 = 20.0;
+
 /// Returns the logarithm of the integral over the profile of the likelihood over that over its parabola.
 fn profile_gain(
     forward: &Forward<'_>,
@@ -351,10 +356,10 @@ fn profile_gain(
     let reach = 4.0 * variance.sqrt();
     let from = (here - reach)
         .max(size.low)
-        .max(size.neutral - 4.0 * size.scale);
+        .max(size.neutral - PROFILE_REACH * size.scale);
     let to = (here + reach)
         .min(size.high)
-        .min(size.neutral + 4.0 * size.scale);
+        .min(size.neutral + PROFILE_REACH * size.scale);
     let mut logs = Vec::new();
     // The regularisation of the size is no part of its likelihood; where it is held it has none.
     let base = marginal_log(&found.priors, &found.optimum, at)? + regularisation(prior, here);
@@ -399,7 +404,7 @@ fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{LocationKind, LocationRange};
+    use crate::parameters::{LocationKind, LocationRange, Target};
     use tapjoint_beam::effects::EffectId;
 
     /// One stiffness and one size, with data that need not be linear in either.
@@ -433,6 +438,7 @@ mod tests {
                 joint: vec![0],
                 effects: vec![CandidateEffect {
                     effect: EffectId::SensorMass,
+                    target: Target::All,
                     size: self.size,
                     location: None,
                 }],
@@ -574,6 +580,7 @@ mod tests {
             joint: vec![0],
             effects: vec![CandidateEffect {
                 effect: EffectId::AddedMass,
+                target: Target::All,
                 size: size(0.0),
                 location: Some(LocationRange {
                     kind: LocationKind::Position,

@@ -7,13 +7,13 @@ use crate::evidence::{
     Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
     over_drifts, profile_correction, start_with,
 };
-use crate::fixture::{log_unread, with_peaks};
+use crate::fixture::with_peaks;
 use crate::forward::Forward;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
-use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
+use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior, Size};
 use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
 use crate::structure::COUPLING;
-use tapjoint_beam::effects::EffectId;
+use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits the nominal model with its joint free.
@@ -30,6 +30,10 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
     Fit::of_variants(vec![evaluate(&forward, &priors, &start)?])
 }
 
+/// Largest size from which a search begins, over its scale.
+const LARGEST_STEP: f64 = 10.0;
+/// Sizes of errors of the set-up from which a search may begin, over their scale: 1 mm to 15 cm, 2 % to 30-fold.
+const START_SET_UP_SIZES: [f64; 9] = [0.2, 0.6, 1.2, 2.0, 3.5, 6.0, 10.0, 30.0, 90.0];
 /// Nodes of a location at which the true model is fitted.
 const CORRECTED: usize = 6;
 
@@ -46,6 +50,23 @@ impl<'a> Search<'a> {
     /// Returns the model with these effects beside those of the fit without them.
     fn model_with(&self, added: &[CandidateEffect]) -> Forward<'a> {
         Forward::new(self.dataset, &[&self.without.effects[..], added].concat())
+    }
+
+    /// Fits an effect beside those of the fit without it: on each of the things that it may act on, which are equally
+    /// probable.
+    pub fn add_any(&self, variants: &[CandidateEffect]) -> Option<Fit> {
+        let fits: Vec<Fit> = variants.iter().filter_map(|one| self.add(*one)).collect();
+        let mut logs: Vec<f64> = fits.iter().map(|fit| fit.log_evidence).collect();
+        // A fit that failed has no evidence.
+        logs.resize(variants.len(), f64::NEG_INFINITY);
+        let log_evidence = log_mean(&logs);
+        let best = fits
+            .into_iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        Some(Fit {
+            log_evidence,
+            ..best
+        })
     }
 
     /// Fits the effect beside those of the fit without it.
@@ -111,7 +132,7 @@ impl<'a> Search<'a> {
 
     /// Fits the effects of a model from one start.
     pub fn fit_from(&self, forward: &Forward<'_>, start: &[f64]) -> Option<Fit> {
-        let best = optimum_from(forward, start)?;
+        let best = evaluate(forward, &forward.priors(), start)?;
         let evidence = best.log_evidence;
         Some(self.finish(forward, best, evidence))
     }
@@ -132,15 +153,22 @@ impl<'a> Search<'a> {
     /// the other sign or a size well inside the range.
     fn sizes(&self, forward: &Forward<'_>) -> Vec<f64> {
         let at = forward.layout.last_size();
-        let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
+        let candidate = &forward.layout.effects[forward.layout.effects.len() - 1];
+        let size = &candidate.size;
+        if size.is_fixed() {
+            return vec![size.low];
+        }
+        if candidate.effect.group() == Group::SetUp {
+            return self.set_up_sizes(forward, size);
+        }
         // One step of Gauss-Newton from nothing of it, not stopped by a bound.
         let mut priors = forward.priors();
         (priors[at].low, priors[at].high) = (f64::NEG_INFINITY, f64::INFINITY);
         let linear = linear_fit(forward, self.without, &priors, None);
         let asked = linear.map_or(size.neutral, |optimum| optimum.parameters[at]);
         let asked = asked.clamp(
-            (size.neutral - 2.0 * size.scale).max(size.low),
-            (size.neutral + 2.0 * size.scale).min(size.high),
+            (size.neutral - LARGEST_STEP * size.scale).max(size.low),
+            (size.neutral + LARGEST_STEP * size.scale).min(size.high),
         );
         let away = asked - size.neutral;
         let other = (size.neutral - 0.5 * away).clamp(size.low, size.high);
@@ -151,6 +179,27 @@ impl<'a> Search<'a> {
         } else {
             vec![asked, other]
         }
+    }
+
+    /// Returns the sizes of an error of the set-up from which the search begins: the best of a row from small to gross.
+    /// Shapes bend within a few centimetres, so that the slopes at nothing lead nowhere.
+    fn set_up_sizes(&self, forward: &Forward<'_>, size: &Size) -> Vec<f64> {
+        let rows = START_SET_UP_SIZES.iter().flat_map(|share| [*share, -share]);
+        let rows = rows.map(|share| share * size.scale);
+        let mut tried: Vec<(f64, f64)> = Vec::new();
+        for size in rows.filter(|x| (size.low..=size.high).contains(x)) {
+            let start = start_with(self.without, &forward.layout, size, None);
+            if let Some((predicted, _)) = forward.predict(&start) {
+                let data = &self.dataset.data;
+                tried.push((
+                    objective_at(data, &forward.priors(), &start, &predicted),
+                    size,
+                ));
+            }
+        }
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        tried.truncate(FOLLOWED);
+        tried.into_iter().map(|one| one.1).collect()
     }
 
     /// Fits the linearised model at every node of the location's range; then the true one, free, from the best.
@@ -233,20 +282,10 @@ impl<'a> Search<'a> {
         let total = if is_located(&best, at, spacing) {
             log_sum(&evidences_of(&found))
         } else {
-            let nodes = nodes.iter();
-            let all = nodes.map(|node| node.log_evidence + log_unread(forward, node));
-            log_mean(&all.collect::<Vec<_>>())
+            log_mean(&evidence)
         };
         Some(self.finish(forward, best, total))
     }
-}
-
-/// Returns the local optimum from a start; its evidence includes the probability that no peak is read at
-/// its fixture's frequency.
-fn optimum_from(forward: &Forward<'_>, start: &[f64]) -> Option<LocalOptimum> {
-    let mut one = evaluate(forward, &forward.priors(), start)?;
-    one.log_evidence += log_unread(forward, &one);
-    Some(one)
 }
 
 /// Adds the local optima that are reached from some starts. Of two with equal size and location of the last effect
@@ -255,7 +294,7 @@ fn descend(forward: &Forward<'_>, starts: &[Vec<f64>], found: &mut Vec<LocalOpti
     let which = forward.layout.last_size()..forward.layout.first_nuisance();
     for one in starts
         .iter()
-        .filter_map(|start| optimum_from(forward, start))
+        .filter_map(|start| evaluate(forward, &forward.priors(), start))
     {
         let covariance = one.covariance();
         let same = found.iter_mut().find(|other| {
@@ -340,7 +379,7 @@ fn local_maxima(evidence: &[f64]) -> Vec<usize> {
 
 /// Sizes from which the search begins, over the scale of the effect's prior; with either sign for effects that
 /// have two.
-const START_SIZES: [f64; 2] = [0.5, 1.5];
+const START_SIZES: [f64; 3] = [0.5, 2.0, 8.0];
 /// Number of locations from which it begins.
 const START_LOCATIONS: usize = 3;
 /// Factor by which each stiffness of the joint begins above and below the described or fitted one.

@@ -1,5 +1,8 @@
 //! The fixture's own resonance as a datum: a peak that belongs to no mode of the beam.
 //!
+//! A fixture is a hypothesis only where its own resonance is seen, or lies above all that was looked at: one whose resonance
+//! should be seen and is not would explain much and predict a peak that is missing.
+//!
 //! Peaks of other causes (torsion, bending the other way, something on the structure) may stand anywhere
 //! between the lowest and the highest mode. Under every hypothesis each has the same density 1/B over
 //! the logarithm of the frequency, B being the logarithm of the band. A fixture adds a mode of its own,
@@ -7,16 +10,15 @@
 //! and which may be any of the n peaks. The peaks x_1 .. x_n then count for it with
 //!
 //! ```text
-//! p(peaks | fixture)                   v
-//! -------------------- = (1 - v)  +  -  sum_i B delta(x_i - x_b)
-//! p(peaks | any other)                 n
+//! p(peaks | fixture)      v
+//! --------------------  = - sum_i B delta(x_i - x_b)
+//! p(peaks | any other)    n
 //! ```
 //!
-//! Integrated with the likelihood of all other data over the fixture's frequency, every peak gives a
-//! fit whose frequency the peak states, with the factor v B/n. The remaining fit
-//! without a peak has the factor 1 - v, which is averaged over the frequency where the data leave it open. Nothing changes where the mode lies outside the band or is too
-//! weak (v = 0), and a fixture of zero size has no peak. A fit that should show a peak and has none is
-//! refuted with the probability 1 - v; one whose frequency is stated, by how well it fits.
+//! Integrated with the likelihood of all other data over the fixture's frequency, whose prior has the density 1/R over the
+//! logarithm, every peak gives a fit whose frequency the peak states, with the factor v B/(n R). A frequency above
+//! all that was looked at has the share of R that lies there. A fit whose frequency is stated is refuted by a strength
+//! that does not suit it.
 
 use crate::dataset::{Dataset, chi_square_tail};
 use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
@@ -26,7 +28,6 @@ use crate::parameters::{LocationKind, Prior};
 use crate::settings::{FIXTURE_LEVEL, SPLIT_POLE};
 use crate::structure::fixture_strength;
 use std::f64::consts::TAU;
-use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
 
 /// Standard deviation (dB) of the level at which a fixture's peak is read: damping of the fixture and noise, within a
@@ -107,24 +108,6 @@ impl FixtureMode {
         self.over.map_or(1.0, missed)
     }
 
-    /// Returns the probability that its peak is not read, over all sizes that a fit leaves open: normal about `size` and
-    /// above zero. The mode was solved at the size `solved`; the modal constant of a weak mode is proportional to
-    /// the size.
-    fn missed_by_size(&self, size: f64, std: f64, solved: f64) -> f64 {
-        const SIZES: usize = 400;
-        let Some(over) = self.over else { return 1.0 };
-        let first = (size - 5.0 * std).max(0.0);
-        let step = (size + 5.0 * std - first) / SIZES as f64;
-        let (mut all, mut unread) = (0.0, 0.0);
-        for k in 0..SIZES {
-            let own = first + step * (k as f64 + 0.5);
-            let weight = (-0.5 * ((own - size) / std).powi(2)).exp();
-            all += weight;
-            unread += weight * missed(over + 20.0 * (own / solved).log10());
-        }
-        unread / all
-    }
-
     /// Returns by how many standard deviations a peak is stronger than this mode, and the standard deviation. The size
     /// is known to the relative one of `size_std`, and the constant of a weak mode grows with it.
     fn excess_of(&self, peak: &UnpairedPeak, size_std: f64) -> Option<(f64, f64)> {
@@ -152,16 +135,15 @@ fn size_std(found: &LocalOptimum, at: usize) -> f64 {
     })
 }
 
-/// Returns how probable the peak, or its absence, is under a fit with a fixture. Where a peak states its frequency: a
-/// strength as far from the predicted one; elsewhere: that its peak is not read. `None` for
-/// fits without a fixture.
+/// Returns the probability of a strength as far from the predicted one, of the peak that states the frequency of a fit's
+/// fixture. `None` for fits without a fixture, or with one above all that was looked at.
 pub fn goodness(dataset: &Dataset, fit: &Fit) -> Option<f64> {
     let forward = Forward::new(dataset, &fit.effects);
     let at = forward
         .layout
         .location_of_kind(LocationKind::FixtureFrequency)?;
     if !fit.best.priors[at].std.is_finite() {
-        return unread(&forward, at, &fit.best);
+        return None;
     }
     let own = FixtureMode::new(&forward, fit.parameters())?;
     let peaks = dataset.peaks.all.iter();
@@ -171,53 +153,41 @@ pub fn goodness(dataset: &Dataset, fit: &Fit) -> Option<f64> {
     Some(two_sided(excess))
 }
 
-/// Returns the probability that the peak is not read, over the sizes that the fit leaves open; `None` where the fit
-/// has no uncertainty of the size. `at` is the parameter of the fixture's frequency, after its size.
-///
-/// A fixture that hardly moves is solved with a small size instead: the shape of its mode on the beam is otherwise
-/// rounding.
-fn unread(forward: &Forward<'_>, at: usize, found: &LocalOptimum) -> Option<f64> {
-    let mut effects = forward.layout.effects.iter();
-    let fixture = effects.find(|one| one.effect == EffectId::Fixture)?;
-    let mut parameters = found.optimum.parameters.clone();
-    let size = parameters[at - 1];
-    let solved = size.max(fixture.size.small());
-    parameters[at - 1] = solved;
-    let std = found.covariance()?[(at - 1, at - 1)].max(0.0).sqrt();
-    let own = FixtureMode::new(forward, &parameters)?;
-    (std > 0.0 && std.is_finite()).then(|| own.missed_by_size(size, std, solved))
-}
+/// Lowest and highest frequency of a fixture (Hz), between which its logarithm is uniform: a rig on a soft table, a vice.
+const FIXTURES: [f64; 2] = [30.0, 2000.0];
 
-/// Returns the logarithm of the probability that no peak states the frequency of a fit's fixture; 0 for fits without a
-/// fixture, and where no peaks were searched.
-pub fn log_unread(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
-    let at = forward
-        .layout
-        .location_of_kind(LocationKind::FixtureFrequency);
-    at.filter(|_| forward.dataset.peaks.band.is_some())
-        .and_then(|at| unread(forward, at, found))
-        .map_or(0.0, f64::ln)
+/// Returns the lowest and the highest frequency (Hz) of a fixture whose resonance was not looked for: above this `end` of
+/// the band.
+pub fn unseen_frequencies(end: f64) -> [f64; 2] {
+    [end, FIXTURES[1].max(4.0 * end)]
 }
 
 /// Returns the fit with those in addition whose fixture has the frequency of a peak; any other as it is. `without` is
-/// the fit without the last effect. The evidence of `fit` is that no peak states the frequency ([`log_unread`]).
+/// the fit without the last effect. `fit` has a fixture above all that was looked at.
 pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {
     let peaks = &forward.dataset.peaks;
-    let at = forward
+    let Some(at) = forward
         .layout
-        .location_of_kind(LocationKind::FixtureFrequency);
-    let (Some(at), Some((low, high))) = (at, peaks.band) else {
+        .location_of_kind(LocationKind::FixtureFrequency)
+    else {
         return fit;
     };
-    let mut all = vec![(fit.log_evidence, fit.best.clone())];
-    let factor = ((high - low) / peaks.all.len().max(1) as f64).ln();
-    for peak in &peaks.all {
-        let search = PeakSearch { forward, at, peak };
-        if let Some((found, own)) = search.best(&fit.best, without) {
-            let strength = own.log_strength(peak, size_std(&found, at));
-            let seen = (1.0 - own.missed()).ln() + strength;
-            let log = found.log_evidence + factor + seen - own.share.ln();
-            all.push((log, found));
+    let [from, to] = unseen_frequencies(peaks.end);
+    let range = (to / FIXTURES[0].min(from)).ln();
+    let mut all = vec![(
+        fit.log_evidence + ((to / from).ln() / range).ln(),
+        fit.best.clone(),
+    )];
+    if let Some((low, high)) = peaks.band {
+        let factor = ((high - low) / range / peaks.all.len().max(1) as f64).ln();
+        for peak in &peaks.all {
+            let search = PeakSearch { forward, at, peak };
+            if let Some((found, own)) = search.best(&fit.best, without) {
+                let strength = own.log_strength(peak, size_std(&found, at));
+                let seen = (1.0 - own.missed()).ln() + strength;
+                let log = found.log_evidence + factor + seen - own.share.ln();
+                all.push((log, found));
+            }
         }
     }
     let logs: Vec<f64> = all.iter().map(|one| one.0).collect();
@@ -254,11 +224,7 @@ impl PeakSearch<'_> {
             let start = self.tuned(start)?;
             let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
             let start = self.tuned(held.optimum.parameters)?;
-            let stated = Prior {
-                low: priors[self.at].low,
-                high: priors[self.at].high,
-                ..Prior::normal(start[self.at], self.peak.std / own.share)
-            };
+            let stated = Prior::normal(start[self.at], self.peak.std / own.share);
             self.with_frequency(&start, priors, stated)
         });
         found.max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
@@ -313,24 +279,6 @@ mod tests {
         assert!((missed(0.0) - 0.5).abs() < 1e-12);
         assert!((missed(1.959_964 * LEVEL_STD) - 0.025).abs() < 1e-6);
         assert!((missed(-1.959_964 * LEVEL_STD) - 0.975).abs() < 1e-6);
-    }
-
-    /// A size that is known is one level; one that may be nothing may have no peak, however strong the peak
-    /// of the best size is.
-    #[test]
-    fn limit_a_size_that_may_be_nothing_may_have_no_peak() {
-        let strong = own(40.0);
-        assert!((strong.missed_by_size(0.02, 1e-9, 0.02) / strong.missed() - 1.0).abs() < 0.01);
-        let doubtful = strong.missed_by_size(0.02, 0.02, 0.02);
-        assert!(
-            doubtful > 1e3 * strong.missed() && doubtful < 0.1,
-            "{doubtful}"
-        );
-        let nowhere = FixtureMode {
-            over: None,
-            ..own(0.0)
-        };
-        assert_eq!(nowhere.missed_by_size(0.02, 0.02, 0.02), 1.0);
     }
 
     /// Over all strengths the density integrates to that of a peak of another cause.

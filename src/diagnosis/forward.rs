@@ -5,6 +5,7 @@ use crate::description::{SectionSlopes, free_slope, mass_slope};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
+use crate::set_up::{Channel, SetUp, loaded};
 use crate::structure::{Arrangement, ModalModel, with_joint};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -79,6 +80,17 @@ impl Model for Forward<'_> {
         } = solution;
         let near = Some(&models[..]);
         self.set_joint_slopes(&models, &mut slopes);
+        if self.layout.has_set_up_error() {
+            // Those of shapes at the nominal optimum are those of the described set-up.
+            for column in 0..self.layout.joint.len() {
+                let change = self.difference(parameters, column, WIDE_STEP, near, &base)?;
+                for (row, observable) in self.observables.iter().enumerate() {
+                    if observable.is_shape() {
+                        slopes[(row, column)] = change[row];
+                    }
+                }
+            }
+        }
         for index in 0..self.layout.effects.len() {
             for (column, step) in self.steps(index, parameters) {
                 if !priors[column].is_held() {
@@ -208,11 +220,12 @@ impl<'a> Forward<'a> {
         let law = self.law(parameters);
         let mut all: Vec<ModalModel> = Vec::with_capacity(self.dataset.arrangements.len());
         for (configuration, arrangement) in self.dataset.arrangements.iter().enumerate() {
-            let nominal = with_joint(&arrangement.specimen, &self.layout.joint, parameters);
+            let (specimen, carried) = loaded(arrangement, &self.layout, parameters);
+            let nominal = with_joint(&specimen, &self.layout.joint, parameters);
             let motion = arrangement.joint_motion.as_ref().zip(law.as_ref());
             let stiffness_changes = motion.map(|(motion, law)| motion.stiffness_changes(law));
             let circumstances = Circumstances {
-                sensors: &arrangement.carried,
+                sensors: &carried,
                 level: self.level(arrangement, stiffness_changes.as_ref(), parameters),
                 ..Circumstances::default()
             };
@@ -224,6 +237,7 @@ impl<'a> Forward<'a> {
             };
             all.push(ModalModel {
                 seen,
+                set_up: SetUp::new(arrangement, &self.layout, parameters),
                 own,
                 frequencies,
                 stiffness_changes,
@@ -254,18 +268,14 @@ impl<'a> Forward<'a> {
                     (frequency > 0.0).then(|| frequency.ln() + own)
                 }
                 ObservableKind::Constant { sensor } => {
-                    Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
+                    Some(place.at_sensor(sensor) * place.displacement(one.set_up.tap?))
                 }
                 ObservableKind::Ratio { sensor, reference } => {
                     Some(place.at_sensor(sensor) / place.at_sensor(reference))
                 }
-                // The bare beam knows of no effect but that of its material.
-                ObservableKind::BeamMass => Some(0.0),
-                ObservableKind::FreeScale => {
-                    let modulus = self.size_of(EffectId::Modulus, parameters);
-                    let same = self.dataset.nominal.uncertainty.has_same_clock;
-                    let clock = if same { one.seen.frequency_scale } else { 1.0 };
-                    Some(0.5 * modulus.ln_1p() + clock.ln())
+                // The bare beam knows of no effect but those of its material and section.
+                ObservableKind::BeamMass | ObservableKind::FreeScale => {
+                    Some(self.of_bar(observable.kind, one.seen.frequency_scale, parameters))
                 }
                 ObservableKind::Slope | ObservableKind::Damping => {
                     let law = self.law(parameters);
@@ -355,6 +365,31 @@ impl<'a> Forward<'a> {
             | ObservableKind::BeamMass
             | ObservableKind::FreeScale => 0.0,
         }
+    }
+
+    /// Returns the logarithm of the mass, or of the free frequencies, of the bar over the nominal ones.
+    fn of_bar(&self, kind: ObservableKind, frequency_scale: f64, parameters: &[f64]) -> f64 {
+        let known = &self.dataset.nominal.uncertainty;
+        let slope = match kind {
+            ObservableKind::BeamMass => mass_slope,
+            _ => free_slope,
+        };
+        let mut log = 0.0;
+        for (effect, property) in [
+            (EffectId::Modulus, Parameter::Modulus),
+            (EffectId::Density, Parameter::Density),
+            (EffectId::Thickness, Parameter::Thickness),
+            (EffectId::Length, Parameter::Length),
+        ] {
+            // A longer bar has a length of its own.
+            if property != Parameter::Length || !known.is_longer {
+                log += slope(property) * self.size_of(effect, parameters).ln_1p();
+            }
+        }
+        if kind == ObservableKind::FreeScale && known.has_same_clock {
+            log += frequency_scale.ln();
+        }
+        log
     }
 
     /// Returns the sum of the sizes of all effects of a kind; 0 without any.
@@ -479,8 +514,14 @@ impl<'a> ModeInPlace<'a> {
         })
     }
 
+    /// What the channel of a sensor shows.
+    fn channel(&self, sensor: usize) -> Channel {
+        self.model.set_up.channels[sensor]
+    }
+
     fn at_sensor(&self, sensor: usize) -> f64 {
-        self.displacement(self.arrangement.sensors[sensor].position)
+        let channel = self.channel(sensor);
+        channel.factor * self.displacement(channel.position)
     }
 
     fn displacement(&self, position: f64) -> f64 {
@@ -512,6 +553,7 @@ impl<'a> ModeInPlace<'a> {
             NuisanceParameter::WidthHold => SectionSlopes::of(&dataset.section.hold, mode),
             NuisanceParameter::Temperature { setup } if setup == arrangement.setup => 1.0,
             NuisanceParameter::Discrepancy { mode: own } if own == mode => 1.0,
+            NuisanceParameter::CommonFactor => 1.0,
             NuisanceParameter::Scatter { configuration }
                 if configuration == self.observable.configuration =>
             {
@@ -584,21 +626,22 @@ impl<'a> ModeInPlace<'a> {
     /// Returns the derivative of the modal constant at a sensor with respect to a nuisance parameter.
     fn constant_slope(&self, sensor: usize, nuisance: NuisanceParameter, predicted: f64) -> f64 {
         let arrangement = self.arrangement;
-        let Some(tap) = arrangement.tap else {
+        let Some(tap) = self.model.set_up.tap else {
             return 0.0;
         };
-        let x = arrangement.sensors[sensor].position;
+        let channel = self.channel(sensor);
+        let x = channel.position;
         match nuisance {
             NuisanceParameter::Gain { setup, name } if self.is_gain(sensor, setup, name) => {
                 predicted
             }
             NuisanceParameter::SensorPosition { position }
-                if arrangement.positions[sensor] == position =>
+                if arrangement.positions[channel.sensor] == position =>
             {
-                self.slope(x) * self.displacement(tap)
+                channel.factor * self.slope(x) * self.displacement(tap)
             }
             NuisanceParameter::TapPosition { setup } if arrangement.setup == setup => {
-                self.displacement(x) * self.slope(tap)
+                channel.factor * self.displacement(x) * self.slope(tap)
             }
             _ => 0.0,
         }
@@ -609,9 +652,9 @@ impl<'a> ModeInPlace<'a> {
         match nuisance {
             NuisanceParameter::Gain { setup, name } if self.is_gain(sensor, setup, name) => 1.0,
             NuisanceParameter::SensorPosition { position }
-                if self.arrangement.positions[sensor] == position =>
+                if self.arrangement.positions[self.channel(sensor).sensor] == position =>
             {
-                let x = self.arrangement.sensors[sensor].position;
+                let x = self.channel(sensor).position;
                 self.slope(x) / self.displacement(x)
             }
             _ => 0.0,

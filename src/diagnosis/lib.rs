@@ -4,20 +4,25 @@
 //! ```text
 //! Observations, Nominal -> observations   common modes, unpaired peaks, checks
 //!                          dataset        data with their uncertainties, nuisance parameters
+//!                          spare          data for the closure alone
 //!                          structure      the described structure, how well it is known, and its modal models
 //!                          description    what an error of the description does to the frequencies
+//!                          set_up         sensors and hammer as a hypothesis has them
 //!                          parameters     effects, priors, order of the parameters
 //!                          forward        predictions of a hypothesis and their slopes
 //!                          evidence       evidence of a hypothesis (with optimum)
+//!                          common_factor  what all frequencies have in common
 //!                          amplitude      joints whose stiffness depends on the amplitude (with joint_motion)
 //!                          fixture        the fixture's own resonance
 //!                          fit            local optima of one hypothesis
+//!                          unknown        evidence of something outside the catalogue
 //!                          validate       residuals, hold-out data, leave-one-recording-out
 //!                          verdict        tests of one explanation, probabilities of all, an answer
 //!                          effect_pairs   two effects at once
 //!                          compare        all hypotheses
 //!                          next_test      the most informative next test
-//!                          summary        the result, with changes along the beam
+//!                          location_map   changes along the beam
+//!                          summary        the result
 //! ```
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
@@ -28,6 +33,7 @@
 //! it.
 
 mod amplitude;
+mod common_factor;
 mod compare;
 mod dataset;
 mod description;
@@ -37,24 +43,29 @@ mod fit;
 mod fixture;
 mod forward;
 mod joint_motion;
+mod location_map;
 mod next_test;
 mod observations;
 mod optimum;
 mod parameters;
 mod result;
+mod set_up;
 mod settings;
+mod spare;
 mod structure;
 mod summary;
 mod synthetic;
 #[cfg(test)]
 mod tests;
+mod unknown;
 mod validate;
 mod verdict;
 
 pub use result::{
-    AmplitudeDependence, Block, Closure, CrossValidation, DecidedBy, Diagnosis, FrequencyChange,
-    Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
-    Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
+    AmplitudeDependence, Block, Closure, CommonFactor, CrossValidation, DecidedBy, Diagnosis,
+    FrequencyChange, Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap,
+    LocationProbabilities, Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors,
+    Verdict,
 };
 pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
 pub use structure::{DescriptionUncertainty, Nominal, NominalSensor};
@@ -87,8 +98,7 @@ pub fn diagnose(
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
     let test = checked(observations, nominal, settings)?;
-    let mut comparison = compare::compare(test)?;
-    verdict::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
+    let comparison = compare::compare(test)?;
     let unlocated = compare::without_unlocated(test);
     Ok(summary::diagnosis(&comparison, unlocated))
 }

@@ -264,6 +264,8 @@ pub struct UnpairedPeaks {
     pub doubtful: Vec<f64>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where no peaks were searched.
     pub band: Option<(f64, f64)>,
+    /// The highest frequency (Hz) that was looked at.
+    pub end: f64,
     /// Configurations whose peaks were searched, with the logarithm of the least modal constant (1/kg) that is read;
     /// `None` where no peak shows it.
     pub searched: BTreeMap<usize, Option<f64>>,
@@ -318,7 +320,13 @@ impl UnpairedPeaks {
             let logs = logs.filter(|log| log.is_finite());
             (*index, logs.min_by(f64::total_cmp))
         });
+        // Frequencies read elsewhere show nothing above the highest.
+        let ends = observations.configurations.iter().flat_map(|one| {
+            let modes = one.modes.iter().map(|mode| mode.frequency);
+            modes.chain(one.band.map(|band| band.1))
+        });
         UnpairedPeaks {
+            end: ends.fold(0.0, f64::max),
             doubtful: doubtful.collect(),
             searched: least.collect(),
             all,

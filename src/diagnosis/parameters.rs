@@ -1,16 +1,20 @@
 //! Parameters of a hypothesis and their priors: joint, effects, and nuisance parameters.
 //!
-//! Every prior of an effect's size reaches zero, so that a little of it is never excluded by definition. Sizes are
-//! mixtures of two normal distributions, half of them where the sign is fixed. The wider has the
-//! standard deviation `scale`, whose double is the catalogue's largest size, the other two fifths of it.
-//! One width alone would make a third of the range implausibly small.
+//! The prior of an effect's size is a half-Cauchy distribution (Gelman 2006, "Prior distributions for variance parameters",
+//! section 3), cut off where the size cannot be, and symmetric where the sign is open. It has one number, `scale`: half of
+//! the sizes are smaller. Four fifths lie between 0.16 and 6.3 times the scale, which is 1.6 decades. It reaches zero, so that
+//! a little of an effect is never excluded by definition, and its tail leaves room for gross errors. The scales come
+//! from what such things weigh and yield, not from any study of the diagnosis; each stands with its reason in
+//! [`candidate_effect`].
 //!
-//! Sizes that belong to the structure are fractions of its own: masses of the beam's mass, springs of
-//! E I/L^3, axial forces of E I/L^2. Those of sensors and clocks are absolute.
+//! Sizes that belong to the structure are fractions of its own: masses of the beam's mass, compliances of L/(E I),
+//! axial forces of E I/L^2. Those of sensors, cables, rules and clocks are absolute.
 
+use crate::dataset::Dataset;
+use crate::fixture::unseen_frequencies;
 use crate::result::LARGEST_STIFFNESS_CHANGE;
-use crate::structure::{Arrangement, COUPLING, Nominal, ROTATION};
-use tapjoint_beam::effects::{Effect, EffectId};
+use crate::structure::{COUPLING, Nominal, ROTATION};
+use tapjoint_beam::effects::{Effect, EffectId, Group};
 use tapjoint_identify::consistent::Parameter;
 
 /// Nuisance parameter: small, unknown, and shared by all hypotheses. Its influence is linear.
@@ -55,6 +59,8 @@ pub enum NuisanceParameter {
     Scatter { configuration: usize },
     /// What the model misses of one mode's frequency, in all configurations alike (logarithm).
     Discrepancy { mode: usize },
+    /// Factor on all frequencies (logarithm).
+    CommonFactor,
 }
 
 impl NuisanceParameter {
@@ -115,15 +121,44 @@ impl Prior {
     }
 }
 
+/// Part of the set-up on which an effect acts. Indices are those of the dataset's inventory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// The structure, or all sensors alike.
+    All,
+    /// A sensor, by the index of its name.
+    Sensor { name: usize },
+    /// A sensor at one of its stated positions, by the index of the position.
+    Place { position: usize },
+    /// Two sensors, by the indices of their names.
+    Pair { names: [usize; 2] },
+    /// Taps at one of their stated positions, by its index.
+    Taps { tap: usize },
+}
+
 /// Effect with the priors of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateEffect {
     /// The effect.
     pub effect: EffectId,
+    /// What it acts on.
+    pub target: Target,
     /// Parameter that is zero when there is no such effect.
     pub size: Size,
     /// Second parameter, for its location or its law, if it has one.
     pub location: Option<LocationRange>,
+}
+
+impl CandidateEffect {
+    /// Returns an error of the set-up.
+    fn of_set_up(effect: EffectId, target: Target, size: Size) -> Self {
+        CandidateEffect {
+            effect,
+            target,
+            size,
+            location: None,
+        }
+    }
 }
 
 /// Prior of an effect's size.
@@ -131,7 +166,7 @@ pub struct CandidateEffect {
 pub struct Size {
     /// Name of the effect's parameter.
     pub name: &'static str,
-    /// Standard deviation of the widest part (SI).
+    /// Size that half of all effects of the kind do not reach (SI).
     pub scale: f64,
     /// Value without the effect: 0, or that of the nominal model.
     pub neutral: f64,
@@ -165,6 +200,8 @@ pub enum LocationKind {
     Exponent,
     /// Radius of gyration of a mass at the joint (m), uniform in its logarithm.
     Gyration,
+    /// Translational compliance of a joint that is described as rigid (1), uniform in its logarithm.
+    Translation,
 }
 
 impl LocationRange {
@@ -193,6 +230,7 @@ impl LocationRange {
             LocationKind::FixtureFrequency => "frequency",
             LocationKind::Exponent => "exponent",
             LocationKind::Gyration => "inertia",
+            LocationKind::Translation => "translation",
         }
     }
 
@@ -213,28 +251,30 @@ impl LocationRange {
     pub fn is_logarithmic(self) -> bool {
         matches!(
             self.kind,
-            LocationKind::FixtureFrequency | LocationKind::Gyration
+            LocationKind::FixtureFrequency | LocationKind::Gyration | LocationKind::Translation
         )
     }
 }
 
-/// Standard deviations of the parts of a size's prior, as shares of its scale.
-const WIDTHS: [f64; 2] = [1.0, 0.4];
-
 impl Size {
-    /// Returns the logarithm of the prior density (1 over the unit of the size).
+    /// Returns the logarithm of the prior density (1 over the unit of the size); 0 for a size that is fixed.
     pub fn log_density(&self, value: f64) -> f64 {
+        if self.is_fixed() {
+            return 0.0;
+        }
         if value < self.low || value > self.high {
             return f64::NEG_INFINITY;
         }
-        let parts = WIDTHS.iter().map(|width| {
-            let std = width * self.scale;
-            let away = (value - self.neutral) / std;
-            (-0.5 * away * away).exp() / (std * (2.0 * std::f64::consts::PI).sqrt())
-        });
-        let density: f64 = parts.sum::<f64>() / WIDTHS.len() as f64;
-        let sides: f64 = if self.low >= self.neutral { 2.0 } else { 1.0 };
-        (sides * density).ln()
+        // Cauchy's distribution between the bounds.
+        let [low, high, away] =
+            [self.low, self.high, value].map(|x| (x - self.neutral) / self.scale);
+        let within = high.atan() - low.atan();
+        -(within * self.scale * (1.0 + away * away)).ln()
+    }
+
+    /// Returns whether there is but one size: an effect that is there or not.
+    pub fn is_fixed(&self) -> bool {
+        self.low >= self.high
     }
 
     /// Returns a size next to nothing, at which slopes with respect to a location do not vanish yet.
@@ -249,6 +289,24 @@ impl Size {
         }
     }
 
+    /// Returns the size of an effect that is there or not.
+    fn fixed(name: &'static str) -> Self {
+        Size {
+            low: 1.0,
+            ..Size::signed(name, 1.0, 1.0)
+        }
+    }
+
+    /// Returns the distance (m) of a place from where it is stated, both on a beam of this length (m): half of all that are
+    /// misread are within 5 mm.
+    fn offset(stated: f64, length: f64) -> Self {
+        Size {
+            low: -stated,
+            high: (length - stated).max(0.0),
+            ..Size::signed("offset", 0.005, length)
+        }
+    }
+
     fn signed(name: &'static str, scale: f64, reach: f64) -> Self {
         Size {
             name,
@@ -260,36 +318,56 @@ impl Size {
     }
 }
 
-/// Returns an effect with its priors; `None` for an effect that is no hypothesis of this kind (joint drift changes the
-/// spread of a nuisance parameter and not a prediction).
-pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<CandidateEffect> {
+/// Returns an effect of the structure or of the clock with its priors; `None` for an effect that is no hypothesis of this
+/// kind: joint drift changes the spread of a nuisance parameter and not a prediction, and an error of the set-up has a
+/// target. `end` is the highest frequency (Hz) that was looked at.
+pub fn candidate_effect(effect: EffectId, nominal: &Nominal, end: f64) -> Option<CandidateEffect> {
     let (length, mass) = (nominal.length(), nominal.beam_mass());
     let spring = nominal.bending_stiffness() / length.powi(3);
     let force = nominal.bending_stiffness() / length.powi(2);
     let size = match effect {
-        EffectId::SensorMass => Size::positive("mass", 0.015, 0.3 * mass),
-        EffectId::SensorCable => Size::positive("stiffness", 0.15 * spring, 3.0 * spring),
-        EffectId::CrossCoupling => Size::signed("coupling", 0.2, 0.95),
-        EffectId::JointMass => Size::positive("mass", 0.06 * mass, 0.6 * mass),
-        EffectId::JointNonlinearity => Size::signed("ratio", 0.1, LARGEST_STIFFNESS_CHANGE),
-        EffectId::JointDamping => Size::positive("loss_factor", 0.05, 0.5),
-        EffectId::Fixture => Size::positive("ratio", 0.05, 0.5),
-        EffectId::Modulus => Size::signed("relative", 0.03, 0.3),
-        EffectId::Length => Size::signed("relative", 0.007, 0.1),
-        EffectId::Density => Size::signed("relative", 0.03, 0.3),
-        EffectId::Thickness => Size::signed("relative", 0.015, 0.2),
-        EffectId::Timebase => Size::signed("relative", 0.001, 0.05),
-        EffectId::AddedMass => Size::positive("mass", 0.02 * mass, 0.3 * mass),
-        EffectId::LocalCrack => Size::positive("compliance", 0.025, 0.5),
+        // Accelerometers weigh 0.5 g (miniature) to 50 g (seismic).
+        EffectId::SensorMass => Size::positive("mass", 0.005, 0.3 * mass),
+        // A coaxial cable, E I of 1e-3 to 1e-2 N m2 over 0.1 to 0.3 m, to a rubber band.
+        EffectId::SensorCable => Size::positive("stiffness", 30.0, 3.0 * spring),
+        // 0 for symmetric bolts; sqrt(3)/2 for a bed of springs that begins at the beam's root.
+        EffectId::CrossCoupling => Size::signed("coupling", 0.1, 0.95),
+        // Bolt, nut and washers beside a beam that they hold.
+        EffectId::JointMass => Size::positive("mass", 0.03 * mass, 0.6 * mass),
+        // Bolted joints soften by 0.2 to 20 % from a tap to a hard tap.
+        EffectId::JointNonlinearity => Size::signed("ratio", 0.03, LARGEST_STIFFNESS_CHANGE),
+        // Loss factors of bolted joints: 0.002 to 0.1.
+        EffectId::JointDamping => Size::positive("loss_factor", 0.01, 0.5),
+        // A vice is a hundred times stiffer than the joint on it, a table ten times.
+        EffectId::Fixture => Size::positive("ratio", 0.02, 0.5),
+        // Tables of one kind of alloy differ by so much; the direction of rolling adds as much.
+        EffectId::Modulus | EffectId::Density => Size::signed("relative", 0.02, 0.3),
+        // Rolled strip: ISO 9445 and EN 10029 allow 1 to 8 %.
+        EffectId::Thickness => Size::signed("relative", 0.01, 0.2),
+        // Where a clamp begins to hold is known to some millimetres.
+        EffectId::Length => Size::signed("relative", 0.005, 0.1),
+        // Crystals are good to 5e-5; a rate typed from memory is not.
+        EffectId::Timebase => Size::signed("relative", 0.0005, 0.2),
+        // Glue, tape, a nut or a magnet.
+        EffectId::AddedMass => Size::positive("mass", 0.01 * mass, 0.3 * mass),
+        // A crack a third of the thickness deep, h/L = 0.012 (Tada, Paris & Irwin: c E I/L = 6 pi h/L F).
+        EffectId::LocalCrack => Size::positive("compliance", 0.01, 0.5),
         EffectId::AxialLoad => Size {
             // A beam on springs buckles at P L^2/(E I) = -pi^2/4 or above.
             low: -1.5 * force,
-            ..Size::signed("force", 0.2 * force, 5.0 * force)
+            // A beam's own weight makes 0.01, a clamp that was tightened askew 0.1.
+            ..Size::signed("force", 0.05 * force, 5.0 * force)
         },
-        EffectId::ShearRotary => Size::positive("factor", 1.5, 10.0),
+        // What Timoshenko's beam says is 1; layers and holes make it more.
+        EffectId::ShearRotary => Size::positive("factor", 1.0, 10.0),
         EffectId::Resolution => Size::signed("offset", 0.125, 2.0),
+        // Clamps described as rigid: E I/L over their stiffness is 0.005 to 0.1, and E I/L^3 a thirtieth of it.
+        EffectId::JointCompliance => match nominal.rigid_directions() {
+            [_, true] => Size::positive("rotation", 0.02, 5.0),
+            [true, false] => Size::positive("translation", 0.0007, 0.5),
+            [false, false] => return None,
+        },
         EffectId::JointDrift
-        | EffectId::JointCompliance
         | EffectId::SensorPosition
         | EffectId::SensorPolarity
         | EffectId::SensorSwap
@@ -299,13 +377,20 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<Candidate
     let range = match effect {
         EffectId::JointMass => Some((LocationKind::Gyration, 0.003, 0.03, 2)),
         EffectId::JointNonlinearity => Some((LocationKind::Exponent, 0.5, 2.0, 3)),
-        EffectId::Fixture => Some((LocationKind::FixtureFrequency, 30.0, 2000.0, 14)),
+        EffectId::Fixture => {
+            let [from, to] = unseen_frequencies(end);
+            Some((LocationKind::FixtureFrequency, from, to, 6))
+        }
         EffectId::AddedMass => Some((LocationKind::Position, 0.01 * length, length, 12)),
         EffectId::LocalCrack => Some((LocationKind::Position, 0.01 * length, length, 18)),
+        EffectId::JointCompliance if nominal.rigid_directions() == [true; 2] => {
+            Some((LocationKind::Translation, 1e-6, 0.1, 4))
+        }
         _ => None,
     };
     Some(CandidateEffect {
         effect,
+        target: Target::All,
         size,
         location: range.map(|(kind, low, high, nodes)| LocationRange {
             kind,
@@ -316,32 +401,117 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal) -> Option<Candidate
     })
 }
 
-/// Returns the effects that can be hypotheses for a test: those whose object it has.
-pub fn candidate_effects(nominal: &Nominal, arrangements: &[Arrangement]) -> Vec<CandidateEffect> {
+/// Returns the effects that can be hypotheses for a test: those whose object it has. An effect that may act on several
+/// things has a variant for each.
+pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
+    let (nominal, arrangements) = (&dataset.nominal, &dataset.arrangements);
     let has_joint = nominal.has_joint();
     let has_clamp = has_joint && nominal.is_one_beam();
+    let gives = !nominal.fitted_springs().is_empty();
     let possible = EffectId::ALL.into_iter().filter(|effect| {
         let mut sensors = arrangements.iter().flat_map(|one| &one.carried);
         match effect {
             EffectId::SensorMass => sensors.any(|sensor| sensor.mass == 0.0),
             EffectId::SensorCable => sensors.next().is_some(),
-            EffectId::CrossCoupling => has_clamp && !nominal.fits(COUPLING),
+            EffectId::CrossCoupling => {
+                has_clamp && !nominal.fits(COUPLING) && nominal.fitted_springs().len() == 2
+            }
             // No force pulls on a free end, nor on beams that overlap.
-            EffectId::Fixture | EffectId::AxialLoad => has_clamp,
-            EffectId::JointMass | EffectId::JointDamping => has_joint,
+            EffectId::AxialLoad => has_clamp,
+            EffectId::Fixture => has_clamp && nominal.fits(ROTATION),
+            // What is held rigidly neither moves nor dissipates.
+            EffectId::JointMass | EffectId::JointDamping => has_joint && gives,
             EffectId::JointNonlinearity => nominal.fits(ROTATION),
+            EffectId::JointCompliance => has_joint,
             EffectId::Resolution => nominal.reading_bias.is_some(),
             _ => true,
         }
     });
-    let candidates = possible.filter_map(|effect| {
-        let mut candidate = candidate_effect(effect, nominal)?;
-        if let (EffectId::Resolution, Some(bias)) = (effect, nominal.reading_bias) {
-            candidate.size.scale = bias;
+    let mut all: Vec<Vec<CandidateEffect>> = Vec::new();
+    for effect in possible {
+        if effect.group() == Group::SetUp {
+            all.push(set_up_errors(effect, dataset));
+        } else if let Some(mut candidate) = candidate_effect(effect, nominal, dataset.peaks.end) {
+            if let (EffectId::Resolution, Some(bias)) = (effect, nominal.reading_bias) {
+                candidate.size.scale = bias;
+            }
+            all.push(vec![candidate]);
         }
-        Some(candidate)
-    });
-    candidates.collect()
+    }
+    all.retain(|variants| !variants.is_empty());
+    all
+}
+
+/// Returns an error of the set-up for everything that it may act on. Only shapes and modal constants show it.
+fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
+    let (inventory, length) = (&dataset.inventory, dataset.nominal.length());
+    let [has_constants, has_ratios] = dataset.kinds_of_shapes();
+    let names = 0..inventory.names.len();
+    let several = names.len() > 1;
+    let mut all = Vec::new();
+    match effect {
+        // A rule is misread by a centimetre, or the wrong end of the sensor is meant.
+        EffectId::SensorPosition if has_constants || has_ratios => {
+            for (position, (_, stated)) in inventory.positions.iter().enumerate() {
+                all.push(CandidateEffect::of_set_up(
+                    effect,
+                    Target::Place { position },
+                    Size::offset(*stated, length),
+                ));
+            }
+        }
+        EffectId::TapPosition if has_constants => {
+            for (tap, stated) in inventory.taps.iter().enumerate() {
+                all.push(CandidateEffect::of_set_up(
+                    effect,
+                    Target::Taps { tap },
+                    Size::offset(*stated, length),
+                ));
+            }
+        }
+        EffectId::SensorPolarity if has_constants || has_ratios => {
+            for name in names {
+                all.push(CandidateEffect::of_set_up(
+                    effect,
+                    Target::Sensor { name },
+                    Size::fixed("flipped"),
+                ));
+            }
+        }
+        EffectId::SensorSwap if several => {
+            for first in names.clone() {
+                for second in first + 1..names.end {
+                    let names = [first, second];
+                    all.push(CandidateEffect::of_set_up(
+                        effect,
+                        Target::Pair { names },
+                        Size::fixed("swapped"),
+                    ));
+                }
+            }
+        }
+        // A wrong sheet, 10 % from sensor to sensor; a wrong unit is a factor of 9.81 or 10.
+        EffectId::SensorScale => {
+            let size = Size {
+                low: -0.95,
+                ..Size::signed("relative", 0.1, 20.0)
+            };
+            if has_constants {
+                all.push(CandidateEffect::of_set_up(effect, Target::All, size));
+            }
+            if several {
+                for name in names {
+                    all.push(CandidateEffect::of_set_up(
+                        effect,
+                        Target::Sensor { name },
+                        size,
+                    ));
+                }
+            }
+        }
+        _ => {}
+    }
+    all
 }
 
 /// Order of the parameters of a hypothesis: joint, effects (size and location of each), nuisance parameters.
@@ -392,13 +562,28 @@ impl Layout {
         self.location(effect)
     }
 
+    /// Returns whether one of its effects is an error of the set-up.
+    pub fn has_set_up_error(&self) -> bool {
+        let mut effects = self.effects.iter();
+        effects.any(|one| one.effect.group() == Group::SetUp)
+    }
+
     /// Returns the effects with the values that the parameters give them.
     pub fn effects_at(&self, parameters: &[f64]) -> Option<Vec<Effect>> {
         (0..self.effects.len())
             .map(|index| {
                 let candidate = &self.effects[index];
                 let size = parameters[self.size(index)];
+                if candidate.size.is_fixed() {
+                    return Effect::from_pairs(candidate.effect, &[]).ok();
+                }
                 let mut pairs = vec![(candidate.size.name, size)];
+                // A joint that is rigid in translation alone does not turn the more.
+                if candidate.effect == EffectId::JointCompliance
+                    && candidate.size.name != "rotation"
+                {
+                    pairs.push(("rotation", 0.0));
+                }
                 if let (Some(range), Some(location)) = (candidate.location, self.location(index)) {
                     let value = range.value_at(parameters[location]);
                     pairs.push((range.name(), range.own_value(value, size)));

@@ -38,6 +38,10 @@ pub struct Diagnosis {
     pub fitted_modes: usize,
     /// Fit of the described model without sensors of unknown position; `None` where all positions are known.
     pub unlocated: Option<UnlocatedSensors>,
+    /// Common factor that the frequencies ask for; `None` where they do not fix it.
+    pub common_factor: Option<CommonFactor>,
+    /// Why no data could be spared for the closure; `None` where some were.
+    pub closure_reason: Option<String>,
     /// Tests that would decide between the hypotheses, those with most information per cost first.
     pub next_tests: Vec<NextTest>,
 }
@@ -191,8 +195,16 @@ pub struct HypothesisResult {
     /// Root mean square error that the measurement uncertainty of the hold-out frequencies alone would leave (%).
     #[serde(rename = "withheld_floor")]
     pub holdout_floor: Option<f64>,
-    /// Share of the gap on hold-out data that the hypothesis closes; `None` where the gap is below
-    /// two noise floors.
+    /// Share of the gap on those frequencies that the hypothesis closes, which is a condition for its name; `None` where the
+    /// gap is below two noise floors.
+    pub withheld_closure: Option<Closure>,
+    /// Root mean square error under the nominal model of the frequencies that are spared for the closure (%); `None` where
+    /// neither two modes nor two recordings can be spared.
+    pub spare_before: Option<f64>,
+    /// That error under this hypothesis (%).
+    pub spare_after: Option<f64>,
+    /// Share of the gap that the hypothesis closes on the spared frequencies, which take no part in anything else; `None`
+    /// where there are none, or the gap is below two noise floors.
     pub closure: Option<Closure>,
     /// Each recording predicted from the others; `None` with fewer than three, and for improbable hypotheses.
     #[serde(rename = "left_out_recordings")]
@@ -259,6 +271,19 @@ pub struct ParameterValue {
     /// none would, and for parameters other than sizes.
     #[serde(rename = "smallest_isolable")]
     pub smallest_separable: Option<f64>,
+}
+
+/// Factor on all frequencies that would suit the data best, if the description were exact.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct CommonFactor {
+    /// Measured over described frequencies, less 1 (%).
+    pub percent: f64,
+    /// Its standard uncertainty (%).
+    pub std_percent: f64,
+    /// Standard uncertainty of the same factor by the description's tolerances, by weight and free test (%).
+    pub tolerance_percent: f64,
+    /// Distance from what the description says, in standard deviations of both together.
+    pub deviation: f64,
 }
 
 /// Share of a gap that is closed.

@@ -122,6 +122,11 @@ pub struct GapSettings {
     pub withhold_from: usize,
     /// Number of the highest modes that are held out: 1.
     pub withheld_modes: usize,
+    /// Number of modes from which on the two highest are spared for the closure alone: 8, so that five are left to fit and one
+    /// to test.
+    pub spare_modes_from: usize,
+    /// Number of recordings from which on two are spared for the closure alone, if others were taken alike: 6, so that four are left.
+    pub spare_recordings_from: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
     /// Seed of random draws.
@@ -178,6 +183,8 @@ impl Default for GapSettings {
             highest_mode: 10,
             withhold_from: 6,
             withheld_modes: 1,
+            spare_modes_from: 8,
+            spare_recordings_from: 6,
             unknown_positions: 12,
             seed: 0,
         }
@@ -285,9 +292,6 @@ pub const SECOND_EFFECT: f64 = 5.0;
 pub const PROMISED_BY_SECOND: f64 = 2.0 * SECOND_EFFECT;
 /// Least number of data for which pairs of effects are tried.
 pub const LEAST_DATA_FOR_PAIRS: usize = 6;
-/// Hold-out error over its standard uncertainty up to which two effects may be named (1): chance alone
-/// exceeds it in 3 of 1000 cases (Gaussian, one mode of common error).
-pub const MISSED_HOLDOUT: f64 = 3.0;
 
 // Probabilities and the verdict.
 
@@ -295,6 +299,11 @@ pub const MISSED_HOLDOUT: f64 = 3.0;
 /// effect too small to be noticed is as good as none; and most of the dozen things that may be wrong
 /// with a test are right.
 pub const NO_GAP_PRIOR: f64 = 4.0;
+/// Prior probability that a joint that is described as rigid gives, over that of one group of effects: all clamps give,
+/// and how much matters is the question.
+pub const RIGID_PRIOR: f64 = 4.0;
+/// Standard deviations of an effect's size from zero from which on it is a name: what is within two is as good as none.
+pub const SIZED: f64 = 2.0;
 /// Chi square below which two hypotheses count as one on these data: three standard deviations.
 pub const SEPARATE: f64 = 9.0;
 /// Probability from which on an effect is named.

@@ -5,6 +5,7 @@
 use crate::joint_motion::{
     JointMotion, ModeAmplitude, StiffnessChanges, initial_amplitude, log_stiffness,
 };
+use crate::set_up::SetUp;
 use crate::settings::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -118,6 +119,11 @@ impl Nominal {
         directions.filter(|one| *one != COUPLING).collect()
     }
 
+    /// Returns whether the joint is described as rigid: in translation, and in rotation.
+    pub(crate) fn rigid_directions(&self) -> [bool; 2] {
+        self.specimen.joint_stiffnesses().map(f64::is_infinite)
+    }
+
     /// Returns whether a parameter of the joint is fitted.
     pub(crate) fn fits(&self, direction: usize) -> bool {
         self.joint_parameters().iter().any(|one| one.0 == direction)
@@ -184,6 +190,8 @@ pub struct Arrangement {
     pub positions: Vec<usize>,
     /// Position of the taps (m).
     pub tap: Option<f64>,
+    /// Index of that position among all stated ones.
+    pub tap_index: Option<usize>,
     /// Amplitude over that of the hardest configuration (1).
     pub level: f64,
     /// Tap force over that of the hardest configuration (1), where it was measured.
@@ -201,7 +209,7 @@ pub struct Arrangement {
 }
 
 /// Sensors and masses of all configurations, each once.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Inventory {
     /// Names of the sensors.
     pub names: Vec<String>,
@@ -209,6 +217,8 @@ pub struct Inventory {
     pub positions: Vec<(usize, f64)>,
     /// Known added masses.
     pub fastened: Vec<PointMass>,
+    /// Stated positions of the taps (m).
+    pub taps: Vec<f64>,
 }
 
 /// Returns the index of a value in a list, which grows where it is new.
@@ -256,6 +266,9 @@ impl Arrangement {
             names,
             positions,
             tap: configuration.tap,
+            tap_index: configuration
+                .tap
+                .map(|tap| index_in(&mut inventory.taps, tap)),
             level: configuration.level.unwrap_or(1.0),
             known_level: configuration.level,
             spans: configuration.modes.iter().filter_map(span).collect(),
@@ -370,6 +383,8 @@ fn common_scatter(configuration: &Configuration) -> BTreeMap<usize, f64> {
 pub struct ModalModel {
     /// The structure with its effects.
     pub seen: Seen,
+    /// Where sensors and hammer are.
+    pub set_up: SetUp,
     /// Its modes, or those of a structure next to it.
     pub own: Arc<BeamModes>,
     /// Its frequencies (Hz), where the modes are those of a structure next to it.

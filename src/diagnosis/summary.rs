@@ -1,22 +1,20 @@
 //! The result: from the comparison of the hypotheses to every stated number.
 
 use crate::amplitude::amplitude_dependence;
+use crate::common_factor::common_factor;
 use crate::compare::ModelComparison;
 use crate::dataset::Dataset;
 use crate::description::property_of;
 use crate::evidence::{Fit, log_likelihood};
-use crate::forward::Forward;
+use crate::location_map::location_map;
 use crate::next_test::next_tests;
-use crate::optimum::{LinearModel, Optimum, maximise};
-use crate::parameters::{LocationKind, NuisanceParameter, Prior};
+use crate::parameters::{LocationKind, NuisanceParameter, Target};
 use crate::result::{
-    CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LocationMap,
+    CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
     ParameterValue, UnlocatedSensors, Verdict,
 };
-use crate::settings::{
-    CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, LEAST_MAP_DATA, MISFIT, SEPARATE,
-};
-use crate::structure::{COUPLING, ModalModel};
+use crate::settings::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
+use crate::structure::COUPLING;
 use crate::validate::{
     HoldoutErrors, LeftOutErrors, Residuals, closure, frequency_residuals, noise_floor,
 };
@@ -24,10 +22,8 @@ use crate::verdict::{
     Candidate, DegreesOfFreedom, GoodnessOfFit, best_known, confounded, delta_chi_square,
     location_probabilities, none_of, verdict,
 };
-use nalgebra::DMatrix;
 use tapjoint_beam::Beam;
-use tapjoint_beam::effects::EffectId;
-use tapjoint_beam::specimen::Body;
+use tapjoint_beam::effects::{Effect, EffectId};
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Returns the result of a comparison.
@@ -43,7 +39,7 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
     let mut tested = GoodnessOfFit::new(dataset, fit);
     if let Some(tested) = &mut tested {
         tested.freedom = Some(DegreesOfFreedom::of(dataset, fit));
-        tested.closure = hypotheses[best].closure;
+        tested.closure = hypotheses[best].withheld_closure;
         let errors = HoldoutErrors::new(dataset, fit).zip(reference.holdout_before.as_ref());
         tested.is_decisive = errors.is_some_and(|(after, before)| after.are_decisive(before));
     }
@@ -78,6 +74,14 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         decided_by: decided_by(dataset, candidates),
         amplitude_dependence: amplitude_dependence(dataset, &comparison.baseline),
         fitted_modes: dataset.fitted_modes,
+        common_factor: common_factor(dataset),
+        closure_reason: dataset.spare.is_empty().then(|| {
+            format!(
+                "neither two modes nor two recordings can be spared: that needs {} modes, or {} recordings of which two \
+                 repeat the sensors of others",
+                dataset.settings.spare_modes_from, dataset.settings.spare_recordings_from
+            )
+        }),
         unlocated,
     }
 }
@@ -110,6 +114,7 @@ struct Reference<'a> {
     comparison: &'a ModelComparison,
     before: Option<Residuals>,
     holdout_before: Option<HoldoutErrors>,
+    spare_before: Option<HoldoutErrors>,
     left_out_before: Option<LeftOutErrors>,
 }
 
@@ -120,6 +125,7 @@ impl<'a> Reference<'a> {
             comparison,
             before: Residuals::new(dataset, &comparison.described),
             holdout_before: HoldoutErrors::new(dataset, &comparison.drifting),
+            spare_before: HoldoutErrors::on(&dataset.spare, dataset, &comparison.drifting),
             left_out_before: LeftOutErrors::new(dataset, &comparison.drifting),
         }
     }
@@ -130,6 +136,7 @@ impl<'a> Reference<'a> {
         let fit = (!candidate.is_unknown()).then_some(&candidate.fit);
         let residuals = fit.and_then(|fit| Residuals::new(dataset, fit));
         let holdout = fit.and_then(|fit| HoldoutErrors::new(dataset, fit));
+        let spare = fit.and_then(|fit| HoldoutErrors::on(&dataset.spare, dataset, fit));
         let none = none_of(candidates).map(|none| none.fit.log_evidence);
         let before = self.before.as_ref();
         let layout = dataset.layout(&candidate.fit.effects);
@@ -149,12 +156,16 @@ impl<'a> Reference<'a> {
             holdout_before: self.holdout_before.as_ref().map(HoldoutErrors::rms),
             holdout_after: holdout.as_ref().map(HoldoutErrors::rms),
             holdout_floor: holdout.as_ref().map(HoldoutErrors::floor),
-            closure: (self.holdout_before.as_ref().zip(holdout.as_ref()))
+            withheld_closure: (self.holdout_before.as_ref().zip(holdout.as_ref()))
+                .and_then(|(before, after)| closure(before, after, dataset.settings.seed)),
+            spare_before: self.spare_before.as_ref().map(HoldoutErrors::rms),
+            spare_after: spare.as_ref().map(HoldoutErrors::rms),
+            closure: (self.spare_before.as_ref().zip(spare.as_ref()))
                 .and_then(|(before, after)| closure(before, after, dataset.settings.seed)),
             cross_validation: self.cross_validation(candidate),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             misfit: residuals.as_ref().map(Residuals::misfit),
-            effects: layout.effects_at(parameters).unwrap_or_default(),
+            effects: effects_of(dataset, &candidate.fit),
             coupling: coupling.map_or(0.0, |k| parameters[k]),
             beam: Some(fitted_beam(dataset, &parameters[layout.first_nuisance()..])),
             ..HypothesisResult::default()
@@ -211,11 +222,17 @@ impl<'a> Reference<'a> {
             let at = layout.size(k);
             let (size, size_std) = (values[at], stds[at]);
             let detectable = DETECTABLE.sqrt() * size_std;
-            parameters.push(ParameterValue {
-                smallest_detectable: Some(detectable).filter(|size| size.is_finite()),
-                smallest_separable: self.smallest_separable(candidate, size - effect.size.neutral),
-                ..value_of(effect.effect, effect.size.name, size, Some(size_std))
-            });
+            if !effect.size.is_fixed() {
+                parameters.push(ParameterValue {
+                    smallest_detectable: Some(detectable).filter(|size| size.is_finite()),
+                    smallest_separable: self
+                        .smallest_separable(candidate, size - effect.size.neutral),
+                    ..value_of(effect.effect, effect.size.name, size, Some(size_std))
+                });
+            }
+            for (name, number) in numbers_of(&self.comparison.dataset, effect.target) {
+                parameters.push(value_of(effect.effect, name, number as f64, None));
+            }
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
                 let value = range.value_at(values[location]);
                 let scale = if range.is_logarithmic() { value } else { 1.0 };
@@ -250,6 +267,63 @@ impl<'a> Reference<'a> {
     }
 }
 
+/// Returns the numbers of the sensors and recordings on which an effect acts, by the names of its parameters. They count
+/// from 1; 0 means all.
+fn numbers_of(dataset: &Dataset, target: Target) -> Vec<(&'static str, usize)> {
+    let inventory = &dataset.inventory;
+    let mut arrangements = dataset.arrangements.iter();
+    match target {
+        Target::All => Vec::new(),
+        Target::Sensor { name } => vec![("sensor", number_of(dataset, name))],
+        Target::Pair { names } => vec![
+            ("sensor", number_of(dataset, names[0])),
+            ("other", number_of(dataset, names[1])),
+        ],
+        Target::Place { position } => {
+            let name = inventory.positions[position].0;
+            let same = inventory.positions.iter().filter(|one| one.0 == name);
+            let first = arrangements.find(|one| one.positions.contains(&position));
+            let recording = first.filter(|_| same.count() > 1);
+            let recording = recording.map_or(0, |one| one.setup + 1);
+            vec![
+                ("sensor", number_of(dataset, name)),
+                ("recording", recording),
+            ]
+        }
+        Target::Taps { tap } => {
+            let first = arrangements.find(|one| one.tap_index == Some(tap));
+            let recording = first.filter(|_| inventory.taps.len() > 1);
+            vec![("recording", recording.map_or(0, |one| one.setup + 1))]
+        }
+    }
+}
+
+/// Returns the number of a sensor in the description, by the index of its name.
+fn number_of(dataset: &Dataset, name: usize) -> usize {
+    let own = &dataset.inventory.names[name];
+    let mut sensors = dataset.nominal.sensors.iter();
+    sensors.position(|one| one.name == *own).unwrap_or(name) + 1
+}
+
+/// Returns the effects of a fit, with the numbers of what they act on.
+fn effects_of(dataset: &Dataset, fit: &Fit) -> Vec<Effect> {
+    let layout = dataset.layout(&fit.effects);
+    let mut effects = layout.effects_at(fit.parameters()).unwrap_or_default();
+    for (effect, candidate) in effects.iter_mut().zip(&fit.effects) {
+        for (name, number) in numbers_of(dataset, candidate.target) {
+            if let Ok(numbered) = effect.with(name, number as f64) {
+                *effect = numbered;
+            }
+        }
+        if candidate.effect == EffectId::SensorScale && candidate.target == Target::All {
+            *effect = effect
+                .with("sensor", 0.0)
+                .unwrap_or_else(|_| effect.clone());
+        }
+    }
+    effects
+}
+
 /// Returns the first beam with the properties that these values of the nuisance parameters give it.
 fn fitted_beam(dataset: &Dataset, values: &[f64]) -> Beam {
     let mut beam = dataset.nominal.specimen.body.beams()[0];
@@ -279,131 +353,4 @@ fn value_of(effect: EffectId, name: &'static str, value: f64, std: Option<f64>) 
         smallest_detectable: None,
         smallest_separable: None,
     }
-}
-
-// Map along the beam: stiffness or mass that the residual calls for, whatever the cause.
-//
-// The beam is cut into pieces. A relative change e_j of the bending stiffness of piece j moves ln f of
-// a mode by half of that piece's share of its bending energy, a change of its mass by minus half of its
-// share of the kinetic energy. The changes that explain the residual of the nominal model are found by
-// regularised least squares, beside the joint and all nuisance parameters.
-
-/// Pieces of the beam: twice as many as half waves of the sixth mode.
-const PIECES: usize = 12;
-/// Points in each piece for its share of the energies.
-const PIECE_POINTS: usize = 8;
-/// Standard deviation of a piece's change before the data, if all pieces change (1).
-const CHANGE_STD: f64 = 0.1;
-/// Standard deviation of the change of a single piece (1): wide, since its place counts and not its size.
-const SINGLE_CHANGE_STD: f64 = 3.0;
-
-/// Returns the map of the nominal fit's residual; `None` with fewer than four frequencies.
-fn location_map(dataset: &Dataset, nominal: &Fit) -> Option<LocationMap> {
-    if dataset.frequencies().count() < LEAST_MAP_DATA {
-        return None;
-    }
-    let length = dataset.nominal.length();
-    let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
-    let mut slopes = [0, 1].map(|_| DMatrix::zeros(dataset.observables.len(), PIECES));
-    for row in dataset.frequencies() {
-        let observable = &dataset.observables[row];
-        let model = &models[observable.configuration];
-        if let Some(index) = model.index(observable.mode) {
-            for piece in 0..PIECES {
-                let own = local_slopes(model, index, piece, length);
-                for (slopes, own) in slopes.iter_mut().zip(own) {
-                    slopes[(row, piece)] = own;
-                }
-            }
-        }
-    }
-    let (stiffness, stiffness_std) = changes(dataset, nominal, &slopes[0])?;
-    let (mass, mass_std) = changes(dataset, nominal, &slopes[1])?;
-    let piece = length / PIECES as f64;
-    Some(LocationMap {
-        positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
-        stiffness,
-        stiffness_std,
-        mass,
-        mass_std,
-        stiffness_explains: explained(dataset, nominal, &slopes[0])?,
-        mass_explains: explained(dataset, nominal, &slopes[1])?,
-        // The energy of the highest mode resolves half its wave.
-        resolution: length / dataset.fitted_modes as f64,
-    })
-}
-
-/// Returns d ln f = (1/2) int EI w''^2 dx / omega^2 for the stiffness of a piece of the beam, and
-/// -(1/2) int rho A w^2 dx for its mass, with w of unit modal mass, by the midpoint rule. `length` is that of the
-/// structure (m).
-fn local_slopes(model: &ModalModel, index: usize, piece: usize, length: f64) -> [f64; 2] {
-    let (body, modes) = (&model.seen.specimen.body, model.modes());
-    let (step, omega) = (length / (PIECES * PIECE_POINTS) as f64, model.omega(index));
-    let (mut by_stiffness, mut by_mass) = (0.0, 0.0);
-    for point in 0..PIECE_POINTS {
-        let from = step * (piece * PIECE_POINTS + point) as f64;
-        let x = from + 0.5 * step;
-        let beam = match body {
-            Body::One(beam) => beam,
-            Body::Joined([left, _]) if x < left.length => left,
-            Body::Joined([_, right]) => right,
-        };
-        let bend = (modes.slope(index, from + step) - modes.slope(index, from)) / step;
-        by_stiffness += 0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega);
-        by_mass += -0.5 * beam.mass_per_length() * modes.displacement(index, x).powi(2) * step;
-    }
-    [by_stiffness, by_mass]
-}
-
-/// Returns the changes of all pieces together and their standard uncertainties.
-fn changes(
-    dataset: &Dataset,
-    nominal: &Fit,
-    slopes: &DMatrix<f64>,
-) -> Option<(Vec<f64>, Vec<f64>)> {
-    let first = nominal.parameters().len();
-    let (priors, found) = with_pieces(dataset, nominal, slopes, CHANGE_STD)?;
-    let variances = found.covariance(&priors)?.diagonal();
-    let stds = variances.iter().skip(first).map(|v| v.max(0.0).sqrt());
-    Some((found.parameters[first..].to_vec(), stds.collect()))
-}
-
-/// Returns the share of the misfit by which chi square falls if one piece alone changes, for each piece.
-fn explained(dataset: &Dataset, nominal: &Fit, slopes: &DMatrix<f64>) -> Option<Vec<f64>> {
-    // All that the described model leaves.
-    let objective = nominal.best.optimum.objective;
-    let misfit = 2.0 * objective;
-    (0..PIECES)
-        .map(|piece| {
-            let own = slopes.columns(piece, 1).into_owned();
-            let (_, found) = with_pieces(dataset, nominal, &own, SINGLE_CHANGE_STD)?;
-            let decrease = 2.0 * (objective - found.objective).max(0.0);
-            Some(if misfit > 0.0 { decrease / misfit } else { 0.0 })
-        })
-        .collect()
-}
-
-/// Returns the optimum of the nominal fit, linearised, with changes of pieces after its parameters; and the priors.
-fn with_pieces(
-    dataset: &Dataset,
-    nominal: &Fit,
-    slopes: &DMatrix<f64>,
-    std: f64,
-) -> Option<(Vec<Prior>, Optimum)> {
-    let optimum = &nominal.best.optimum;
-    let first = optimum.parameters.len();
-    let count = first + slopes.ncols();
-    let mut all = optimum.model.slopes.clone().resize_horizontally(count, 0.0);
-    all.columns_mut(first, slopes.ncols()).copy_from(slopes);
-    let mut start = optimum.parameters.clone();
-    start.resize(count, 0.0);
-    let mut priors = nominal.best.priors.clone();
-    priors.resize(count, Prior::normal(0.0, std));
-    let model = LinearModel {
-        origin: &start,
-        there: &optimum.model.predicted,
-        slopes: &all,
-    };
-    let found = maximise(&dataset.data, &priors, &start, &model)?;
-    Some((priors, found))
 }

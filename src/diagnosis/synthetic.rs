@@ -2,6 +2,9 @@
 //!
 //! They are drawn from the structure's modes on the finer mesh, not from the diagnosis's own predictions. Only whether
 //! a fixture's peak is read follows the diagnosis's own rule: the simulator, which makes signals, tests that rule.
+//!
+//! Where the set-up is not as described, the configurations state the described places, and the readings are those of the
+//! true ones. Interchanged sensors count as equally sensitive, since a plan states no scales.
 
 use crate::observations::DECIBEL;
 use crate::settings::{FIXTURE_LEVEL, GapError};
@@ -9,7 +12,9 @@ use crate::structure::{Nominal, fixture_strength, joint_amplitude};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use tapjoint_beam::effects::{Circumstances, Effect, EffectId, Seen, apply};
+use tapjoint_beam::effects::{
+    ActualSetUp, Circumstances, DescribedSetUp, Effect, EffectId, Seen, actual_set_ups, apply,
+};
 use tapjoint_beam::specimen::{BeamModes, Joint, Mesh, PointMass, Specimen};
 use tapjoint_identify::observation::{
     AlongDecay, Configuration, DecayEnd, DecayVerdict, ExtraPeak, Observations, Observed,
@@ -56,7 +61,22 @@ pub struct PlannedConfiguration {
     pub level: f64,
 }
 
-/// Draws the observations that the plan would make of a structure with these effects.
+impl TestPlan {
+    /// Returns the described set-up of each configuration, on a beam of this length (m).
+    pub fn set_ups(&self, length: f64) -> Vec<DescribedSetUp> {
+        let planned = self.configurations.iter();
+        planned
+            .map(|one| DescribedSetUp {
+                length,
+                sensors: one.sensors.iter().map(|(_, position)| *position).collect(),
+                tap: one.tap,
+            })
+            .collect()
+    }
+}
+
+/// Draws the observations that the plan would make of a structure with these effects. Those of the set-up are left out
+/// where the plan has no such sensor or recording.
 ///
 /// # Errors
 /// [`GapError::Structure`] where the structure has no such modes.
@@ -67,15 +87,18 @@ pub fn observe(
     seed: u64,
 ) -> Result<Observations, GapError> {
     let modes = truth.specimen.modes(plan.modes, Mesh::SIMULATION)?;
-    let planned = plan.configurations.iter();
+    let length = truth.specimen.body.length();
+    let set_ups = actual_set_ups(effects, &plan.set_ups(length));
+    let planned = plan.configurations.iter().zip(&set_ups);
     let amplitudes: Vec<f64> = planned
-        .map(|one| joint_amplitude(&modes, one.tap, one.level, 0..plan.modes))
+        .map(|(one, actual)| joint_amplitude(&modes, actual.tap, one.level, 0..plan.modes))
         .collect();
     let largest = amplitudes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut test = VirtualTest {
         plan,
         truth,
         effects,
+        set_ups: &set_ups,
         random: ChaCha8Rng::seed_from_u64(seed),
     };
     let mut configurations = Vec::new();
@@ -101,6 +124,8 @@ struct VirtualTest<'a> {
     plan: &'a TestPlan,
     truth: &'a Nominal,
     effects: &'a [Effect],
+    /// The true set-up of each configuration.
+    set_ups: &'a [ActualSetUp],
     random: ChaCha8Rng,
 }
 
@@ -130,9 +155,10 @@ impl VirtualTest<'_> {
 
     fn configuration(&mut self, index: usize, amplitude: f64) -> Result<Configuration, GapError> {
         let planned = &self.plan.configurations[index];
-        let modes = self.solve(planned, amplitude)?;
+        let actual = &self.set_ups[index];
+        let modes = self.solve(planned, actual, amplitude)?;
         let observed = (0..self.plan.modes)
-            .map(|number| self.mode(planned, number, &modes))
+            .map(|number| self.mode(actual, number, &modes))
             .collect();
         let sensors = planned
             .sensors
@@ -155,7 +181,7 @@ impl VirtualTest<'_> {
             modes: observed,
             covariance: None,
             common: 0.0,
-            extra_peaks: self.fixture_peak(planned, &modes).into_iter().collect(),
+            extra_peaks: self.fixture_peak(actual, &modes).into_iter().collect(),
         })
     }
 
@@ -164,11 +190,12 @@ impl VirtualTest<'_> {
     fn solve(
         &mut self,
         planned: &PlannedConfiguration,
+        actual: &ActualSetUp,
         amplitude: f64,
     ) -> Result<VirtualModes, GapError> {
-        let sensors: Vec<PointMass> = planned
-            .sensors
-            .iter()
+        let names = planned.sensors.iter().map(|(name, _)| name);
+        let sensors: Vec<PointMass> = names
+            .zip(&actual.sensors)
             .map(|(name, position)| PointMass::new(*position, self.truth.mass_of(name)))
             .collect();
         let mut nominal = self.truth.loaded(&sensors, &planned.masses);
@@ -212,16 +239,11 @@ impl VirtualTest<'_> {
     }
 
     /// Draws the fixture's own mode, where it is strong enough to be read.
-    fn fixture_peak(
-        &mut self,
-        planned: &PlannedConfiguration,
-        modes: &VirtualModes,
-    ) -> Option<ExtraPeak> {
+    fn fixture_peak(&mut self, actual: &ActualSetUp, modes: &VirtualModes) -> Option<ExtraPeak> {
         let own = &modes.own;
         let fixture = own.fixture?;
-        let sensors: Vec<f64> = planned.sensors.iter().map(|sensor| sensor.1).collect();
-        let tap = Some(planned.tap);
-        let strength = fixture_strength(&own.modes, fixture, &own.numbers, &sensors, tap)?;
+        let (sensors, tap) = (&actual.sensors, Some(actual.tap));
+        let strength = fixture_strength(&own.modes, fixture, &own.numbers, sensors, tap)?;
         if strength.own <= strength.median + FIXTURE_LEVEL / DECIBEL {
             return None;
         }
@@ -236,28 +258,22 @@ impl VirtualTest<'_> {
         })
     }
 
-    fn mode(
-        &mut self,
-        planned: &PlannedConfiguration,
-        number: usize,
-        modes: &VirtualModes,
-    ) -> ObservedMode {
+    fn mode(&mut self, actual: &ActualSetUp, number: usize, modes: &VirtualModes) -> ObservedMode {
         let (own, seen) = (&modes.own.modes, &modes.seen);
         let mode = modes.own.numbers[number];
         let true_frequency = own.frequencies()[mode] * seen.frequency_scale + seen.frequency_offset;
         let frequency = self.measured(true_frequency, true_frequency * self.plan.frequency_std);
-        let at_sensors: Vec<f64> = planned
-            .sensors
-            .iter()
-            .map(|(_, position)| own.displacement(mode, *position))
-            .collect();
+        let positions = actual.sensors.iter();
+        let true_ones: Vec<f64> = positions.map(|x| own.displacement(mode, *x)).collect();
+        let channels = actual.channels.iter();
+        let at_sensors: Vec<f64> = channels.map(|channel| channel.of(&true_ones)).collect();
         let strongest = (0..at_sensors.len())
             .max_by(|&a, &b| at_sensors[a].abs().total_cmp(&at_sensors[b].abs()));
         let reference = strongest.zip(self.plan.shape_std);
         // Shapes of unit modal mass are about 2/sqrt(mass) large.
         let size = 2.0 / self.truth.beam_mass();
         let constant = reference.map(|(sensor, std)| {
-            let value = at_sensors[sensor] * own.displacement(mode, planned.tap);
+            let value = at_sensors[sensor] * own.displacement(mode, actual.tap);
             self.measured(value, size * std)
         });
         let mut shape = Vec::new();

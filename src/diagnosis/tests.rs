@@ -10,6 +10,7 @@ use crate::fit::fit_nominal;
 use crate::forward::Forward;
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effect};
+use crate::set_up::SetUp;
 use crate::settings::GapSettings;
 use crate::structure::{DescriptionUncertainty, ModalModel, Nominal, NominalSensor};
 use crate::synthetic::{PlannedConfiguration, TestPlan, observe};
@@ -153,7 +154,7 @@ fn limit_slopes_near_a_solution_are_those_of_new_solutions() {
     // does to a shape, 1 % here, is left out of its slopes.
     for (dataset, most) in [(dataset(None), 0.005), (dataset(Some(0.01)), 0.02)] {
         for effect in EffectId::ALL {
-            let Some(candidate) = candidate_effect(effect, &dataset.nominal) else {
+            let Some(candidate) = candidate_effect(effect, &dataset.nominal, 2000.0) else {
                 continue;
             };
             for (share, place) in [(1.0, 0.12), (1.0, 0.499_98), (5.0, 0.305), (5.0, 0.8)] {
@@ -465,6 +466,10 @@ fn val_slopes_of_properties_are_those_of_beams_solved_anew() {
         let own = Arc::new(specimen.beam_modes(modes, Mesh::SIMULATION).unwrap());
         let model = ModalModel {
             seen: apply(&[], &specimen, &Circumstances::default()),
+            set_up: SetUp {
+                channels: Vec::new(),
+                tap: None,
+            },
             own,
             frequencies: None,
             stiffness_changes: None,

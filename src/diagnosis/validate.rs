@@ -244,11 +244,15 @@ pub struct HoldoutErrors {
 impl HoldoutErrors {
     /// Returns the errors on the hold-out data; `None` where there are none, or the hypothesis does not predict them.
     pub fn new(dataset: &Dataset, fit: &Fit) -> Option<Self> {
-        if dataset.holdout.is_empty() {
+        Self::on(&dataset.holdout, dataset, fit)
+    }
+
+    /// Returns the errors on some data that took no part in the fit; `None` as for [`HoldoutErrors::new`].
+    pub fn on(data: &[(Observable, Datum)], dataset: &Dataset, fit: &Fit) -> Option<Self> {
+        if data.is_empty() {
             return None;
         }
-        let (observables, data): (Vec<Observable>, Vec<Datum>) =
-            dataset.holdout.iter().copied().unzip();
+        let (observables, data): (Vec<Observable>, Vec<Datum>) = data.iter().copied().unzip();
         let forward = Forward {
             dataset,
             layout: dataset.layout(&fit.effects),

@@ -6,8 +6,8 @@ use crate::fixture;
 use crate::result::{Block, Closure, Hypothesis, LocationProbabilities, Verdict};
 use crate::settings::{
     ANOTHER_LEVEL, BLOCK_MISFIT, CLOSED_SHARE, DETECTED, DOUBLED_ERRORS, LISTED_SHARE, LONGEST_SET,
-    MISFIT, NAMED_PROBABILITY, NO_GAP_PRIOR, PREDICTED, SECOND_EFFECT, SEPARATE, SET_PROBABILITY,
-    SMALLEST_P_VALUE, SPARE_DATA,
+    MISFIT, NAMED_PROBABILITY, NO_GAP_PRIOR, PREDICTED, RIGID_PRIOR, SEPARATE, SET_PROBABILITY,
+    SIZED, SMALLEST_P_VALUE, SPARE_DATA,
 };
 use crate::structure::Arrangement;
 use crate::validate::{Residuals, holdout_goodness};
@@ -38,6 +38,8 @@ pub struct GoodnessOfFit {
     pub freedom: Option<DegreesOfFreedom>,
     /// Its closure on hold-out data; `None` where the nominal model has no gap there.
     pub closure: Option<Closure>,
+    /// The size of each effect is told from nothing.
+    is_sized: bool,
     /// The gap on hold-out data exceeds what the prediction leaves open, so that the closure can be certain.
     pub is_decisive: bool,
 }
@@ -105,6 +107,7 @@ impl GoodnessOfFit {
             peak: fixture::goodness(dataset, fit),
             freedom: None,
             closure: None,
+            is_sized: is_sized(dataset, fit),
             is_decisive: false,
         })
     }
@@ -143,6 +146,22 @@ impl GoodnessOfFit {
             closure.value > 0.0 || predicts && closure.value > DOUBLED_ERRORS
         }
     }
+}
+
+/// Returns whether the size of each effect of a fit is told from nothing. An effect that is there or not has no size, and a
+/// joint that gives may do so in either direction.
+fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
+    let layout = dataset.layout(&fit.effects);
+    let Some(covariance) = fit.best.covariance() else {
+        return false;
+    };
+    fit.effects.iter().enumerate().all(|(k, effect)| {
+        let at = layout.size(k);
+        let away = (fit.parameters()[at] - effect.size.neutral).abs();
+        effect.size.is_fixed()
+            || effect.effect == EffectId::JointCompliance && effect.location.is_some()
+            || away >= SIZED * covariance[(at, at)].max(0.0).sqrt()
+    })
 }
 
 // Probabilities of the hypotheses, and which of them the data cannot separate.
@@ -227,8 +246,9 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
                 let is_single = one.effects().len() == 1 && other.effects().len() == 1;
                 is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
             });
-            let weight = match one.hypothesis {
-                Hypothesis::None => NO_GAP_PRIOR,
+            let weight = match one.effects() {
+                _ if one.hypothesis == Hypothesis::None => NO_GAP_PRIOR,
+                [EffectId::JointCompliance] => RIGID_PRIOR,
                 _ => 1.0,
             };
             weight / same.count() as f64
@@ -251,104 +271,10 @@ pub fn best_known(candidates: &[Candidate]) -> Option<usize> {
     candidates.iter().position(|one| !one.is_unknown())
 }
 
-/// Lowers the probability of the best explanation by what its own misfit says against it.
-///
-/// A misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most (Sellke, Bayarri &
-/// Berger 2001). Such odds count against every explanation that is about as probable as the best. Evidence compares
-/// how well explanations fit under the assumed noise; one that this noise refutes is no explanation
-/// while another stands. If none stands, the noise is in doubt, and with it the evidence. The odds that remain against
-/// the one that is left are evidence for something unknown, which
-/// has no misfit of its own. A best explanation that stands is left alone: what refutes its rivals makes it no
-/// better.
-pub fn calibrate_by_p_value(dataset: &Dataset, candidates: &mut [Candidate]) {
-    let Some(best) = best_known(candidates) else {
-        return;
-    };
-    let odds = odds_against(dataset, &candidates[best]);
-    if odds <= 1.0 {
-        return;
-    }
-    let mut all: Vec<Option<f64>> = vec![None; candidates.len()];
-    all[best] = Some(odds);
-    // Down to explanations as good as the best, and then as good as the best that is not refuted.
-    let mut least = candidates[best].probability * (-SECOND_EFFECT).exp();
-    let mut stands = false;
-    for (k, candidate) in candidates.iter().enumerate().skip(best + 1) {
-        if candidate.is_unknown() || candidate.probability < least {
-            continue;
-        }
-        all[k] = Some(odds_against(dataset, candidate));
-        if !stands && all[k] == Some(1.0) {
-            stands = true;
-            least = candidate.probability * (-SECOND_EFFECT).exp();
-        }
-    }
-    let probabilities: Vec<f64> = candidates.iter().map(|one| one.probability).collect();
-    let Some((left, relative)) = relative_odds(&probabilities, &all) else {
-        return;
-    };
-    let name = candidates[left].hypothesis.clone();
-    let lowered = divided(&probabilities, &relative);
-    for (candidate, probability) in candidates.iter_mut().zip(lowered) {
-        candidate.probability = probability;
-    }
-    sort(candidates);
-    let left_now = candidates.iter().position(|one| one.hypothesis == name);
-    let unknown = candidates.iter().position(Candidate::is_unknown);
-    let odds = all[left].filter(|odds| *odds > 1.0);
-    if let (Some(left), Some(unknown), Some(odds)) = (left_now, unknown, odds) {
-        // All others keep their odds among each other.
-        let odds = odds * candidates[unknown].prior / candidates[left].prior;
-        let weight = odds * candidates[left].probability;
-        if weight > candidates[unknown].probability {
-            let total = 1.0 - candidates[unknown].probability + weight;
-            candidates[unknown].probability = weight;
-            for candidate in candidates.iter_mut() {
-                candidate.probability /= total;
-            }
-            sort(candidates);
-        }
-    }
-}
-
-/// Returns the odds against one explanation; infinite where its fit has no covariance to be tested with.
-fn odds_against(dataset: &Dataset, candidate: &Candidate) -> f64 {
-    let Some(goodness) = GoodnessOfFit::new(dataset, &candidate.fit) else {
-        return f64::INFINITY;
-    };
-    goodness.refuting_p_value().map_or(1.0, odds_by_p_value)
-}
-
 /// Returns the highest odds against an explanation whose misfit has the probability `p`.
 fn odds_by_p_value(p: f64) -> f64 {
     let p = p.clamp(SMALLEST_P_VALUE, 1.0 / E);
     -1.0 / (E * p * p.ln())
-}
-
-/// Returns which of the tested explanations is left, the first of equal ones, and the odds against every
-/// other of them over those against it; `None` where none was tested or all have infinite odds against them.
-fn relative_odds(probabilities: &[f64], odds: &[Option<f64>]) -> Option<(usize, Vec<Option<f64>>)> {
-    let mut left: Option<(usize, f64)> = None;
-    for (k, odds) in odds.iter().enumerate() {
-        if let Some(odds) = odds.filter(|odds| odds.is_finite()) {
-            let weight = probabilities[k] / odds;
-            if left.is_none_or(|(_, most)| weight > most) {
-                left = Some((k, weight));
-            }
-        }
-    }
-    let (left, _) = left?;
-    let own = odds[left]?;
-    let relative = odds.iter().map(|odds| Some((*odds)? / own));
-    Some((left, relative.collect()))
-}
-
-/// Returns probabilities divided by odds, with the sum 1.
-fn divided(probabilities: &[f64], odds: &[Option<f64>]) -> Vec<f64> {
-    let each = probabilities.iter().zip(odds);
-    let each: Vec<f64> = each.map(|(p, odds)| p / odds.unwrap_or(1.0)).collect();
-    let total: f64 = each.iter().sum();
-    each.into_iter().map(|p| p / total).collect()
 }
 
 /// Candidates of one group of effects; pairs, `none` and `unknown` are groups of their own.
@@ -500,16 +426,21 @@ pub fn verdict(
             freedom.data
         ));
     }
+    // What is not told from nothing is no name.
+    if !tested.is_sized {
+        return if is_refuted {
+            Verdict::Unknown
+        } else {
+            Verdict::NoGap
+        };
+    }
     let holds = tested.passes_holdout() && (first.effects().len() < 2 || tested.improves_holdout());
     if groups[0].probability >= NAMED_PROBABILITY && holds {
-        // Names one effect; a group whose members the data do not separate as a group.
-        let members = &groups[0].members;
-        let total: f64 = members.iter().map(|&k| candidates[k].probability).sum();
-        if first.probability >= NAMED_PROBABILITY * total || members.len() == 1 {
-            return Verdict::Named(first.effects().to_vec());
-        }
-        let likely = likely(candidates, members, total);
-        return Verdict::Group(effects_of(candidates, &likely));
+        let members = inseparable(candidates, &groups[0].members);
+        return match members[..] {
+            [one] => Verdict::Named(candidates[one].effects().to_vec()),
+            _ => Verdict::Group(effects_of(candidates, &members)),
+        };
     }
     let aliases = aliases_of_first(candidates);
     let together: f64 = aliases.iter().map(|&k| candidates[k].probability).sum();
@@ -524,6 +455,21 @@ fn evidence_over_none(candidates: &[Candidate], candidate: &Candidate) -> f64 {
     none_of(candidates).map_or(f64::INFINITY, |none| {
         candidate.fit.log_evidence - none.fit.log_evidence
     })
+}
+
+/// Returns the members of a group that the data do not separate from the one that explains them best. Their priors do not
+/// count: which property of the beam is more often wrong says nothing about this beam.
+fn inseparable(candidates: &[Candidate], members: &[usize]) -> Vec<usize> {
+    let objectives = members.iter();
+    let least = objectives
+        .map(|&k| candidates[k].fit.best.optimum.objective)
+        .fold(f64::INFINITY, f64::min);
+    let members = members.iter().copied();
+    let close = members.filter(|&k| {
+        let objective = candidates[k].fit.best.optimum.objective;
+        2.0 * (objective - least) < SEPARATE
+    });
+    close.collect()
 }
 
 fn effects_of(candidates: &[Candidate], members: &[usize]) -> Vec<EffectId> {
@@ -567,7 +513,10 @@ fn set_of(candidates: &[Candidate], groups: &[CandidateGroup]) -> Verdict {
             break;
         }
     }
-    if counted <= LONGEST_SET {
+    if set.len() == 1 {
+        // The only explanation fails on data that took no part in its fit.
+        Verdict::Unknown
+    } else if counted <= LONGEST_SET {
         Verdict::Set(set)
     } else {
         Verdict::NotEnoughData(format!(
@@ -596,6 +545,7 @@ mod tests {
             peak: None,
             freedom: None,
             closure: Some(closure),
+            is_sized: true,
             is_decisive,
         }
     }
@@ -635,18 +585,6 @@ mod tests {
         }
     }
 
-    /// A refuted hypothesis, even against all odds, leaves the others as they were among each other.
-    #[test]
-    fn limit_lowered_probabilities_keep_the_odds_of_all_others() {
-        for odds in [8.0, 1e10, f64::INFINITY] {
-            let after = divided(&[0.6, 0.3, 0.1], &[Some(odds), None, Some(1.0)]);
-            // Rounding of three numbers.
-            assert!((after.iter().sum::<f64>() - 1.0).abs() < 1e-15);
-            assert!((after[1] / after[2] - 3.0).abs() < 1e-14);
-            assert!((after[0] / after[1] - 2.0 / odds).abs() < 1e-15);
-        }
-    }
-
     /// At p = 1/e and above a misfit does not count; below, the odds grow and stay finite down to zero.
     #[test]
     fn limit_odds_from_a_misfit_are_even_at_best_and_finite_at_worst() {
@@ -663,32 +601,6 @@ mod tests {
         for (p, bound) in [(0.05, 0.407), (0.01, 0.125)] {
             assert!((1.0 / odds_by_p_value(p) - bound).abs() < 5e-4, "{p}");
         }
-    }
-
-    /// Equal odds against two change nothing between them, and of equal weights the first is left.
-    #[test]
-    fn limit_equal_odds_keep_the_order() {
-        let (first, relative) =
-            relative_odds(&[0.4, 0.4, 0.2], &[Some(9.0), Some(9.0), None]).unwrap();
-        assert_eq!(first, 0);
-        assert_eq!(relative, [Some(1.0), Some(1.0), None]);
-    }
-
-    /// A rival against which less speaks takes the place; untested ones keep their odds to it.
-    #[test]
-    fn regress_an_explanation_that_stands_takes_the_place_of_a_refuted_one() {
-        let (first, relative) =
-            relative_odds(&[0.8, 0.15, 0.05], &[Some(40.0), Some(4.0), None]).unwrap();
-        assert_eq!(first, 1);
-        assert_eq!(relative, [Some(10.0), Some(1.0), None]);
-    }
-
-    #[test]
-    fn limit_infinite_odds_against_all_leave_nothing_to_choose() {
-        let infinite = Some(f64::INFINITY);
-        assert_eq!(relative_odds(&[0.5, 0.5], &[infinite, infinite]), None);
-        let (first, relative) = relative_odds(&[0.9, 0.1], &[infinite, Some(2.0)]).unwrap();
-        assert_eq!((first, relative), (1, vec![infinite, Some(1.0)]));
     }
 
     /// A refuted nominal model, by one block perhaps, gives no name to an effect that explains less.

@@ -79,6 +79,7 @@ pub fn truths_json(truths: &[Truth]) -> Result<String, ReportError> {
         for (name, known) in [
             ("detectable", truth.detectable),
             ("refutable", truth.refutable),
+            ("within_tolerance", truth.within_tolerance),
         ] {
             if let Some(known) = known {
                 entry[name] = json!(known);
@@ -150,12 +151,12 @@ fn cases_csv(cases: &[Case]) -> Result<String, ReportError> {
         let planted: Vec<&str> = truth.effects.iter().map(name_of).collect();
         let named: Vec<&str> = answer.effects.iter().map(|id| id.name()).collect();
         let first = answer.first();
-        let [detectable, refutable] =
-            [truth.detectable, truth.refutable].map(|known| match known {
-                Some(true) => "yes".to_owned(),
-                Some(false) => "no".to_owned(),
-                None => String::new(),
-            });
+        let known = [truth.detectable, truth.refutable, truth.within_tolerance];
+        let [detectable, refutable, within_tolerance] = known.map(|known| match known {
+            Some(true) => "yes".to_owned(),
+            Some(false) => "no".to_owned(),
+            None => String::new(),
+        });
         let closure = answer.closure;
         rows.push(vec![
             truth.name.clone(),
@@ -167,9 +168,10 @@ fn cases_csv(cases: &[Case]) -> Result<String, ReportError> {
             first.map_or("", |(class, _)| class.name()).to_owned(),
             first.map_or_else(String::new, |(_, p)| format!("{p:.4}")),
             closure.map_or_else(String::new, |closure| format!("{closure:.4}")),
+            within_tolerance,
         ]);
     }
-    let heads = "name,planted,detectable,refutable,verdict,named,first,probability,closure";
+    let heads = "name,planted,detectable,refutable,verdict,named,first,probability,closure,within_tolerance";
     write(heads, rows)
 }
 
@@ -199,12 +201,11 @@ pub fn tell_apart(cases: &[Case]) -> String {
         let named = own
             .iter()
             .filter(|(_, answer)| match answer.verdict {
-                Some(Verdict::Named(_)) => answer
-                    .named_groups()
-                    .iter()
-                    .any(|g| Class::Group(*g) == class),
                 Some(Verdict::NoGap) => class == Class::None,
-                _ => false,
+                _ => {
+                    let mut groups = answer.named_groups().into_iter();
+                    answer.is_name() && groups.any(|group| Class::Group(group) == class)
+                }
             })
             .count();
         // "cross-coupling 2, none 1".
@@ -326,9 +327,10 @@ fn closure(cases: &[Case]) -> Option<Chart> {
             let CaseKind::Single(id) = truth.kind() else {
                 return None;
             };
-            let named = matches!(answer.verdict, Some(Verdict::Named(_)));
             let is_right = answer.named_groups() == [id.group()];
-            answer.closure.filter(|_| named && is_right == right)
+            answer
+                .closure
+                .filter(|_| answer.is_name() && is_right == right)
         });
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);

@@ -73,6 +73,16 @@ struct Disturbance {
     mains_step: f64,
 }
 
+/// The sensor that is connected to a channel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ConnectedSensor {
+    pub(super) signal: Signal,
+    /// Its SI units per unit of the file.
+    pub(super) scale: f64,
+    /// Factor on its signal (1).
+    pub(super) factor: f64,
+}
+
 /// Rate of the file (Hz, in true seconds), and steps of the simulation for each of its samples.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rates {
@@ -84,13 +94,17 @@ impl Chain {
     /// `random` is the recording's own; `gains` is the same in all recordings of a test, whose sensors are
     /// the same.
     pub(super) fn new(
-        signal: Signal,
-        scale: f64,
+        sensor: ConnectedSensor,
         laboratory: &Laboratory,
         rates: Rates,
         mut random: ChaCha8Rng,
         gains: &mut ChaCha8Rng,
     ) -> Self {
+        let ConnectedSensor {
+            signal,
+            scale,
+            factor,
+        } = sensor;
         let (sensors, recorder) = (&laboratory.sensors, &laboratory.recorder);
         let inner = rates.file * rates.factor as f64;
         let sensitivity_error: f64 = StandardNormal.sample(gains);
@@ -101,7 +115,7 @@ impl Chain {
             std::array::from_fn(|_| StandardNormal.sample(&mut random));
         let mains_angle = random.random_range(0.0..TAU);
         Self {
-            gain: 1.0 + sensors.sensitivity_error * sensitivity_error,
+            gain: factor * (1.0 + sensors.sensitivity_error * sensitivity_error),
             mounting: mounting
                 .then(|| Resonance::new(sensors.mounting_resonance, MOUNTING_QUALITY, inner)),
             coupling: (sensors.ac_coupling > 0.0)

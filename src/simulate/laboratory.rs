@@ -6,6 +6,7 @@
 use super::hammer::HammerSettings;
 use serde::Serialize;
 use tapjoint_beam::StructureError;
+use tapjoint_beam::effects::SetUpError;
 use tapjoint_signal::recording::RecordingError;
 
 /// Everything about the laboratory.
@@ -227,6 +228,22 @@ pub enum SimulateError {
          remove `mass` from the [[sensor]] that shall weigh more than is known"
     )]
     NothingToWeigh,
+    /// A joint that gives where the description does not call it rigid.
+    #[error(
+        "`joint-compliance`: {parameter} is {value}, but [joint] has no `{key} = \"rigid\"`; a fitted stiffness would hold \
+         the compliance; write `{key} = \"rigid\"` in [joint] and leave --kx and --ky out, or leave the effect out"
+    )]
+    NotRigid {
+        /// The parameter of the effect.
+        parameter: &'static str,
+        /// Its value (1).
+        value: f64,
+        /// Key of the stiffness in the description.
+        key: &'static str,
+    },
+    /// A set-up that the test cannot have.
+    #[error(transparent)]
+    SetUp(#[from] SetUpError),
     /// A non-linear joint without a rotational spring.
     #[error(
         "`joint-nonlinearity` needs a joint that turns: its rotational stiffness is {stiffness} N m/rad, and must be positive and finite"

@@ -100,6 +100,11 @@ impl ObservedStructure {
         })
     }
 
+    /// Positions of its sensors (m).
+    pub fn sensors(&self) -> &[f64] {
+        &self.sensors
+    }
+
     /// Its modes and what lies beyond them.
     pub fn reduced(&self) -> &ReducedStructure {
         &self.reduced
@@ -154,17 +159,17 @@ fn joint_to(modes: &SpecimenModes, moving: usize, position: f64) -> f64 {
     })
 }
 
-/// The described specimen with the sensors and masses of one recording. `given` is a joint in place of the
-/// described one.
+/// The described specimen with the masses of one recording and with its sensors at these places. `given` is a joint in
+/// place of the described one.
 pub(super) fn nominal_specimen(
     test: &TestDescription,
     recording: &RecordingDescription,
+    sensors: &[PointMass],
     given: Option<JointStiffness>,
 ) -> Result<Specimen, SimulateError> {
     let own = test.of_length(recording.length);
     let mut specimen = described_specimen(&own, joint(test, given)?);
-    let sensors = sensor_places(test, recording)?.into_iter();
-    let known = sensors.filter(|sensor| sensor.mass > 0.0);
+    let known = sensors.iter().filter(|sensor| sensor.mass > 0.0);
     specimen.masses.extend(known);
     specimen.masses.extend(&recording.masses);
     Ok(specimen)
@@ -195,7 +200,7 @@ fn joint(
     Err(SimulateError::NoJoint { missing, keys })
 }
 
-/// Places of the sensors in a recording, with their masses by the datasheet.
+/// Described places of the sensors in a recording, with their masses by the datasheet.
 pub(super) fn sensor_places(
     test: &TestDescription,
     recording: &RecordingDescription,

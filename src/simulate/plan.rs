@@ -13,8 +13,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_beam::JointStiffness;
-use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, apply};
-use tapjoint_beam::specimen::Specimen;
+use tapjoint_beam::effects::{
+    ActualSetUp, Circumstances, DescribedSetUp, Effect, EffectId, JointLaw, Seen, actual_set_ups,
+    apply, check_set_up,
+};
+use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
 
 /// A test to be simulated.
@@ -72,14 +75,17 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    check_effects(test, plan.effects)?;
+    check_effects(plan)?;
+    let set_ups = described_set_ups(test)?;
+    check_set_up(plan.effects, &set_ups)?;
+    let set_ups = actual_set_ups(plan.effects, &set_ups);
     let (mut recordings, mut trials) = (Vec::new(), Vec::new());
     for (visit, file) in described.iter().enumerate() {
-        let one = prepare(plan, file, visit)?;
+        let one = prepare(plan, file, &set_ups[file.number], visit)?;
         trials.push(try_out(&one.structure, &one.plan, plan.laboratory));
         recordings.push(one);
     }
-    let scales = scales(test, &trials);
+    let scales = scales(test, &recordings, &trials);
     let joint_law = hardest(&recordings, &trials);
     for recording in &mut recordings {
         let channels = recording.plan.channels.iter_mut();
@@ -98,7 +104,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     }
     let first = test.reference_recording();
     let first = first.unwrap_or(described[0].recording);
-    let nominal = nominal_specimen(test, first, plan.joint)?;
+    let nominal = nominal_specimen(test, first, &sensor_places(test, first)?, plan.joint)?;
     let suspension = plan.laboratory.specimen.suspension;
     Ok(VirtualTest {
         suspension: suspension.filter(|_| hangs(&nominal)),
@@ -120,6 +126,8 @@ impl VirtualRecording {
 struct WantedFile<'a> {
     /// Its first description.
     recording: &'a RecordingDescription,
+    /// Index of that description among all.
+    number: usize,
     /// Its name as a WAV file.
     name: String,
     /// Highest frequency that is wanted of it (Hz); `None` without a band.
@@ -140,7 +148,7 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, Simulat
         ));
     }
     let mut distinct: Vec<WantedFile<'_>> = Vec::new();
-    for recording in &test.recordings {
+    for (number, recording) in test.recordings.iter().enumerate() {
         let file = wav_name(recording);
         let line = recording.line;
         if recording.form.is_some() {
@@ -168,6 +176,7 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, Simulat
         let Some(found) = distinct.iter_mut().find(|found| found.name == file) else {
             distinct.push(WantedFile {
                 recording,
+                number,
                 name: file,
                 highest,
                 block_seconds,
@@ -200,19 +209,38 @@ pub fn wav_name(recording: &RecordingDescription) -> String {
     format!("{}.wav", stem.to_string_lossy())
 }
 
+/// The described places of sensors and taps in every recording.
+fn described_set_ups(test: &TestDescription) -> Result<Vec<DescribedSetUp>, SimulateError> {
+    let set_ups = test.recordings.iter().map(|recording| {
+        let tap = recording.tap.ok_or_else(|| SimulateError::Described {
+            file: wav_name(recording),
+            line: recording.line,
+            problem: ": where the hammer strikes is missing; add `tap` (m along the beam)",
+        })?;
+        let sensors = sensor_places(test, recording)?;
+        Ok(DescribedSetUp {
+            length: recording.length.unwrap_or(test.beam.length),
+            sensors: sensors.iter().map(|sensor| sensor.position).collect(),
+            tap,
+        })
+    });
+    set_ups.collect()
+}
+
 fn prepare(
     plan: &TestPlan<'_>,
     wanted: &WantedFile<'_>,
+    set_up: &ActualSetUp,
     visit: usize,
 ) -> Result<VirtualRecording, SimulateError> {
     let (test, laboratory, described) = (plan.description, plan.laboratory, wanted.recording);
-    let tap = described.tap.ok_or_else(|| SimulateError::Described {
-        file: wanted.name.clone(),
-        line: described.line,
-        problem: ": where the hammer strikes is missing; add `tap` (m along the beam)",
-    })?;
-    let places = sensor_places(test, described)?;
-    let nominal = nominal_specimen(test, described, plan.joint)?;
+    // Sensors weigh where they really are.
+    let weighed = sensor_places(test, described)?.into_iter();
+    let places: Vec<PointMass> = weighed
+        .zip(&set_up.sensors)
+        .map(|(sensor, &position)| PointMass { position, ..sensor })
+        .collect();
+    let nominal = nominal_specimen(test, described, &places, plan.joint)?;
     let level = described.level.unwrap_or(1.0);
     let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
     // Streams of their own, behind those of the recordings' channels.
@@ -235,10 +263,11 @@ fn prepare(
         frames: 0,
         frequency_scale: seen.frequency_scale * (1.0 + laboratory.recorder.clock_error),
         channels: channels(test),
+        signals: set_up.channels.clone(),
         taps: TapPlan {
             taps: laboratory.hammer.taps,
             interval: 0.0,
-            position: marked_position(tap, nominal_length, length),
+            position: marked_position(set_up.tap, nominal_length, length),
             beam_length: length,
             peak_force: laboratory.hammer.peak_force * level,
             pulse_length,
@@ -339,17 +368,37 @@ fn channels(test: &TestDescription) -> Vec<(Signal, f64)> {
     hammer.chain(sensors).map(|signal| (signal, 1.0)).collect()
 }
 
-/// The described scales, and round ones with room for harder taps where none is described.
-fn scales(test: &TestDescription, trials: &[Trial]) -> Vec<Scale> {
+/// The described scales, and round ones with room for harder taps where none is described. Interchanged sensors of one
+/// kind without a described scale are of one type: they get the same one.
+fn scales(test: &TestDescription, recordings: &[VirtualRecording], trials: &[Trial]) -> Vec<Scale> {
+    let Some(plan) = recordings.first().map(|first| &first.plan) else {
+        return Vec::new();
+    };
+    let mut peaks = vec![0.0; plan.channels.len()];
+    for trial in trials {
+        for (peak, of_trial) in peaks.iter_mut().zip(&trial.peaks) {
+            *peak = f64::max(*peak, *of_trial);
+        }
+    }
+    let first = plan.channels.len() - plan.signals.len();
+    for signal in &plan.signals {
+        // The recorder is set by what comes in.
+        peaks[first + signal.sensor] *= signal.factor.abs();
+    }
+    let sensors = test.sensors.iter().map(|sensor| sensor.scale);
     let hammer = test.hammer.iter().map(|hammer| hammer.scale);
-    let described = hammer.chain(test.sensors.iter().map(|sensor| sensor.scale));
-    described
-        .enumerate()
-        .map(|(channel, described)| {
-            let peaks = trials.iter().map(|trial| trial.peaks[channel]);
-            let peak = peaks.fold(0.0, f64::max);
-            described.unwrap_or(Scale::PerUnit(round_scale(3.0 * peak)))
-        })
+    let described: Vec<Option<Scale>> = hammer.chain(sensors).collect();
+    for (channel, signal) in plan.signals.iter().enumerate() {
+        let pair = [first + channel, first + signal.sensor];
+        let of_one_kind = plan.channels[pair[0]].0 == plan.channels[pair[1]].0;
+        if of_one_kind && pair.iter().all(|one| described[*one].is_none()) {
+            let largest = f64::max(peaks[pair[0]], peaks[pair[1]]);
+            pair.iter().for_each(|one| peaks[*one] = largest);
+        }
+    }
+    let scales = described.into_iter().zip(peaks);
+    scales
+        .map(|(scale, peak)| scale.unwrap_or(Scale::PerUnit(round_scale(3.0 * peak))))
         .collect()
 }
 
@@ -479,7 +528,8 @@ fn check_setting(
 ///
 /// It also refuses a joint whose slope 1 + c (p + 1) a^p falls below [`LEAST_SLOPE`] before the hardest tap's
 /// rotation a. There the simulated moment leaves the planted law.
-fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), SimulateError> {
+fn check_effects(plan: &TestPlan<'_>) -> Result<(), SimulateError> {
+    let (test, effects) = (plan.description, plan.effects);
     let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
     if planted.contains(&EffectId::Resolution) {
         return Err(SimulateError::Resolution);
@@ -497,6 +547,26 @@ fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), Simul
     let all_stated = masses.all(|mass| mass.is_some_and(|mass| mass > 0.0));
     if planted.contains(&EffectId::SensorMass) && all_stated {
         return Err(SimulateError::NothingToWeigh);
+    }
+    let springs = [
+        ("rotation", "kr", test.joint.kr),
+        ("translation", "kt", test.joint.kt),
+    ];
+    for effect in effects
+        .iter()
+        .filter(|effect| effect.id == EffectId::JointCompliance)
+    {
+        for (parameter, key, stiffness) in springs {
+            let value = effect.value(parameter).unwrap_or(0.0);
+            let is_rigid = plan.joint.is_none() && stiffness == Some(f64::INFINITY);
+            if value > 0.0 && !is_rigid {
+                return Err(SimulateError::NotRigid {
+                    parameter,
+                    value,
+                    key,
+                });
+            }
+        }
     }
     let mut nonlinear = effects.iter();
     let nonlinear = nonlinear.find(|effect| effect.id == EffectId::JointNonlinearity);

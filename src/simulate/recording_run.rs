@@ -9,7 +9,7 @@
 //! added and the channels are scaled to a recorder's full scale. The truth is an argument and never a part
 //! of the recording.
 
-use super::chain::{Chain, HALF_LENGTH, Rates, Signal};
+use super::chain::{Chain, ConnectedSensor, HALF_LENGTH, Rates, Signal};
 use super::hammer::{Hammer, Pulse, PulseShape, Tap, TapPlan};
 use super::joint_moment::JointMoment;
 use super::laboratory::{AntiAlias, Laboratory};
@@ -21,6 +21,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{PI, TAU};
 use tapjoint_beam::ModeShape;
+use tapjoint_beam::effects::SensorSignal;
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Least rate (Hz) of the simulation: pulses of a steel tip are resolved, and the filter sees what
@@ -40,9 +41,12 @@ pub struct RecordingPlan {
     pub frames: u64,
     /// Factor on a true frequency when the file is read (1): the clock's error and a planted error of the time base.
     pub frequency_scale: f64,
-    /// Channels in the order of the file, each with its SI units per unit of the file. Responses come
+    /// Channels in the order of the file as described, each with its SI units per unit of the file. Responses come
     /// in the order of the structure's sensors.
     pub channels: Vec<(Signal, f64)>,
+    /// The content of each response's channel. A sensor that is connected to another's channel brings quantity, scale and
+    /// error of sensitivity along: the file holds its voltage.
+    pub signals: Vec<SensorSignal>,
     /// The taps.
     pub taps: TapPlan,
     /// Joint that is no linear spring.
@@ -89,6 +93,18 @@ impl RecordingPlan {
             .collect()
     }
 
+    /// The content of every channel; `None` = the hammer's.
+    fn sources(&self) -> Vec<Option<SensorSignal>> {
+        let mut signals = self.signals.iter().copied();
+        let channels = self.channels.iter();
+        channels
+            .map(|(signal, _)| match signal {
+                Signal::Force => None,
+                Signal::Response(_) => signals.next(),
+            })
+            .collect()
+    }
+
     /// Random numbers for one purpose of this recording.
     fn random(&self, purpose: u64) -> ChaCha8Rng {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -105,7 +121,7 @@ pub struct RecordingRun {
     hammer: std::iter::Peekable<Hammer>,
     shape: PulseShape,
     chains: Vec<Chain>,
-    /// For each channel the sensor it belongs to; `None` = the hammer.
+    /// For each channel the sensor that is connected to it; `None` = the hammer.
     sources: Vec<Option<usize>>,
     factor: usize,
     frames_left: u64,
@@ -128,26 +144,27 @@ impl RecordingRun {
             AntiAlias::Off => 0,
         };
         let sensed = plan.sensed();
-        let mut sensors = 0..;
-        let signals = plan.channels.iter();
-        let sources = signals.map(|(signal, _)| match signal {
-            Signal::Force => None,
-            Signal::Response(_) => sensors.next(),
-        });
-        let sources = sources.collect();
+        let sources = plan.sources();
         let rates = Rates {
             factor,
             file: file_rate,
         };
-        let channels = plan.channels.iter().zip(1..);
-        let chains = channels
-            .map(|((signal, scale), number)| {
-                let mut gains = ChaCha8Rng::seed_from_u64(plan.seed);
-                gains.set_stream(SENSITIVITIES | number);
-                let random = plan.random(number);
-                Chain::new(*signal, *scale, laboratory, rates, random, &mut gains)
-            })
-            .collect();
+        // Responses follow the hammer, where there is one.
+        let first = plan.channels.len() - sensed.len();
+        let chains = sources.iter().zip(1..).map(|(source, number)| {
+            let own = source.map_or(0, |signal| first + signal.sensor);
+            let (signal, scale) = plan.channels[own];
+            let mut gains = ChaCha8Rng::seed_from_u64(plan.seed);
+            gains.set_stream(SENSITIVITIES | (own as u64 + 1));
+            let factor = source.map_or(1.0, |signal| signal.factor);
+            let sensor = ConnectedSensor {
+                signal,
+                scale,
+                factor,
+            };
+            Chain::new(sensor, laboratory, rates, plan.random(number), &mut gains)
+        });
+        let chains = chains.collect();
         // The filter looks ahead by half its length: the simulation begins that much earlier.
         let start = -(delay as f64) * step;
         let reduced = structure.reduced().clone();
@@ -157,7 +174,10 @@ impl RecordingRun {
             hammer: Hammer::new(&laboratory.hammer, &plan.taps, plan.random(0)).peekable(),
             shape: plan.taps.pulse_shape,
             chains,
-            sources,
+            sources: sources
+                .iter()
+                .map(|source| source.map(|signal| signal.sensor))
+                .collect(),
             factor,
             frames_left: plan.frames,
             primed: 2 * delay as u64,
@@ -165,7 +185,8 @@ impl RecordingRun {
         }
     }
 
-    /// Gain (1) of each channel beside the one its scale states: the errors of the sensitivities.
+    /// Gain (1) of each channel beside the scale of the sensor that is connected to it: errors of sensitivity, and what
+    /// effects change.
     pub fn gains(&self) -> Vec<f64> {
         self.chains.iter().map(Chain::gain).collect()
     }
@@ -426,7 +447,7 @@ impl TapTest {
 /// Response to one mean tap.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trial {
-    /// Largest value of each channel (SI).
+    /// Largest value of the hammer's and each sensor's true signal (SI).
     pub(super) peaks: Vec<f64>,
     /// Largest rotation of the joint (rad).
     pub(super) joint_rotation: f64,

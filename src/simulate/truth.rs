@@ -92,7 +92,7 @@ pub struct RecordingTruth {
     pub modes: Vec<ModeTruth>,
     /// The taps, in true seconds.
     pub taps: Vec<Tap>,
-    /// Gain (1) of each channel beside its scale.
+    /// Gain (1) of each channel beside the scale of the sensor that is connected to it.
     pub gains: Vec<f64>,
 }
 
@@ -192,7 +192,8 @@ fn recording_of(
 const HEAD: &str = "# Recordings of a virtual test, made by `tapjoint simulate`.\n\n";
 
 /// Returns the nominal description, as its user has it: the recordings as they were written, no effects, and
-/// no joint stiffnesses, so that these are fitted. `text` is the description that was simulated.
+/// no joint stiffnesses, so that these are fitted. A joint that is rigid but for the effects stays described as rigid.
+/// `text` is the description that was simulated.
 ///
 /// # Errors
 /// A text that is no TOML; it was read before.
@@ -205,9 +206,17 @@ pub fn nominal_description(
     // The user does not know the planted effects.
     table.remove("effect");
     if let Some(Value::Table(joint)) = table.get_mut("joint") {
-        for key in ["kt", "kr", "ktr"] {
-            joint.remove(key);
+        let nominal = simulated.nominal.joint.unwrap_or(Joint::RIGID);
+        let springs = [
+            ("kt", test.joint.kt, nominal.kt),
+            ("kr", test.joint.kr, nominal.kr),
+        ];
+        for (key, described, stiffness) in springs {
+            if described != Some(f64::INFINITY) || stiffness.is_finite() {
+                joint.remove(key);
+            }
         }
+        joint.remove("ktr");
     }
     let mut scales = simulated.scales.iter().zip(1i64..);
     if test.hammer.is_some()

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint_analysis::nominal_with;
-use tapjoint_beam::effects::{EffectError, EffectId};
+use tapjoint_beam::effects::{EffectError, EffectId, Group};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, TestDescription};
 use tapjoint_diagnosis::{
@@ -111,6 +111,10 @@ pub fn judge_plan(
     };
     let mut groups = GROUPS.to_vec();
     groups.retain(|group| !cannot.contains(&group[0]));
+    // Errors of the set-up show in the shapes alone, which need hammer and sensor.
+    if test.hammer.is_none() || test.sensors.is_empty() {
+        groups.retain(|group| group[0].group() != Group::SetUp);
+    }
     let total = (groups.len() + 1) * settings.draws;
     let done = AtomicUsize::new(0);
     (0..total)
@@ -192,7 +196,8 @@ fn case(
             length: body.length(),
             ..body.beams()[0]
         };
-        effects.push(draw_effect(&beam, group, &mut random)?);
+        let set_ups = plan.set_ups(beam.length);
+        effects.push(draw_effect(&beam, &set_ups, group, &mut random)?);
     }
     let observed = observe(plan, nominal, &effects, random.random())?;
     let exact = TestPlan {
@@ -207,6 +212,7 @@ fn case(
         effects: effects.iter().map(Planted::of).collect(),
         detectable: (!effects.is_empty()).then_some(chi_square > DETECTABLE),
         refutable: None,
+        within_tolerance: None,
     };
     let diagnosis = diagnose(&observed, nominal, &GapSettings::default());
     let answer = diagnosis.map_or_else(|_| Answer::default(), |found| Answer::of(&found));

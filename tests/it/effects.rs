@@ -56,6 +56,12 @@ fn typical(id: EffectId) -> Effect {
     Effect::from_pairs(id, pairs).unwrap()
 }
 
+/// Errors of the set-up leave the specimen as it is.
+fn of_the_specimen() -> impl Iterator<Item = EffectId> {
+    let all = EffectId::ALL.into_iter();
+    all.filter(|id| id.group() != Group::SetUp)
+}
+
 fn absent(id: EffectId) -> Effect {
     let sizes = id.size_parameters().iter();
     sizes.fold(typical(id), |effect, name| effect.with(name, 0.0).unwrap())
@@ -92,7 +98,7 @@ fn prop_names_are_read_back() {
 
 #[test]
 fn val_places_groups_and_parameters_are_those_of_the_table() {
-    let table: [(&str, &str, &str, &[&str]); 16] = [
+    let table: [(&str, &str, &str, &[&str]); 24] = [
         ("sensor-mass", "sensor", "sensor-mass", &["mass"]),
         ("sensor-cable", "sensor", "sensor-cable", &["stiffness"]),
         ("cross-coupling", "joint", "cross-coupling", &["coupling"]),
@@ -105,9 +111,17 @@ fn val_places_groups_and_parameters_are_those_of_the_table() {
         ),
         ("joint-damping", "joint", "joint-damping", &["loss_factor"]),
         ("joint-drift", "joint", "joint-drift", &["std"]),
+        (
+            "joint-compliance",
+            "joint",
+            "joint-compliance",
+            &["rotation", "translation"],
+        ),
         ("fixture", "fixture", "fixture", &["frequency", "ratio"]),
         ("modulus", "body", "scale", &["relative"]),
         ("length", "body", "scale", &["relative"]),
+        ("density", "body", "scale", &["relative"]),
+        ("thickness", "body", "scale", &["relative"]),
         ("timebase", "acquisition", "scale", &["relative"]),
         ("added-mass", "body", "added-mass", &["mass", "position"]),
         (
@@ -119,6 +133,26 @@ fn val_places_groups_and_parameters_are_those_of_the_table() {
         ("axial-load", "body", "offset", &["force"]),
         ("shear-rotary", "body", "shear-rotary", &["factor"]),
         ("resolution", "acquisition", "offset", &["offset"]),
+        (
+            "sensor-position",
+            "acquisition",
+            "set-up",
+            &["offset", "sensor", "recording"],
+        ),
+        ("sensor-polarity", "acquisition", "set-up", &["sensor"]),
+        ("sensor-swap", "acquisition", "set-up", &["sensor", "other"]),
+        (
+            "sensor-scale",
+            "acquisition",
+            "set-up",
+            &["relative", "sensor"],
+        ),
+        (
+            "tap-position",
+            "acquisition",
+            "set-up",
+            &["offset", "recording"],
+        ),
     ];
     for (id, (name, place, group, parameters)) in EffectId::ALL.into_iter().zip(table) {
         assert_eq!(
@@ -198,10 +232,7 @@ fn limit_effects_of_no_size_change_nothing() {
 fn prop_every_effect_of_typical_size_is_seen() {
     let untouched = read_with(&[]);
     // A base inserts a mode of its own, so that numbers shift.
-    for id in EffectId::ALL
-        .into_iter()
-        .filter(|id| *id != EffectId::Fixture)
-    {
+    for id in of_the_specimen().filter(|id| *id != EffectId::Fixture) {
         let seen = apply(&[typical(id)], &nominal(), &circumstances());
         let shift = read(&seen)
             .iter()
@@ -220,10 +251,7 @@ fn prop_every_effect_of_typical_size_is_seen() {
 /// The derivative of every frequency with every size, from one solution, against new solutions.
 #[test]
 fn prop_rayleighs_quotient_has_the_exact_derivative() {
-    for id in EffectId::ALL
-        .into_iter()
-        .filter(|id| *id != EffectId::Fixture)
-    {
+    for id in of_the_specimen().filter(|id| *id != EffectId::Fixture) {
         let effect = typical(id);
         let name = id.parameters()[0].name;
         let size = effect.value(name).unwrap();
@@ -270,18 +298,24 @@ fn val_reading_bias_is_pure_offset() {
 }
 
 #[test]
-fn val_modulus_and_length_scale_a_clamped_beam() {
+fn val_properties_of_the_beam_scale_a_clamped_beam() {
     let clamped = Specimen {
         joint: Some(Joint::RIGID),
         ..nominal()
     };
-    // f ~ sqrt(E) L^-2; with length the beam's mass grows too, so that only the bare beam scales.
+    // f ~ h L^-2 sqrt(E/rho); the beam's mass changes too, so that only the bare beam scales.
     let bare = Specimen {
         masses: Vec::new(),
         ..clamped
     };
     let base = read(&apply(&[], &bare, &circumstances()));
-    for (id, power) in [(EffectId::Modulus, 0.5), (EffectId::Length, -2.0)] {
+    let powers = [
+        (EffectId::Modulus, 0.5),
+        (EffectId::Length, -2.0),
+        (EffectId::Density, -0.5),
+        (EffectId::Thickness, 1.0),
+    ];
+    for (id, power) in powers {
         let effect = Effect::from_pairs(id, &[("relative", 0.01)]).unwrap();
         let found = read(&apply(&[effect], &bare, &circumstances()));
         for (a, b) in found.iter().zip(&base) {
@@ -293,6 +327,21 @@ fn val_modulus_and_length_scale_a_clamped_beam() {
             );
         }
     }
+}
+
+#[test]
+fn val_a_rigid_joint_that_gives_has_the_stiffness_of_the_compliance() {
+    let rigid = Specimen {
+        joint: Some(Joint::RIGID),
+        ..nominal()
+    };
+    let sizes = [("rotation", 0.05), ("translation", 0.001)];
+    let effect = Effect::from_pairs(EffectId::JointCompliance, &sizes).unwrap();
+    let seen = apply(&[effect], &rigid, &circumstances());
+    let units = StiffnessUnits::of(&steel_strip());
+    let [kt, kr] = seen.specimen.joint_stiffnesses();
+    // E I/L over the stiffness.
+    assert!((units.kr / kr - 0.05).abs() < 1e-15 && (units.kt / kt - 0.001).abs() < 1e-15);
 }
 
 #[test]

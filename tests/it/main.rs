@@ -46,6 +46,7 @@ mod recording_uff;
 mod report;
 mod resolution;
 mod scales;
+mod set_up_errors;
 mod set_ups;
 mod several_files;
 mod shared;

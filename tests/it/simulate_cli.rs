@@ -5,6 +5,7 @@ use predicates::prelude::*;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use tapjoint::effects::EffectId;
 use tempfile::TempDir;
 
 use crate::shared::tapped_strip;
@@ -137,6 +138,30 @@ fn regress_the_folder_holds_what_a_user_believes_and_the_truth_beside_it() {
 }
 
 #[test]
+fn regress_every_effect_is_listed_in_help_and_guide() {
+    let help = tapjoint(Path::new("."))
+        .args(["simulate", "--help"])
+        .output()
+        .unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide.md");
+    let guide = fs::read_to_string(guide).unwrap();
+    for id in EffectId::ALL {
+        let name = id.name();
+        // A bias of reading is in no recording.
+        let is_listed = help.contains(&format!("\n  {name}: "));
+        assert_eq!(is_listed, id != EffectId::Resolution, "{name}");
+        let mut rows = guide.lines().filter(|line| line.starts_with("| `"));
+        let row = rows.find(|row| row.contains(&format!("`{name}`")));
+        let row = row.unwrap_or_else(|| panic!("{name} is not in the guide"));
+        for info in id.parameters() {
+            let parameter = format!("`{}`", info.name);
+            assert!(row.contains(&parameter), "{name}: {parameter}");
+        }
+    }
+}
+
+#[test]
 fn regress_the_laboratory_is_printed_and_json_is_the_truth() {
     let folder = folder(TEST);
     tapjoint(folder.path())
@@ -201,7 +226,7 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
     let no_joint = TEST.replace("kt = 1.994e6", "");
     let measured = TEST.split("[[recording]]").next().unwrap().to_owned()
         + "[measured]\nfrequencies = [17.0, 118.0]\n";
-    let cases: [(&str, &[&str], &str); 10] = [
+    let cases: [(&str, &[&str], &str); 12] = [
         (&no_joint, &[], "kt is missing"),
         (&measured, &[], "no recording to simulate"),
         (
@@ -224,6 +249,16 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
             TEST,
             &["--with", "resolution:offset=0.1"],
             "bias of reading",
+        ),
+        (
+            TEST,
+            &["--with", "sensor-position:offset=90mm,sensor=1"],
+            "give an offset from -0.338 to 0.085 m",
+        ),
+        (
+            TEST,
+            &["--with", "sensor-swap:other=3"],
+            "other is 3, but the test has 2 sensors",
         ),
         (TEST, &["--rate", "1000"], "band ends at 1000 Hz"),
         (TEST, &["--seconds", "0.6"], "fewer --taps"),

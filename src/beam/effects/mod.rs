@@ -4,12 +4,17 @@
 //!
 //! ```text
 //! EffectId, parameters -> Effect ; apply(effects, nominal specimen, circumstances) -> Seen
+//!                                  actual_set_ups(effects, described places) -> places and signals
 //! ```
 
 mod catalogue;
+mod set_up;
 
 use crate::specimen::{Base, Hinge, PointMass, PointSpring, Specimen};
 pub use catalogue::{EffectDimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
+pub use set_up::{
+    ActualSetUp, DescribedSetUp, SensorSignal, SetUpError, actual_set_ups, check_set_up,
+};
 use statrs::function::gamma::gamma;
 use std::f64::consts::PI;
 
@@ -357,7 +362,7 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
         EffectId::AxialLoad => specimen.axial_force += first,
         EffectId::ShearRotary => specimen.shear_rotary += first,
         EffectId::Resolution => seen.frequency_offset += first,
-        // The structure is as described; where sensors and hammer are is the set-up's affair.
+        // The structure is as described: see `actual_set_ups`.
         EffectId::SensorPosition
         | EffectId::SensorPolarity
         | EffectId::SensorSwap

@@ -101,8 +101,6 @@ pub struct Posterior {
 
 /// Usual drift of a joint whose fit has none (1).
 const USUAL_DRIFT: f64 = 0.01;
-/// Second moment of the prior of a size over the square of its scale: half of it each with 1 and 0.4.
-const PRIOR_MOMENT: f64 = 0.58;
 
 impl Posterior {
     /// Returns the posterior of a candidate; `weight` is that of the beam (N).
@@ -397,8 +395,10 @@ fn sharpened(
         if priors[column].is_held() {
             continue;
         }
-        let more = 1.0 / (PRIOR_MOMENT * size.scale * size.scale) - priors[column].std.powi(-2);
         let value = optimum.parameters[column];
+        // Near zero the prior is as wide as its scale, in its tail as the size itself.
+        let width = size.scale.hypot(value - size.neutral);
+        let more = width.powi(-2) - priors[column].std.powi(-2);
         better.curvature[(column, column)] += more;
         pull[column] = more * (value - size.neutral);
         // Pressed against its bound the size is spread as exp(-g t): a second moment of 2/g^2.

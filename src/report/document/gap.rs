@@ -4,8 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
-    AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
-    LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
+    AmplitudeDependence, CommonFactor, DecidedBy, Diagnosis, GapError, Hypothesis,
+    HypothesisResult, JointShift, LocationMap, LocationProbabilities, NextTest, Residual,
+    UnlocatedSensors, Verdict,
 };
 
 /// The gap between model and measurement.
@@ -36,6 +37,10 @@ pub struct GapSection {
     pub along_decays: Option<AmplitudeDependence>,
     /// Changes along the beam that would explain the residual of the nominal model.
     pub map: Option<LocationMap>,
+    /// Common factor that the frequencies ask for; null where they do not fix it.
+    pub common_factor: Option<CommonFactor>,
+    /// Why no closure is stated on data that took no part in anything else; null where there are such data.
+    pub closure_reason: Option<String>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
     /// Tests that would tell more, those first that tell most for their effort.
@@ -128,6 +133,8 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         decided_by: Some(found.decided_by),
         along_decays: found.amplitude_dependence.clone(),
         map: found.location_map.clone(),
+        common_factor: found.common_factor,
+        closure_reason: found.closure_reason.clone(),
         baselines: baselines.collect(),
         next_test: found.next_tests.clone(),
         updated_model: None,

@@ -32,7 +32,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
         }
         // The size of a single effect from which these readings would tell it from every other.
         let told_apart = found.parameters.iter().find_map(|parameter| {
-            let (unit, factor) = unit_of(parameter.name);
+            let (unit, factor) = unit_of(parameter);
             let least = factor * parameter.smallest_separable?;
             Some(format!("{}{unit}", significant(least, 2)))
         });

@@ -6,10 +6,10 @@ use crate::document::{Document, GapSection};
 use crate::format::{
     RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
-use tapjoint_beam::effects::{EffectId, Place};
+use tapjoint_beam::effects::{EffectId, Group, Place};
 use tapjoint_diagnosis::{
-    Closure, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest, ParameterValue, Proposal,
-    Residual, UnlocatedSensors, Verdict,
+    Closure, CommonFactor, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest,
+    ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
 use tapjoint_numerics::stats::times;
 
@@ -162,6 +162,16 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
             "; on withheld frequencies from {} to {} %",
+            percent(Some(before)),
+            left(Some(after), gap.noise_floor)
+        ));
+    }
+    if let Some(closure) = &found.withheld_closure {
+        text.push_str(&share(closure));
+    }
+    if let Some((before, after)) = found.spare_before.zip(found.spare_after) {
+        text.push_str(&format!(
+            "; on frequencies that took no part in this choice from {} to {} %",
             percent(Some(before)),
             left(Some(after), gap.noise_floor)
         ));
@@ -350,8 +360,9 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
             format!("The data are consistent with {causes}{odds}{size}.")
         }
         Verdict::Group(effects) => format!(
-            "The cause is one of {}{odds}; these data cannot tell them apart.",
-            names(effects)
+            "The cause is one of {}{odds}; these data cannot tell them apart.{}",
+            names(effects),
+            scale_of(effects, gap)
         ),
         Verdict::Set(list) => {
             let words = list.iter().map(|one| match one {
@@ -359,20 +370,53 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
                 _ => one.name(),
             });
             let effects: Vec<String> = words.collect();
-            match effects.as_slice() {
-                [effect] => format!(
-                    "{effect} explains the readings best, but does not predict the withheld ones any better: it is \
-                     probably not the cause."
-                ),
-                _ => format!(
-                    "The cause is most likely one of {}; these data do not decide.",
-                    listed(&effects, "or")
-                ),
-            }
+            format!(
+                "The cause is most likely one of {}; these data do not decide.",
+                listed(&effects, "or")
+            )
         }
         Verdict::Unknown => unknown(gap, has_joint),
         Verdict::NotEnoughData(reason) => undecided(gap, reason, has_joint),
     }
+}
+
+/// Tells what all frequencies ask for where the effects are those of one common factor.
+fn scale_of(effects: &[EffectId], gap: &GapSection) -> String {
+    let factor = gap.common_factor.as_ref();
+    match factor.filter(|_| effects.iter().all(|one| one.group() == Group::Scale)) {
+        Some(factor) => format!(
+            " All frequencies ask for {} %; the description leaves \u{b1}{} % open.",
+            asked(factor),
+            significant(factor.tolerance_percent, 2)
+        ),
+        None => String::new(),
+    }
+}
+
+/// "+1.02 \u{b1} 0.10": a common factor and its standard uncertainty.
+fn asked(factor: &CommonFactor) -> String {
+    let text = rounded(factor.percent, Some(factor.std_percent)).joined();
+    match text.starts_with('-') || text.starts_with('\u{2212}') {
+        true => text,
+        false => format!("+{text}"),
+    }
+}
+
+/// Standard uncertainties from which on a common factor is worth a sentence.
+const ASKED: f64 = 2.0;
+
+/// Tells that the frequencies ask for a common factor that the tolerances allow; nothing where they ask for none.
+fn within_tolerances(gap: &GapSection) -> String {
+    let factor = gap.common_factor.as_ref();
+    let factor = factor
+        .filter(|one| one.percent.abs() > ASKED * one.std_percent && one.deviation.abs() <= ASKED);
+    factor.map_or_else(String::new, |factor| {
+        format!(
+            " The frequencies ask for {} %, within the tolerances of the description (\u{b1}{} %).",
+            asked(factor),
+            significant(factor.tolerance_percent, 2)
+        )
+    })
 }
 
 /// Tells that the cause has no name, and that it is spread where two local changes would explain it.
@@ -436,7 +480,8 @@ fn no_gap(gap: &GapSection) -> String {
                 percent(Some(before))
             ));
             format!(
-                "No gap: the described model explains the frequencies within their uncertainty{moved}.{open}"
+                "No gap: the described model explains the frequencies within their uncertainty{moved}.{}{open}",
+                within_tolerances(gap)
             )
         }
     }
@@ -542,7 +587,6 @@ pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
         Verdict::NoGap => "no gap found".to_owned(),
         Verdict::Named(_) => format!("missing in it: {}", listed(&names, "and")),
         Verdict::Group(_) => format!("missing in it: one of {}", listed(&names, "or")),
-        Verdict::Set(_) if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
         Verdict::Set(_) => format!(
             "these data do not decide what is missing in it: {}",
             listed(&names, "or")
@@ -666,7 +710,7 @@ pub(crate) fn sizes(found: &HypothesisResult) -> String {
 }
 
 fn size(parameter: &ParameterValue) -> String {
-    let (unit, factor) = unit_of(parameter.name);
+    let (unit, factor) = unit_of(parameter);
     let value = factor * parameter.value;
     let known = parameter.std.map(|std| factor * std);
     let size = match known.filter(|std| std.is_finite() && *std > 0.0) {
@@ -678,8 +722,10 @@ fn size(parameter: &ParameterValue) -> String {
 }
 
 /// The unit a parameter is read in, and how many of it one SI unit is.
-pub(crate) fn unit_of(name: &str) -> (&'static str, f64) {
-    match name {
+pub(crate) fn unit_of(parameter: &ParameterValue) -> (&'static str, f64) {
+    match parameter.name {
+        // A place that is off; that of readings is a frequency.
+        "offset" if parameter.effect.group() == Group::SetUp => (" mm", 1e3),
         "mass" => (" g", 1e3),
         "inertia" => (" kg mm\u{b2}", 1e6),
         "position" => (" mm", 1e3),

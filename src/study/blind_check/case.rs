@@ -79,6 +79,9 @@ pub struct Truth {
     pub detectable: Option<bool>,
     /// True where such readings show that nothing in the catalogue explains them.
     pub refutable: Option<bool>,
+    /// True where one common factor on all frequencies was planted that the tolerances of the description cover: it is a
+    /// part of what is described, and no effect. `None` where no such factor was planted, or this is not known.
+    pub within_tolerance: Option<bool>,
 }
 
 /// Kinds of cases, each with questions of its own.
@@ -95,6 +98,15 @@ pub enum CaseKind {
 }
 
 impl Truth {
+    /// The planted effects that an answer has to find: all but a factor within the tolerances of the description.
+    pub fn counted(&self) -> impl Iterator<Item = &Planted> {
+        let covered = self.within_tolerance == Some(true);
+        self.effects.iter().filter(move |planted| match planted {
+            Planted::Catalogue(id, _) => !(covered && id.group() == Group::Scale),
+            Planted::OutOfCatalogue(_) => true,
+        })
+    }
+
     /// The catalogue's effects that were planted.
     pub fn catalogue(&self) -> impl Iterator<Item = (EffectId, &BTreeMap<String, f64>)> {
         self.effects.iter().filter_map(|planted| match planted {
@@ -103,14 +115,18 @@ impl Truth {
         })
     }
 
-    /// Returns the kind of case.
+    /// Returns the kind of case by the effects that count.
     pub fn kind(&self) -> CaseKind {
-        match &self.effects[..] {
+        let counted: Vec<&Planted> = self.counted().collect();
+        match counted[..] {
             [] => CaseKind::Null,
-            all if all.iter().any(|p| matches!(p, Planted::OutOfCatalogue(_))) => {
+            [Planted::Catalogue(id, _)] => CaseKind::Single(*id),
+            _ if counted
+                .iter()
+                .any(|p| matches!(p, Planted::OutOfCatalogue(_))) =>
+            {
                 CaseKind::OutOfCatalogue
             }
-            [Planted::Catalogue(id, _)] => CaseKind::Single(*id),
             _ => CaseKind::Several,
         }
     }
@@ -126,6 +142,19 @@ impl Truth {
     }
 }
 
+/// An estimated parameter of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedParameter {
+    /// The effect.
+    pub effect: EffectId,
+    /// Name of the parameter.
+    pub name: String,
+    /// Value (SI).
+    pub value: f64,
+    /// Stated standard uncertainty (SI); `None` where the data do not bound it.
+    pub std: Option<f64>,
+}
+
 /// The answer of the diagnosis to one test; the default where it could not be diagnosed: no verdict and no
 /// probabilities.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -138,13 +167,34 @@ pub struct Answer {
     pub classes: BTreeMap<Class, f64>,
     /// Probability of each place; `None` is the place of what is unknown.
     pub places: Vec<(Option<Place>, f64)>,
-    /// Estimated parameters of the named effects (SI).
-    pub parameters: Vec<(EffectId, String, f64)>,
+    /// Estimated parameters of the named effects.
+    pub parameters: Vec<EstimatedParameter>,
     /// Share (1) of the gap that closes on withheld data; `None` where it was too small to say.
     pub closure: Option<f64>,
 }
 
 impl Answer {
+    /// Returns true where the verdict names one or more effects, or one group of effects that data like these do not
+    /// separate.
+    pub fn is_name(&self) -> bool {
+        match self.verdict {
+            Some(Verdict::Named(_)) => true,
+            Some(Verdict::Group(_)) => self.named_groups().len() == 1,
+            _ => false,
+        }
+    }
+
+    /// Returns true where the verdict names effects, not a group.
+    pub fn is_single_name(&self) -> bool {
+        matches!(self.verdict, Some(Verdict::Named(_)))
+    }
+
+    /// Estimate of a parameter of an effect.
+    pub fn estimate(&self, effect: EffectId, name: &str) -> Option<&EstimatedParameter> {
+        let mut all = self.parameters.iter();
+        all.find(|one| one.effect == effect && one.name == name)
+    }
+
     /// Name of the verdict, as in the report; "no-answer" where there is none.
     pub fn verdict_name(&self) -> &'static str {
         self.verdict.as_ref().map_or("no-answer", Verdict::kind)
@@ -233,7 +283,12 @@ impl Answer {
                 (None, p.unknown),
             ],
             parameters: parameters
-                .map(|value| (value.effect, value.name.to_owned(), value.value))
+                .map(|found| EstimatedParameter {
+                    effect: found.effect,
+                    name: found.name.to_owned(),
+                    value: found.value,
+                    std: found.std,
+                })
                 .collect(),
             closure: named.and_then(|found| Some(found.closure?.value)),
             effects,

@@ -167,6 +167,12 @@ impl Campaign {
         // Stream 0 shuffles the kinds.
         random.set_stream(index as u64 + 1);
         let subject = Subject::draw(&mut random);
+        let name = format!("test-{index:04}");
+        let text = subject.describe(&name, self.extent, &mut random);
+        let description = TestDescription::parse(&text, &name)?;
+        // Errors of the set-up are drawn of the described one.
+        let plan = plan_of(&description, &PlanSettings::default())?;
+        let set_ups = plan.set_ups(subject.beam.length);
         let mut planted = Vec::new();
         let mut effects = Vec::new();
         let mut fastened = Fastened::default();
@@ -176,7 +182,7 @@ impl Campaign {
             Plant::Pair => rand::seq::index::sample(&mut random, GROUPS.len(), 2).into_vec(),
         };
         for group in groups {
-            let effect = draw_effect(&subject.beam, GROUPS[group], &mut random)?;
+            let effect = draw_effect(&subject.beam, &set_ups, GROUPS[group], &mut random)?;
             planted.push(Planted::of(&effect));
             effects.push(effect);
         }
@@ -187,10 +193,7 @@ impl Campaign {
         }
         let drift = random.random_range(0.0..=self.drift);
         effects.push(Effect::from_pairs(EffectId::JointDrift, &[("std", drift)])?);
-        let name = format!("test-{index:04}");
-        let text = subject.describe(&name, self.extent, &mut random);
         Ok(DrawnTest {
-            description: TestDescription::parse(&text, &name)?,
             laboratory: subject.laboratory(self.extent, &mut random)?,
             noise_db: self.noise_db,
             modes: self.extent.modes(),
@@ -200,8 +203,10 @@ impl Campaign {
                 effects: planted,
                 detectable: None,
                 refutable: None,
+                within_tolerance: within_tolerance(&effects, &description),
             },
             text,
+            description,
             effects,
             fastened,
         })
@@ -216,6 +221,43 @@ impl Campaign {
         plants.shuffle(&mut ChaCha8Rng::seed_from_u64(self.seed));
         plants
     }
+}
+
+/// Standard deviations of what the tolerances leave open up to which a common factor on all frequencies is no effect.
+const COVERED: f64 = 2.0;
+
+/// Power with which a property enters the frequencies of a beam, h/L^2 sqrt(E/rho), and the clock; 0 where it is no common
+/// factor on all of them. The width has almost no influence.
+fn power_of(effect: EffectId) -> f64 {
+    match effect {
+        EffectId::Modulus => 0.5,
+        EffectId::Thickness | EffectId::Timebase => 1.0,
+        EffectId::Density => -0.5,
+        EffectId::Length => -2.0,
+        _ => 0.0,
+    }
+}
+
+/// Returns true where a planted common factor on all frequencies lies within the tolerances of the description; `None`
+/// where there is none.
+fn within_tolerance(effects: &[Effect], description: &TestDescription) -> Option<bool> {
+    let factors = effects.iter().filter(|effect| power_of(effect.id) != 0.0);
+    let changes: Vec<f64> = factors
+        .filter_map(|effect| Some(power_of(effect.id) * effect.value("relative")?.ln_1p()))
+        .collect();
+    let (beam, tolerance) = (&description.beam, &description.beam.tolerance);
+    let variances = [
+        (EffectId::Modulus, tolerance.modulus.std / beam.modulus),
+        (
+            EffectId::Thickness,
+            tolerance.thickness.std / beam.thickness,
+        ),
+        (EffectId::Density, tolerance.density.std / beam.density),
+        (EffectId::Length, tolerance.length.std / beam.length),
+    ]
+    .map(|(property, relative)| (power_of(property) * relative).powi(2));
+    let std = variances.iter().sum::<f64>().sqrt();
+    (!changes.is_empty()).then(|| changes.iter().sum::<f64>().abs() < COVERED * std)
 }
 
 /// A random factor whose logarithm is normal, with this standard deviation.
@@ -398,17 +440,14 @@ impl DrawnTest {
             seed: self.seed,
         };
         let mut test = plan_test(&plan)?;
-        let described = self.description.recordings.iter();
-        let recordings = test.recordings.iter_mut().zip(described);
-        for (recording, described) in recordings.filter(|_| !self.fastened.is_empty()) {
+        let recordings = test.recordings.iter_mut();
+        for recording in recordings.filter(|_| !self.fastened.is_empty()) {
             // Adds what no effect describes, and looks at the structure again.
             self.fastened.add_to(&mut recording.seen.specimen);
-            let sensors = self.description.sensors.iter();
-            let places = sensors.filter_map(|sensor| described.place_of(sensor));
             recording.structure = ObservedStructure::new(
                 &recording.seen.specimen,
                 &self.laboratory.specimen,
-                &places.collect::<Vec<f64>>(),
+                recording.structure.sensors(),
                 recording.seen.joint_loss_factor,
                 recording.plan.highest_mode(&self.laboratory),
             )?;

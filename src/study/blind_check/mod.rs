@@ -16,7 +16,7 @@ mod score;
 mod table;
 mod truth_file;
 
-pub use case::{Answer, Case, CaseKind, Class, Extent, Planted, Truth};
+pub use case::{Answer, Case, CaseKind, Class, EstimatedParameter, Extent, Planted, Truth};
 pub use draw::{Campaign, DrawError, DrawnTest, Recorded, RecordedTest};
 pub use planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect};
 pub use score::{

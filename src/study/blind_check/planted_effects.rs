@@ -5,12 +5,13 @@ use rand::RngExt;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 use tapjoint_beam::Beam;
-use tapjoint_beam::effects::{Effect, EffectError, EffectId};
+use tapjoint_beam::effects::{DescribedSetUp, Effect, EffectError, EffectId, Group};
 use tapjoint_beam::specimen::{Hinge, PointMass, PointSpring, Specimen};
 
 /// The groups that single effects are dealt from; `resolution` is a reading bias that recordings
-/// cannot hold, `joint-drift` a nuisance that every test has.
-pub const GROUPS: [&[EffectId]; 12] = [
+/// cannot hold, `joint-drift` a nuisance that every test has, and `joint-compliance` needs a joint that is described as
+/// rigid.
+pub const GROUPS: [&[EffectId]; 13] = [
     &[EffectId::SensorMass],
     &[EffectId::SensorCable],
     &[EffectId::CrossCoupling],
@@ -29,18 +30,33 @@ pub const GROUPS: [&[EffectId]; 12] = [
     &[EffectId::LocalCrack],
     &[EffectId::AxialLoad],
     &[EffectId::ShearRotary],
+    &[
+        EffectId::SensorPosition,
+        EffectId::SensorPolarity,
+        EffectId::SensorSwap,
+        EffectId::SensorScale,
+        EffectId::TapPosition,
+    ],
 ];
 
-/// One effect of a group, its size log-uniform between small and large, its sign and place at random.
+/// One effect of a group, its size log-uniform between small and large, its sign and place at random. `set_ups` are those
+/// of the recordings; without any there is no error of the set-up.
 ///
 /// # Errors
 /// [`EffectError`] where a beam so unlike a test specimen takes a size out of its range.
 pub fn draw_effect(
     beam: &Beam,
+    set_ups: &[DescribedSetUp],
     group: &[EffectId],
     random: &mut ChaCha8Rng,
 ) -> Result<Effect, EffectError> {
-    let id = *group.choose(random).unwrap_or(&group[0]);
+    let sensors = set_ups.first().map_or(0, |first| first.sensors.len());
+    let mut possible = group.to_vec();
+    possible.retain(|id| *id != EffectId::SensorSwap || sensors > 1);
+    let id = *possible.choose(random).unwrap_or(&group[0]);
+    if id.group() == Group::SetUp {
+        return Effect::from_pairs(id, &set_up_error(id, set_ups, random));
+    }
     let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
     let mut pairs = size(beam, id, sign, random);
     let places = match id {
@@ -57,6 +73,81 @@ pub fn draw_effect(
 /// A random size whose logarithm is uniform.
 pub(super) fn log_uniform(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
     random.random_range(low.ln()..high.ln()).exp()
+}
+
+/// Sizes of an error in the position of a sensor (m): from a careless reading of the tape to a number that is mistyped.
+const SENSOR_OFFSETS: [f64; 2] = [2e-3, 30e-3];
+/// Sizes of an error in the position of the taps (m).
+const TAP_OFFSETS: [f64; 2] = [5e-3, 40e-3];
+/// Factors by which a calibration is off, either way.
+const SCALE_FACTORS: [f64; 2] = [1.05, 2.0];
+
+/// The parameters of an error of the set-up.
+fn set_up_error(
+    id: EffectId,
+    set_ups: &[DescribedSetUp],
+    random: &mut ChaCha8Rng,
+) -> Vec<(&'static str, f64)> {
+    let sensors = set_ups.first().map_or(1, |first| first.sensors.len());
+    let sensor = random.random_range(0..sensors.max(1));
+    let number = (sensor + 1) as f64;
+    let signed = |size: f64, random: &mut ChaCha8Rng| match random.random_bool(0.5) {
+        true => size,
+        false => -size,
+    };
+    match id {
+        EffectId::SensorPosition => {
+            let places = set_ups.iter().filter_map(|one| one.sensors.get(sensor));
+            let places: Vec<f64> = places.copied().collect();
+            let size = log_uniform(SENSOR_OFFSETS[0], SENSOR_OFFSETS[1], random);
+            let offset = signed(size, random);
+            let mut pairs = offset_of(&places, set_ups, offset, random);
+            pairs.push(("sensor", number));
+            pairs
+        }
+        EffectId::SensorPolarity => vec![("sensor", number)],
+        EffectId::SensorSwap => {
+            let other = (sensor + random.random_range(1..sensors.max(2))) % sensors.max(2);
+            vec![("sensor", number), ("other", (other + 1) as f64)]
+        }
+        EffectId::SensorScale => {
+            // All sensors at once, as by the hammer's calibration, or one of them.
+            let number = random.random_range(0..=sensors) as f64;
+            let size = log_uniform(SCALE_FACTORS[0].ln(), SCALE_FACTORS[1].ln(), random);
+            let relative = signed(size, random).exp_m1();
+            vec![("relative", relative), ("sensor", number)]
+        }
+        _ => {
+            let places: Vec<f64> = set_ups.iter().map(|one| one.tap).collect();
+            let offset = signed(log_uniform(TAP_OFFSETS[0], TAP_OFFSETS[1], random), random);
+            offset_of(&places, set_ups, offset, random)
+        }
+    }
+}
+
+/// An offset of one of the places that recordings share, of the other sign or smaller where it would leave the beam.
+fn offset_of(
+    places: &[f64],
+    set_ups: &[DescribedSetUp],
+    offset: f64,
+    random: &mut ChaCha8Rng,
+) -> Vec<(&'static str, f64)> {
+    let chosen = random.random_range(0..places.len().max(1));
+    let (Some(place), Some(set_up)) = (places.get(chosen), set_ups.get(chosen)) else {
+        return vec![("offset", offset)];
+    };
+    let [left, right] = [*place, set_up.length - place];
+    let room = if offset < 0.0 { left } else { right };
+    let offset = match offset.abs() <= room {
+        true => offset,
+        false if left > right => -offset.abs().min(left),
+        false => offset.abs().min(right),
+    };
+    // The first recording with this place stands for all of them; where there is but one place, 0 does.
+    let first = places.iter().position(|one| one == place).unwrap_or(0);
+    let is_only = places.iter().all(|one| one == place);
+    let recording = if is_only { 0.0 } else { (first + 1) as f64 };
+    vec![("offset", offset), ("recording", recording)]
 }
 
 /// The parameters but for positions.

@@ -3,7 +3,7 @@
 //!
 //! Checks of the check: answers without knowledge must score as guesses do.
 
-use super::case::{Answer, Case, CaseKind, Class, Extent, Truth};
+use super::case::{Answer, Case, CaseKind, Class, EstimatedParameter, Extent, Planted, Truth};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -28,18 +28,35 @@ pub struct Scores {
     pub top_1_of_all: Rate,
     /// One effect: the most probable place is right.
     pub place: Rate,
-    /// One effect, named: the name is right.
+    /// One effect, named: the name is right. A verdict of one group of effects names that group.
     pub named_right: Rate,
     /// One effect: something is named.
     pub named: Rate,
     /// Any case in which something is named: the names are exactly what was planted.
     pub named_right_of_all: Rate,
+    /// All cases: something is named.
+    pub name_share: Rate,
+    /// `named_right` of verdicts that name a single effect, or two, and no group.
+    pub single_named_right: Rate,
+    /// `named` by such verdicts.
+    pub single_named: Rate,
+    /// `named_right_of_all` of such verdicts.
+    pub single_named_right_of_all: Rate,
+    /// One clear error of the set-up (an offset of 5 mm and more, a polarity, a swap, a scale that is 10 % off and more):
+    /// it is named.
+    pub set_up_named: Rate,
+    /// One error of the set-up, rightly named, its size estimated: the size lies within 2 stated standard deviations.
+    pub set_up_size_within_2_std: Rate,
+    /// The same of one effect of any kind.
+    pub size_within_2_std: Rate,
     /// Nothing planted, yet an effect is answered.
     pub null_called_effect: Rate,
     /// Nothing planted, yet an effect is the most probable class.
     pub null_false_alarm: Rate,
     /// Outside the catalogue, yet an effect is named.
     pub outside_named: Rate,
+    /// `outside_named` by a verdict that names a single effect, or two, and no group.
+    pub outside_single_named: Rate,
     /// Outside the catalogue and refutable: no name, no `no-gap`.
     pub outside_refused: Rate,
     /// Outside the catalogue, refutable or not: called unknown.
@@ -79,7 +96,7 @@ pub fn score(cases: &[Case]) -> Scores {
         };
         kind.push((truth, answer));
     }
-    let named = singles.iter().filter(|(_, answer)| is_named(answer));
+    let named = singles.iter().filter(|(_, answer)| answer.is_name());
     let closures = sorted(named.filter_map(|(_, answer)| answer.closure));
     let sizes = sorted(singles.iter().filter_map(|(t, a)| size_error(t, a)));
     let classed = cases.iter().filter_map(|(truth, answer)| {
@@ -106,9 +123,24 @@ pub fn score(cases: &[Case]) -> Scores {
             let mut members = EffectId::ALL.iter().filter(|id| is_class(t, id.group()));
             Some(members.any(|id| Some(id.place()) == place))
         }),
-        named_right: Rate::of(&singles, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
-        named: Rate::of(&singles, |(_, a)| Some(is_named(a))),
-        named_right_of_all: Rate::of(cases, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
+        named_right: Rate::of(&singles, |(t, a)| a.is_name().then(|| names_exactly(t, a))),
+        named: Rate::of(&singles, |(_, a)| Some(a.is_name())),
+        named_right_of_all: Rate::of(cases, |(t, a)| a.is_name().then(|| names_exactly(t, a))),
+        name_share: Rate::of(cases, |(_, a)| Some(a.is_name())),
+        single_named_right: Rate::of(&singles, |(t, a)| {
+            a.is_single_name().then(|| names_exactly(t, a))
+        }),
+        single_named: Rate::of(&singles, |(_, a)| Some(a.is_single_name())),
+        single_named_right_of_all: Rate::of(cases, |(t, a)| {
+            a.is_single_name().then(|| names_exactly(t, a))
+        }),
+        set_up_named: Rate::of(&singles, |(t, a)| {
+            is_clear_set_up_error(t).then(|| a.is_name() && names_exactly(t, a))
+        }),
+        set_up_size_within_2_std: Rate::of(&singles, |(t, a)| {
+            size_within_2_std(t, a).filter(|_| is_class(t, Group::SetUp))
+        }),
+        size_within_2_std: Rate::of(&singles, |(t, a)| size_within_2_std(t, a)),
         // The verdict makes its reader believe in an effect.
         null_called_effect: Rate::of(&nulls, |(_, a)| {
             Some(match &a.verdict {
@@ -120,7 +152,8 @@ pub fn score(cases: &[Case]) -> Scores {
         null_false_alarm: Rate::of(&nulls, |(_, a)| {
             Some(matches!(a.first(), Some((Class::Group(_), _))))
         }),
-        outside_named: Rate::of(&outside, |(_, a)| Some(is_named(a))),
+        outside_named: Rate::of(&outside, |(_, a)| Some(a.is_name())),
+        outside_single_named: Rate::of(&outside, |(_, a)| Some(a.is_single_name())),
         outside_refused: Rate::of(&outside, |(t, a)| {
             (t.refutable == Some(true)).then(|| is_refused(a))
         }),
@@ -129,7 +162,7 @@ pub fn score(cases: &[Case]) -> Scores {
         several_detectable: Rate::of(&several, |(t, a)| {
             (t.detectable == Some(true)).then(|| found_or_refused(t, a))
         }),
-        several_found: Rate::of(&several, |(t, a)| Some(is_named(a) && names_exactly(t, a))),
+        several_found: Rate::of(&several, |(t, a)| Some(a.is_name() && names_exactly(t, a))),
         set_coverage: Rate::of(&sets, |(class, set)| Some(set.contains(class))),
         set_size: mean(sets.iter().map(|(_, set)| set.len() as f64)),
         truth_probability: mean(singles.iter().filter_map(|(truth, answer)| {
@@ -145,10 +178,6 @@ pub fn score(cases: &[Case]) -> Scores {
     }
 }
 
-fn is_named(answer: &Answer) -> bool {
-    matches!(answer.verdict, Some(Verdict::Named(_)))
-}
-
 /// Returns true where the verdict leaves the case open: neither an effect nor "nothing is missing".
 fn is_refused(answer: &Answer) -> bool {
     matches!(
@@ -158,7 +187,7 @@ fn is_refused(answer: &Answer) -> bool {
 }
 
 fn found_or_refused(truth: &Truth, answer: &Answer) -> bool {
-    is_refused(answer) || is_named(answer) && names_exactly(truth, answer)
+    is_refused(answer) || answer.is_name() && names_exactly(truth, answer)
 }
 
 fn is_class(truth: &Truth, group: Group) -> bool {
@@ -171,35 +200,101 @@ fn rank_within(truth: &Truth, answer: &Answer, most: usize) -> bool {
     first.any(|group| is_class(truth, group))
 }
 
-/// Returns true where the verdict names the groups of all that was planted, and no other.
+/// Returns true where the verdict names the groups of all that was planted, and no other. Where it names an error of the
+/// set-up, it names the sensor too.
 fn names_exactly(truth: &Truth, answer: &Answer) -> bool {
     if truth.kind() == CaseKind::OutOfCatalogue {
         return false;
     }
-    let mut groups: Vec<Group> = truth.catalogue().map(|(id, _)| id.group()).collect();
+    let counted = truth.counted().filter_map(|planted| match planted {
+        Planted::Catalogue(id, _) => Some(id.group()),
+        Planted::OutOfCatalogue(_) => None,
+    });
+    let mut groups: Vec<Group> = counted.collect();
     groups.sort();
     groups.dedup();
-    groups == answer.named_groups()
+    groups == answer.named_groups() && names_the_sensor(truth, answer)
+}
+
+/// Returns false where an effect is named, but of another sensor than the planted one. An answer that gives no sensor
+/// cannot be wrong in it. Sensor 0 stands for all: of a single sensor both numbers are right.
+fn names_the_sensor(truth: &Truth, answer: &Answer) -> bool {
+    truth.catalogue().all(|(id, values)| {
+        let found = ["sensor", "other"]
+            .map(|name| answer.estimate(id, name).map(|estimate| estimate.value));
+        let [Some(found), other] = found else {
+            return true;
+        };
+        let Some(&planted) = values.get("sensor") else {
+            return true;
+        };
+        let is_same = found == planted || found == 0.0 || planted == 0.0;
+        match (other, values.get("other")) {
+            // A swap has no direction.
+            (Some(other), Some(&planted_other)) => {
+                let crossed = found == planted_other && other == planted;
+                crossed || is_same && other == planted_other
+            }
+            _ => is_same,
+        }
+    })
+}
+
+/// Least offset that is a clear error of the set-up (m).
+const CLEAR_OFFSET: f64 = 5e-3;
+/// Least relative error of a calibration that is clear (1), either way.
+const CLEAR_SCALE: f64 = 0.1;
+
+/// Returns true of an error of the set-up that a test is expected to show.
+fn is_clear_set_up_error(truth: &Truth) -> bool {
+    let CaseKind::Single(id) = truth.kind() else {
+        return false;
+    };
+    let mut planted = truth.catalogue().filter(|(own, _)| *own == id);
+    let values = planted.next().map(|(_, values)| values);
+    let size = |name: &str| values.and_then(|values| values.get(name)).copied();
+    match id {
+        EffectId::SensorPosition | EffectId::TapPosition => {
+            size("offset").is_some_and(|offset| offset.abs() >= CLEAR_OFFSET)
+        }
+        EffectId::SensorScale => {
+            size("relative").is_some_and(|relative| relative.abs() >= CLEAR_SCALE)
+        }
+        EffectId::SensorPolarity | EffectId::SensorSwap => true,
+        _ => false,
+    }
+}
+
+/// Planted size of the one effect that counts, and its estimate, where that very effect is named.
+fn size_of<'a>(truth: &Truth, answer: &'a Answer) -> Option<(f64, &'a EstimatedParameter)> {
+    let CaseKind::Single(id) = truth.kind() else {
+        return None;
+    };
+    if !answer.is_name() || answer.effects != [id] {
+        return None;
+    }
+    let (_, values) = truth.catalogue().find(|(own, _)| *own == id)?;
+    let name = *id.size_parameters().first()?;
+    Some((*values.get(name)?, answer.estimate(id, name)?))
 }
 
 /// abs ln(estimate/truth) of the effect's size where that very effect is named; infinite where the
 /// sign is wrong.
 fn size_error(truth: &Truth, answer: &Answer) -> Option<f64> {
-    let (id, values) = truth.catalogue().next()?;
-    if !is_named(answer) || answer.effects != [id] {
-        return None;
-    }
-    let name = *id.size_parameters().first()?;
-    let planted = values.get(name)?;
-    let (.., found) = answer
-        .parameters
-        .iter()
-        .find(|(effect, parameter, _)| *effect == id && parameter == name)?;
-    let ratio = found / planted;
+    let (planted, found) = size_of(truth, answer)?;
+    let ratio = found.value / planted;
     Some(match ratio > 0.0 {
         true => ratio.ln().abs(),
         false => f64::INFINITY,
     })
+}
+
+/// Returns true where the estimated size lies within 2 standard deviations of the planted one; `None` where that very
+/// effect is not named, or its size has no standard deviation.
+fn size_within_2_std(truth: &Truth, answer: &Answer) -> Option<bool> {
+    let (planted, found) = size_of(truth, answer)?;
+    let std = found.std?;
+    Some((found.value - planted).abs() <= 2.0 * std)
 }
 
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {

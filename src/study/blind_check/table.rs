@@ -90,9 +90,19 @@ fn all_rows(s: &Scores) -> Vec<Row> {
         rate("named_right", s.named_right, AtLeast(0.96)),
         rate("coverage", s.named, AtLeast(0.62)),
         rate("named_right_of_all", s.named_right_of_all, None),
+        rate("name_share", s.name_share, None),
+        rate("single_named_right", s.single_named_right, None),
+        rate("single_coverage", s.single_named, None),
+        rate(
+            "single_named_right_of_all",
+            s.single_named_right_of_all,
+            None,
+        ),
+        rate("set_up_named", s.set_up_named, None),
         rate("null_called_effect", s.null_called_effect, AtMost(0.02)),
         rate("null_false_alarm", s.null_false_alarm, None),
         rate("outside_named", s.outside_named, AtMost(0.18)),
+        rate("outside_single_named", s.outside_single_named, None),
         rate("outside_refused", s.outside_refused, AtLeast(0.80)),
         rate("outside_unknown", s.outside_unknown, None),
         rate(
@@ -111,6 +121,8 @@ fn all_rows(s: &Scores) -> Vec<Row> {
         figure("closure_median", median, AtLeast(0.97)),
         figure("closure_10th", tenth, AtLeast(0.75)),
         figure("size_error", s.size_error, AtMost(0.15)),
+        rate("size_within_2_std", s.size_within_2_std, None),
+        rate("set_up_size_within_2_std", s.set_up_size_within_2_std, None),
     ]
 }
 
@@ -125,9 +137,15 @@ fn meaning(key: &str) -> &'static str {
         "named_right" => "one effect, named: name is right",
         "coverage" => "one effect: something is named",
         "named_right_of_all" => "any case, named: name is right",
+        "name_share" => "any case: something is named",
+        "single_named_right" => "one effect, no group: name is right",
+        "single_coverage" => "one effect: named, and no group",
+        "single_named_right_of_all" => "any case, no group: name is right",
+        "set_up_named" => "clear error of the set-up: named",
         "null_called_effect" => "nothing: called an effect",
         "null_false_alarm" => "nothing: an effect comes first",
         "outside_named" => "outside: named",
+        "outside_single_named" => "outside: named, and no group",
         "outside_refused" => "outside, refutable: refused",
         "outside_unknown" => "outside: called unknown",
         "several_found_or_refused" => "two: both found, or refused",
@@ -142,6 +160,8 @@ fn meaning(key: &str) -> &'static str {
         "closure_median" => "withheld closure, named: median",
         "closure_10th" => "withheld closure, named: 10th pct",
         "size_error" => "size error, median |ln ratio|",
+        "size_within_2_std" => "named: size within 2 std",
+        "set_up_size_within_2_std" => "set-up, named: size within 2 std",
         _ => "",
     }
 }

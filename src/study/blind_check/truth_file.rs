@@ -15,7 +15,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use tapjoint_beam::effects::{EffectError, EffectId};
+use tapjoint_beam::effects::{EffectError, EffectId, Group};
 
 /// A reason for which a truth file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +54,7 @@ struct Entry {
     params: BTreeMap<String, Value>,
     detectable: Option<bool>,
     refutable: Option<bool>,
+    within_tolerance: Option<bool>,
     #[serde(flatten)]
     unknown: BTreeMap<String, Value>,
 }
@@ -142,6 +143,7 @@ pub fn parse_truths(text: &str) -> Result<TruthFile, TruthError> {
             name: entry.name,
             detectable: entry.detectable,
             refutable: entry.refutable,
+            within_tolerance: entry.within_tolerance,
         });
     }
     Ok(TruthFile { truths, doubts })
@@ -159,10 +161,18 @@ fn doubts_of(entry: &Entry) -> Vec<String> {
     }
     for key in entry.unknown.keys() {
         doubts.push(format!(
-            "the key `{key}` is not known and is left out; known: name, effects, params, detectable, refutable"
+            "the key `{key}` is not known and is left out; known: name, effects, params, detectable, refutable, \
+             within_tolerance"
         ));
     }
     let effects = entry.known_effects();
+    if entry.within_tolerance == Some(true) && effects.iter().all(|id| id.group() != Group::Scale) {
+        doubts.push(
+            "`within_tolerance` is true, but no modulus, length, density, thickness or timebase is among the effects; all \
+             of them count"
+                .to_owned(),
+        );
+    }
     // Faults outside the catalogue have parameters of their own.
     if effects.len() != entry.effects.len() {
         return doubts;

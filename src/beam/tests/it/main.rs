@@ -4,4 +4,5 @@
 
 mod plate;
 mod sections;
+mod set_up;
 mod width;

@@ -40,6 +40,8 @@
 //! - **Parlett 1998**: "The Symmetric Eigenvalue Problem", SIAM. Rayleigh quotient iteration and its third order.
 //! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
 //!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.
+//! - **Kirchhoff 1879**: "Ueber die Transversalschwingungen eines Stabes von veraenderlichem Querschnitt", Monatsberichte der
+//!   Akademie der Wissenschaften zu Berlin, 815-828. Frequencies of a wedge.
 //! - **Iwan 1966**: "A distributed-element model for hysteresis and its steady-state dynamic response",
 //!   Journal of Applied Mechanics 33, 893-900. Sliders in parallel.
 //! - **Box & Hill 1967**: "Discrimination among mechanistic models", Technometrics 9, 57-71. The experiment

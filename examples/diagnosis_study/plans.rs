@@ -1,6 +1,6 @@
 //! Plans of tests: which recordings are made, with what noise, and what is stated of them.
 
-use super::draws::{log_triangular, log_uniform, normal, weighted};
+use super::draws::{log_triangular, log_uniform, weighted};
 use super::structures::{Structure, Support};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -192,7 +192,7 @@ impl PlannedTest {
             return;
         };
         let tails = StudentT::new(3.0).expect("three degrees of freedom");
-        let Ok(own) = truth.modes(self.plan.modes, Mesh::DIAGNOSIS) else {
+        let Ok(own) = truth.beam_modes(self.plan.modes, Mesh::DIAGNOSIS) else {
             return;
         };
         for configuration in &mut observed.configurations {
@@ -202,12 +202,13 @@ impl PlannedTest {
                 *kt *= factors[0];
                 *kr *= factors[1];
             }
-            let Ok(moved) = drifted.modes(self.plan.modes, Mesh::DIAGNOSIS) else {
+            let Ok(moved) = drifted.beam_modes(self.plan.modes, Mesh::DIAGNOSIS) else {
                 continue;
             };
             for mode in &mut configuration.modes {
-                let index = mode.mode - 1;
-                mode.frequency *= moved.frequencies()[index] / own.frequencies()[index];
+                let [moved, own] = [&moved, &own]
+                    .map(|modes| modes.modes.frequencies()[modes.numbers[mode.mode - 1]]);
+                mode.frequency *= moved / own;
             }
         }
     }
@@ -370,6 +371,7 @@ fn carried_out(
     let length = structure.truth.body.length().min(structure.length());
     let off = |place: f64, error: f64| (place + positions * error).clamp(1e-3 * length, length);
     let mut known: Vec<((String, f64), f64)> = Vec::new();
+    let mut taps: Vec<(f64, f64)> = Vec::new();
     let mass_error = structure.errors.draw(random);
     let mut carried_out = stated.to_vec();
     for configuration in &mut carried_out {
@@ -386,8 +388,14 @@ fn carried_out(
             mass.mass *= (1.0 + masses * mass_error).max(0.0);
             mass.position = off(mass.position, structure.errors.draw(random));
         }
-        // The hammer is aimed anew for every recording.
-        configuration.tap = off(configuration.tap, normal(random));
+        // So has a mark at which the hammer is aimed.
+        let found = taps.iter().find(|one| one.0 == configuration.tap);
+        let truth = found.map(|one| one.1).unwrap_or_else(|| {
+            let truth = off(configuration.tap, structure.errors.draw(random));
+            taps.push((configuration.tap, truth));
+            truth
+        });
+        configuration.tap = truth;
     }
     carried_out
 }

@@ -66,7 +66,10 @@ impl Class {
     pub fn name(self) -> String {
         match self {
             Self::Nothing => "nothing".to_owned(),
-            Self::Single(index) => GROUPS[index][0].group().name().to_owned(),
+            Self::Single(index) => match GROUPS[index] {
+                [alone] => alone.name().to_owned(),
+                members => members[0].group().name().to_owned(),
+            },
             Self::Pair => "pair".to_owned(),
             Self::Outside(kind) => format!("outside-{}", kind.name()),
         }

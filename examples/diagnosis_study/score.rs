@@ -28,23 +28,6 @@ pub struct NamedRate {
     pub ideal: Option<f64>,
 }
 
-impl NamedRate {
-    /// Counts the tests of which `hit` says something.
-    fn of(
-        answered: &[Answered],
-        key: &'static str,
-        title: &'static str,
-        hit: fn(&Trial, &Answer) -> Option<bool>,
-    ) -> Self {
-        Self {
-            key,
-            title,
-            rate: Rate::of(answered, |(trial, answer)| hit(trial, answer)),
-            ideal: None,
-        }
-    }
-}
-
 /// All scores of a set of tests.
 pub struct Scores {
     pub tests: usize,
@@ -108,7 +91,7 @@ impl Scores {
         Self {
             tests: trials.len(),
             failed: trials.len() - answered.len(),
-            rates: rates(&answered),
+            rates: MEASURES.map(|measure| measure.rate(&answered)).into(),
             list_size: mean(&listed),
             closure: closures(&answered),
             first: Calibration::of(&answered, |answer| {
@@ -163,170 +146,253 @@ impl Scores {
     }
 }
 
-fn rates(answered: &[Answered]) -> Vec<NamedRate> {
-    vec![
-        NamedRate::of(
-            answered,
-            "first_class_right",
-            "first class right",
-            |trial, answer| {
-                Some(answer.classes.first().map(|first| &first.0) == Some(&trial.truth.explained()))
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "first_group_right",
-            "first group right",
-            |trial, answer| {
-                trial
-                    .truth
-                    .is_single()
-                    .then(|| first_group_is_right(trial, answer))
-            },
-        ),
-        NamedRate::of(answered, "place_right", "place right", |trial, answer| {
-            trial
-                .truth
-                .is_single()
-                .then(|| place_is_right(trial, answer))
-        }),
-        NamedRate::of(answered, "named", "named", |_, answer| {
-            Some(answer.named().is_some())
-        }),
-        NamedRate::of(
-            answered,
-            "names_right",
-            "names that are right",
-            |trial, answer| {
-                let named = answer.named()?;
-                Some(named == trial.truth.explained())
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "singles_named_right",
-            "one effect: named rightly",
-            |trial, answer| {
-                trial
-                    .truth
-                    .is_single()
-                    .then(|| answer.named() == Some(trial.truth.explained()))
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "singles_named_wrong",
-            "one effect: named wrongly",
-            |trial, answer| {
-                let wrong = answer
-                    .named()
-                    .is_some_and(|named| named != trial.truth.explained());
-                trial.truth.is_single().then_some(wrong)
-            },
-        ),
-        NamedRate::of(answered, "nulls_named", "nulls named", |trial, answer| {
-            let named = matches!(answer.verdict, Verdict::Named(_) | Verdict::Group(_));
-            trial.truth.is_null().then_some(named)
-        }),
-        NamedRate::of(
-            answered,
-            "outside_named",
-            "outside named",
-            |trial, answer| trial.truth.outside.map(|_| answer.named().is_some()),
-        ),
-        NamedRate::of(
-            answered,
-            "outside_unknown",
-            "outside called unknown",
-            |trial, answer| {
-                trial
-                    .truth
-                    .outside
-                    .map(|_| answer.verdict == Verdict::Unknown)
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "pairs_found_or_refused",
-            "pairs both found or refused",
-            |trial, answer| {
-                let refused =
-                    matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData(_));
-                let found = answer.named() == Some(trial.truth.explained());
-                (trial.truth.effects.len() == 2).then_some(refused || found)
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "pairs_found",
-            "pairs both found",
-            |trial, answer| {
-                let found = answer.named() == Some(trial.truth.explained());
-                (trial.truth.effects.len() == 2).then_some(found)
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "list_holds",
-            "90 % list holds the truth",
-            |trial, answer| {
-                let truth = trial.truth.explained();
-                let holds = answer
-                    .list(SET_PROBABILITY)
-                    .iter()
-                    .any(|one| one.0 == truth);
-                (trial.truth.effects.len() < 2).then_some(holds)
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "set_up_named",
-            "set-up errors named",
-            |trial, answer| {
-                let is_named = answer.named() == Some(Explained::Groups(vec![Group::SetUp]));
-                worthy_set_up(trial).map(|_| is_named)
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "set_up_member_right",
-            "set-up errors, kind right",
-            |trial, answer| worthy_set_up(trial).map(|effect| is_named_as(answer, effect)),
-        ),
-        NamedRate::of(
-            answered,
-            "set_up_sizes_hold",
-            "set-up sizes within 2 std",
-            |trial, answer| {
-                let effect = worthy_set_up(trial)?;
-                is_named_as(answer, effect).then(|| size_holds(effect, answer))?
-            },
-        ),
-        NamedRate::of(
-            answered,
-            "sizes_hold",
-            "sizes of names within 2 std",
-            |trial, answer| {
-                let effect = trial.truth.effects.first()?;
-                (trial.truth.is_single() && is_named_as(answer, effect))
-                    .then(|| size_holds(effect, answer))?
-            },
-        ),
-    ]
+/// A rate that is counted: whether a test is a hit, or `None` where the test is none of its cases.
+struct Measure {
+    key: &'static str,
+    title: &'static str,
+    hit: fn(&Trial, &Answer) -> Option<bool>,
 }
 
-/// Returns whether the most probable group of effects is the planted one.
-fn first_group_is_right(trial: &Trial, answer: &Answer) -> bool {
+impl Measure {
+    fn rate(&self, answered: &[Answered]) -> NamedRate {
+        NamedRate {
+            key: self.key,
+            title: self.title,
+            rate: Rate::of(answered, |(trial, answer)| (self.hit)(trial, answer)),
+            ideal: None,
+        }
+    }
+}
+
+const MEASURES: [Measure; 22] = [
+    Measure {
+        key: "first_class_right",
+        title: "first class right",
+        hit: first_class_right,
+    },
+    Measure {
+        key: "first_group_right",
+        title: "one effect: first group",
+        hit: first_group_right,
+    },
+    Measure {
+        key: "first_group_right_visible",
+        title: "  visible",
+        hit: first_group_right_visible,
+    },
+    Measure {
+        key: "place_right",
+        title: "one effect: place",
+        hit: place_right,
+    },
+    Measure {
+        key: "named",
+        title: "named",
+        hit: is_named,
+    },
+    Measure {
+        key: "names_right",
+        title: "names that are right",
+        hit: names_right,
+    },
+    Measure {
+        key: "singles_named_right",
+        title: "one effect: named rightly",
+        hit: single_named_right,
+    },
+    Measure {
+        key: "singles_named_right_visible",
+        title: "  visible",
+        hit: single_named_right_visible,
+    },
+    Measure {
+        key: "singles_named_wrong",
+        title: "one effect: named wrongly",
+        hit: single_named_wrong,
+    },
+    Measure {
+        key: "nulls_named",
+        title: "nulls named",
+        hit: null_named,
+    },
+    Measure {
+        key: "outside_named",
+        title: "outside named",
+        hit: outside_named,
+    },
+    Measure {
+        key: "outside_named_visible",
+        title: "  visible",
+        hit: outside_named_visible,
+    },
+    Measure {
+        key: "outside_unknown",
+        title: "outside called unknown",
+        hit: outside_unknown,
+    },
+    Measure {
+        key: "outside_unknown_visible",
+        title: "  visible",
+        hit: outside_unknown_visible,
+    },
+    Measure {
+        key: "pairs_found_or_refused",
+        title: "pairs both found or refused",
+        hit: pair_found_or_refused,
+    },
+    Measure {
+        key: "pairs_found_or_refused_visible",
+        title: "  visible",
+        hit: pair_found_or_refused_visible,
+    },
+    Measure {
+        key: "pairs_found",
+        title: "pairs both found",
+        hit: pair_found,
+    },
+    Measure {
+        key: "list_holds",
+        title: "90 % list holds the truth",
+        hit: list_holds,
+    },
+    Measure {
+        key: "set_up_named",
+        title: "set-up errors named",
+        hit: set_up_named,
+    },
+    Measure {
+        key: "set_up_kind_right",
+        title: "set-up errors, kind right",
+        hit: set_up_kind_right,
+    },
+    Measure {
+        key: "set_up_sizes_hold",
+        title: "set-up sizes within 2 std",
+        hit: set_up_size_holds,
+    },
+    Measure {
+        key: "sizes_hold",
+        title: "sizes of names within 2 std",
+        hit: named_size_holds,
+    },
+];
+
+fn first_class_right(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let first = answer.classes.first().map(|first| &first.0);
+    Some(first == Some(&trial.truth.explained()))
+}
+
+/// Whether the most probable group of effects is the planted one.
+fn first_group_right(trial: &Trial, answer: &Answer) -> Option<bool> {
     let mut classes = answer.classes.iter();
     let first = classes.find(|one| matches!(one.0, Explained::Groups(_)));
-    first.is_some_and(|first| first.0 == trial.truth.explained())
+    let is_right = first.is_some_and(|first| first.0 == trial.truth.explained());
+    trial.truth.is_single().then_some(is_right)
 }
 
-/// Returns whether the most probable place is that of a member of the planted group: data cannot separate them.
-fn place_is_right(trial: &Trial, answer: &Answer) -> bool {
+fn first_group_right_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
+    visible(trial, first_group_right(trial, answer))
+}
+
+/// Returns what is said of a test only where its fault is visible.
+fn visible(trial: &Trial, hit: Option<bool>) -> Option<bool> {
+    hit.filter(|_| trial.truth.is_visible)
+}
+
+/// Whether the most probable place is that of a member of the planted group: data cannot separate them.
+fn place_right(trial: &Trial, answer: &Answer) -> Option<bool> {
+    if !trial.truth.is_single() {
+        return None;
+    }
     let group = trial.truth.effects[0].id.group();
     let mut members = EffectId::ALL.iter().filter(|id| id.group() == group);
-    members.any(|id| Some(id.place()) == answer.place)
+    Some(members.any(|id| Some(id.place()) == answer.place))
+}
+
+fn is_named(_: &Trial, answer: &Answer) -> Option<bool> {
+    Some(answer.named().is_some())
+}
+
+fn names_right(trial: &Trial, answer: &Answer) -> Option<bool> {
+    answer.named().map(|named| named == trial.truth.explained())
+}
+
+fn single_named_right(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_right = names_right(trial, answer) == Some(true);
+    trial.truth.is_single().then_some(is_right)
+}
+
+fn single_named_right_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
+    visible(trial, single_named_right(trial, answer))
+}
+
+fn single_named_wrong(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_wrong = names_right(trial, answer) == Some(false);
+    trial.truth.is_single().then_some(is_wrong)
+}
+
+fn null_named(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_named = matches!(answer.verdict, Verdict::Named(_) | Verdict::Group(_));
+    trial.truth.is_null().then_some(is_named)
+}
+
+fn outside_named(trial: &Trial, answer: &Answer) -> Option<bool> {
+    trial.truth.outside.map(|_| answer.named().is_some())
+}
+
+fn outside_named_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
+    visible(trial, outside_named(trial, answer))
+}
+
+fn outside_unknown(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_unknown = answer.verdict == Verdict::Unknown;
+    trial.truth.outside.map(|_| is_unknown)
+}
+
+fn outside_unknown_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
+    visible(trial, outside_unknown(trial, answer))
+}
+
+fn pair_found(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_found = names_right(trial, answer) == Some(true);
+    (trial.truth.effects.len() == 2).then_some(is_found)
+}
+
+fn pair_found_or_refused(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let is_refused = matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData(_));
+    pair_found(trial, answer).map(|is_found| is_found || is_refused)
+}
+
+fn pair_found_or_refused_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
+    visible(trial, pair_found_or_refused(trial, answer))
+}
+
+/// Whether the list that holds 90 % holds what is true. Tests with two effects are scored for themselves.
+fn list_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let truth = trial.truth.explained();
+    let mut list = answer.list(SET_PROBABILITY).iter();
+    let holds = list.any(|one| one.0 == truth);
+    (trial.truth.effects.len() < 2).then_some(holds)
+}
+
+fn set_up_named(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let set_up = Explained::Groups(vec![Group::SetUp]);
+    worthy_set_up(trial).map(|_| answer.named() == Some(set_up))
+}
+
+fn set_up_kind_right(trial: &Trial, answer: &Answer) -> Option<bool> {
+    worthy_set_up(trial).map(|effect| is_named_as(answer, effect))
+}
+
+fn set_up_size_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let effect = worthy_set_up(trial)?;
+    is_named_as(answer, effect).then(|| size_holds(effect, answer))?
+}
+
+fn named_size_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
+    let effect = trial.truth.effects.first()?;
+    let is_named = trial.truth.is_single() && is_named_as(answer, effect);
+    is_named.then(|| size_holds(effect, answer))?
 }
 
 /// Returns the planted error of the set-up where it is worth a name.

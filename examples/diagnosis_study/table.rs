@@ -9,7 +9,7 @@ use tapjoint::study::blind_check::Rate;
 /// Prints all scores of all tests.
 pub fn print_total(scores: &Scores) {
     println!(
-        "all tests: {} tests, {} without a diagnosis, {:.2} s of processor time each",
+        "all tests: {} tests, {} without a diagnosis, {:.2} s each by the clock",
         scores.tests,
         scores.failed,
         scores.seconds / scores.tests.max(1) as f64

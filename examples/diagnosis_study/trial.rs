@@ -10,8 +10,10 @@ use rand_chacha::ChaCha8Rng;
 use std::time::Instant;
 use tapjoint::effects::{Effect, EffectId, Group, Place};
 use tapjoint::gap::{
-    Diagnosis, GapSettings, Hypothesis, ParameterValue, Verdict, diagnose, observe,
+    DETECTABLE, Diagnosis, GapSettings, Hypothesis, Nominal, ParameterValue, TestPlan, Verdict,
+    diagnose, nominal_chi_square, observe,
 };
+use tapjoint::identify::observation::Observations;
 
 /// What is true of a test.
 #[derive(Debug, Clone)]
@@ -23,6 +25,8 @@ pub struct Truth {
     /// All frequencies are off by less than two standard uncertainties of their common factor, and nothing else is: the
     /// description is as good as it says.
     pub within_tolerance: bool,
+    /// Such a test shows the fault, or each of two effects.
+    pub is_visible: bool,
 }
 
 /// What is explained: the classes between which probabilities are shared out.
@@ -68,6 +72,8 @@ impl Truth {
         }
         if self.within_tolerance {
             parts.push("within tolerance".to_owned());
+        } else if !parts.is_empty() && !self.is_visible {
+            parts.push("not visible".to_owned());
         }
         match parts.is_empty() {
             true => "nothing".to_owned(),
@@ -199,31 +205,106 @@ pub struct Trial {
     pub seconds: f64,
 }
 
-impl Trial {
-    /// Draws and diagnoses a test. `None` where the structure cannot be: it buckles.
-    pub fn run(class: Class, number: usize, seed: u64) -> Option<Self> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let ids = class.draw_ids(&mut random);
-        let structure = Structure::draw(&mut random, &structure_needs(&ids));
+/// What is drawn from streams of its own, so that a change of one leaves the others as they are.
+#[derive(Debug, Clone, Copy)]
+enum Stream {
+    Class,
+    Structure,
+    Plan,
+    Plant,
+    Observation,
+}
+
+fn stream(seed: u64, of: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(of as u64);
+    random
+}
+
+/// A test before its diagnosis.
+struct DrawnTest {
+    truth: Truth,
+    structure: Structure,
+    test: PlannedTest,
+    observed: Observations,
+}
+
+impl DrawnTest {
+    /// Draws a test. `None` where the structure cannot be: it buckles.
+    fn draw(class: Class, seed: u64) -> Option<Self> {
+        let ids = class.draw_ids(&mut stream(seed, Stream::Class));
+        let structure =
+            Structure::draw(&mut stream(seed, Stream::Structure), &structure_needs(&ids));
         let mut needs = plan_needs(&ids);
         needs.several_recordings = class == Class::Outside(OutsideKind::Temperature);
-        let test = PlannedTest::draw(&mut random, &structure, &needs);
-        let effects = draw_effects(&mut random, &ids, &structure, &test)?;
-        let mut truth = test.nominal(&structure, false);
+        let test = PlannedTest::draw(&mut stream(seed, Stream::Plan), &structure, &needs);
+        let mut plant = stream(seed, Stream::Plant);
+        let effects = draw_effects(&mut plant, &ids, &structure, &test)?;
+        let without = test.nominal(&structure, false);
+        let mut truth = without.clone();
         let outside = match class {
-            Class::Outside(kind) => {
-                let size = kind.plant(&mut random, &structure, &mut truth.specimen);
-                Some((kind, size))
-            }
+            Class::Outside(kind) => Some((kind, kind.plant(&mut plant, &mut truth.specimen))),
             _ => None,
         };
+        let mut random = stream(seed, Stream::Observation);
         let mut observed = observe(&test.plan, &truth, &effects, random.random()).ok()?;
         test.state(&mut observed);
         test.drift_heavily(&mut random, &truth.specimen, &mut observed);
         if let Some((kind, size)) = outside {
-            kind.change(&mut random, size, &mut observed);
+            kind.change(&mut random, size, &truth.specimen, &mut observed);
         }
-        let within_tolerance = is_within_tolerance(&effects, &structure);
+        let is_visible = match class {
+            Class::Nothing => false,
+            // The recordings differ from each other by ten times what one is known to.
+            Class::Outside(OutsideKind::Temperature) => {
+                outside.is_some_and(|(_, size)| size > 10.0 * test.plan.frequency_std)
+            }
+            Class::Outside(_) => is_visible(&test, &without, &truth, &[]),
+            Class::Single(_) | Class::Pair => effects
+                .iter()
+                .all(|effect| is_visible(&test, &without, &truth, std::slice::from_ref(effect))),
+        };
+        Some(Self {
+            truth: Truth {
+                class,
+                within_tolerance: is_within_tolerance(&effects, &structure),
+                effects,
+                outside,
+                is_visible,
+            },
+            structure,
+            test,
+            observed,
+        })
+    }
+}
+
+/// Returns whether such a test shows a fault at all: without noise, drift and errors of the description the model without
+/// it leaves a chi square of [`DETECTABLE`].
+fn is_visible(test: &PlannedTest, without: &Nominal, truth: &Nominal, effects: &[Effect]) -> bool {
+    let plan = TestPlan {
+        scatter: 0.0,
+        ..test.plan.clone()
+    };
+    let Ok(observed) = observe(&plan, truth, effects, 0) else {
+        return false;
+    };
+    let chi_square = std::panic::catch_unwind(|| {
+        nominal_chi_square(&observed, without, &GapSettings::default())
+    });
+    // Without any fit the fault is plain.
+    !matches!(chi_square, Ok(Ok(chi_square)) if chi_square < DETECTABLE)
+}
+
+impl Trial {
+    /// Draws and diagnoses a test. `None` where the structure cannot be.
+    pub fn run(class: Class, number: usize, seed: u64) -> Option<Self> {
+        let DrawnTest {
+            truth,
+            structure,
+            test,
+            observed,
+        } = DrawnTest::draw(class, seed)?;
         let described = test.nominal(&structure, true);
         let begin = Instant::now();
         // A panic is a defect of the diagnosis, and no reason to lose all other tests.
@@ -236,12 +317,7 @@ impl Trial {
         };
         Some(Self {
             number,
-            truth: Truth {
-                class,
-                effects,
-                outside,
-                within_tolerance,
-            },
+            truth,
             support: structure.support,
             tolerances: structure.tolerances,
             errors: structure.errors,
@@ -283,10 +359,14 @@ impl Trial {
             .map(Hypothesis::name)
             .collect();
         format!(
-            "{head} -> {} {} [{}]",
+            "{head} -> {} {} [{}]{}",
             answer.verdict.kind(),
             names.join(", "),
-            classes.join(", ")
+            classes.join(", "),
+            match &answer.verdict {
+                Verdict::NotEnoughData(reason) => format!(" {reason}"),
+                _ => String::new(),
+            }
         )
     }
 }

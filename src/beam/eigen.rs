@@ -7,8 +7,8 @@
 //! suffice, each of them two solutions with the banded factor. All pairs come from the dense matrix, whose
 //! time grows with the cube of its size: small ones only.
 //!
-//! The matrices are symmetric and of half-bandwidth 5, as beams have them. The fixed band lets the compiler
-//! unroll every inner loop.
+//! The matrices are symmetric and of a fixed half-bandwidth, which lets the compiler unroll every inner loop: 5 for beams, 6 where
+//! a resonator has a motion between two nodes.
 
 use crate::StructureError;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -43,9 +43,9 @@ const RESIDUAL: f64 = 1e-8;
 ///
 /// # Errors
 /// [`StructureError::FiniteElements`] where K is not positive definite or too small.
-pub(crate) fn lowest_pairs(
-    stiffness: &BandedMatrix,
-    mass: &BandedMatrix,
+pub(crate) fn lowest_pairs<const N: usize>(
+    stiffness: &BandedMatrix<N>,
+    mass: &BandedMatrix<N>,
     shift: f64,
     highest: f64,
     locked: &[Vec<f64>],
@@ -100,8 +100,8 @@ const MOTIONS: usize = 4;
 ///
 /// # Errors
 /// As [`lowest_pairs`].
-pub(crate) fn pairs_for_forces(
-    [stiffness, mass]: [&BandedMatrix; 2],
+pub(crate) fn pairs_for_forces<const N: usize>(
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
     shift: f64,
     highest: f64,
     locked: &[Vec<f64>],
@@ -134,9 +134,9 @@ pub(crate) fn pairs_for_forces(
 
 /// Returns motions of unit modal mass, orthogonal to each other and to the modes by their mass: the static answers to
 /// the forces, and the answers to their inertia. Empty where nothing withstands the forces.
-fn motions_beyond(
+fn motions_beyond<const N: usize>(
     modes: &Eigenpairs,
-    [stiffness, mass]: [&BandedMatrix; 2],
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
     forces: &[Vec<f64>],
 ) -> Vec<Vec<f64>> {
     let Some(factor) = stiffness.cholesky() else {
@@ -168,9 +168,9 @@ fn motions_beyond(
 ///
 /// # Errors
 /// [`StructureError::FiniteElements`] where K + shift M is not positive definite.
-fn all_pairs(
-    stiffness: &BandedMatrix,
-    mass: &BandedMatrix,
+fn all_pairs<const N: usize>(
+    stiffness: &BandedMatrix<N>,
+    mass: &BandedMatrix<N>,
     shift: f64,
 ) -> Result<Eigenpairs, StructureError> {
     let factor = stiffness
@@ -225,9 +225,9 @@ fn descending(values: &[f64]) -> Vec<usize> {
 const EXACT_STEPS: usize = 60;
 
 /// The growing subspace of Lanczos's recursion.
-struct Lanczos<'a> {
-    factor: &'a CholeskyFactor,
-    mass: &'a BandedMatrix,
+struct Lanczos<'a, const N: usize> {
+    factor: &'a CholeskyFactor<N>,
+    mass: &'a BandedMatrix<N>,
     locked: usize,
     /// Orthonormal: the locked vectors, then those of the recursion.
     basis: Vec<Vec<f64>>,
@@ -236,8 +236,8 @@ struct Lanczos<'a> {
     beside: Vec<f64>,
 }
 
-impl<'a> Lanczos<'a> {
-    fn new(factor: &'a CholeskyFactor, mass: &'a BandedMatrix, locked: &[Vec<f64>]) -> Self {
+impl<'a, const N: usize> Lanczos<'a, N> {
+    fn new(factor: &'a CholeskyFactor<N>, mass: &'a BandedMatrix<N>, locked: &[Vec<f64>]) -> Self {
         let mut basis: Vec<Vec<f64>> = Vec::new();
         for motion in locked {
             // A vector x of the problem is y = L^T x of this method.
@@ -395,36 +395,37 @@ fn normalise(vector: &mut [f64]) -> f64 {
     length
 }
 
-/// Half-bandwidth of a beam's matrices. Nodes have up to three motions, so that an element reaches five
-/// equations to the left.
-const HALF_BAND: usize = 5;
+/// Entries of a row of a beam's matrices, the diagonal included. Nodes have up to three motions, so that an element reaches
+/// five equations to the left.
+pub(crate) const BEAM_ROW: usize = 6;
+/// Entries of a row where the motion of a resonator lies between those of two nodes.
+pub(crate) const RESONATOR_ROW: usize = 7;
 
-/// One row: the entries left of the diagonal (nearest last), and the diagonal at the end.
-type Row = [f64; HALF_BAND + 1];
-
-/// A symmetric banded matrix.
+/// A symmetric banded matrix. A row has the entries left of the diagonal (nearest last), and the diagonal at the end.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct BandedMatrix {
-    rows: Vec<Row>,
+pub(crate) struct BandedMatrix<const N: usize = BEAM_ROW> {
+    rows: Vec<[f64; N]>,
 }
 
 /// Lower Cholesky factor of a positive definite matrix. The diagonal holds reciprocals.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CholeskyFactor {
-    rows: Vec<Row>,
+pub(crate) struct CholeskyFactor<const N: usize = BEAM_ROW> {
+    rows: Vec<[f64; N]>,
 }
 
 /// Factor L D L^T of any symmetric matrix: L D left of the diagonal, 1/D on it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct LdlFactor {
-    rows: Vec<Row>,
+pub(crate) struct LdlFactor<const N: usize = BEAM_ROW> {
+    rows: Vec<[f64; N]>,
 }
 
-impl BandedMatrix {
+impl<const N: usize> BandedMatrix<N> {
+    const HALF_BAND: usize = N - 1;
+
     /// The zero matrix of `size` rows.
     pub(crate) fn zeros(size: usize) -> Self {
         Self {
-            rows: vec![[0.0; HALF_BAND + 1]; size],
+            rows: vec![[0.0; N]; size],
         }
     }
 
@@ -437,7 +438,7 @@ impl BandedMatrix {
     /// ignored.
     pub(crate) fn add(&mut self, row: usize, column: usize, value: f64) {
         if column <= row {
-            self.rows[row][HALF_BAND + column - row] += value;
+            self.rows[row][Self::HALF_BAND + column - row] += value;
         }
     }
 
@@ -454,9 +455,9 @@ impl BandedMatrix {
     pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; x.len()];
         for (row, entries) in self.rows.iter().enumerate() {
-            let mut sum = entries[HALF_BAND] * x[row];
-            for back in 1..=HALF_BAND.min(row) {
-                let entry = entries[HALF_BAND - back];
+            let mut sum = entries[Self::HALF_BAND] * x[row];
+            for back in 1..=Self::HALF_BAND.min(row) {
+                let entry = entries[Self::HALF_BAND - back];
                 sum += entry * x[row - back];
                 product[row - back] += entry * x[row];
             }
@@ -469,34 +470,38 @@ impl BandedMatrix {
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         let mut dense = DMatrix::zeros(self.size(), self.size());
         for (row, entries) in self.rows.iter().enumerate() {
-            for back in 0..=HALF_BAND.min(row) {
-                dense[(row, row - back)] = entries[HALF_BAND - back];
-                dense[(row - back, row)] = entries[HALF_BAND - back];
+            for back in 0..=Self::HALF_BAND.min(row) {
+                dense[(row, row - back)] = entries[Self::HALF_BAND - back];
+                dense[(row - back, row)] = entries[Self::HALF_BAND - back];
             }
         }
         dense
     }
 
     /// Returns the Cholesky factor, `None` where the matrix is not positive definite.
-    pub(crate) fn cholesky(&self) -> Option<CholeskyFactor> {
+    pub(crate) fn cholesky(&self) -> Option<CholeskyFactor<N>> {
         let mut rows = self.rows.clone();
         for row in 0..rows.len() {
             let mut own = rows[row];
-            for back in (1..=HALF_BAND.min(row)).rev() {
+            for back in (1..=Self::HALF_BAND.min(row)).rev() {
                 let other = &rows[row - back];
-                let mut rest = own[HALF_BAND - back];
-                for further in back + 1..=HALF_BAND.min(row) {
-                    rest -= own[HALF_BAND - further] * other[HALF_BAND + back - further];
+                let mut rest = own[Self::HALF_BAND - back];
+                for further in back + 1..=Self::HALF_BAND.min(row) {
+                    rest -=
+                        own[Self::HALF_BAND - further] * other[Self::HALF_BAND + back - further];
                 }
-                own[HALF_BAND - back] = rest * other[HALF_BAND];
+                own[Self::HALF_BAND - back] = rest * other[Self::HALF_BAND];
             }
-            let squares: f64 = own[..HALF_BAND].iter().map(|entry| entry * entry).sum();
-            let rest = own[HALF_BAND] - squares;
+            let squares: f64 = own[..Self::HALF_BAND]
+                .iter()
+                .map(|entry| entry * entry)
+                .sum();
+            let rest = own[Self::HALF_BAND] - squares;
             // A NaN is no positive pivot either.
             if rest.is_nan() || rest <= 0.0 {
                 return None;
             }
-            own[HALF_BAND] = 1.0 / rest.sqrt();
+            own[Self::HALF_BAND] = 1.0 / rest.sqrt();
             rows[row] = own;
         }
         Some(CholeskyFactor { rows })
@@ -504,22 +509,22 @@ impl BandedMatrix {
 
     /// Returns the factor L D L^T without exchange of rows, which a pivot of zero by chance makes
     /// infinite.
-    pub(crate) fn ldl(&self) -> LdlFactor {
+    pub(crate) fn ldl(&self) -> LdlFactor<N> {
         let mut rows = self.rows.clone();
         for row in 0..rows.len() {
             let mut own = rows[row];
-            for back in (1..=HALF_BAND.min(row)).rev() {
-                for further in back + 1..=HALF_BAND.min(row) {
-                    let other = rows[row - back][HALF_BAND + back - further];
-                    let inverse = rows[row - further][HALF_BAND];
-                    own[HALF_BAND - back] -= own[HALF_BAND - further] * other * inverse;
+            for back in (1..=Self::HALF_BAND.min(row)).rev() {
+                for further in back + 1..=Self::HALF_BAND.min(row) {
+                    let other = rows[row - back][Self::HALF_BAND + back - further];
+                    let inverse = rows[row - further][Self::HALF_BAND];
+                    own[Self::HALF_BAND - back] -= own[Self::HALF_BAND - further] * other * inverse;
                 }
             }
-            for back in 1..=HALF_BAND.min(row) {
-                let entry = own[HALF_BAND - back];
-                own[HALF_BAND] -= entry * entry * rows[row - back][HALF_BAND];
+            for back in 1..=Self::HALF_BAND.min(row) {
+                let entry = own[Self::HALF_BAND - back];
+                own[Self::HALF_BAND] -= entry * entry * rows[row - back][Self::HALF_BAND];
             }
-            own[HALF_BAND] = 1.0 / own[HALF_BAND];
+            own[Self::HALF_BAND] = 1.0 / own[Self::HALF_BAND];
             rows[row] = own;
         }
         LdlFactor { rows }
@@ -531,7 +536,7 @@ impl BandedMatrix {
         let mut count = 0;
         for row in self.ldl().rows {
             // After a pivot of zero the next one is infinite, and its inverse a zero with a sign.
-            let inverse = row[HALF_BAND];
+            let inverse = row[Self::HALF_BAND];
             if inverse.is_nan() {
                 return None;
             }
@@ -541,38 +546,43 @@ impl BandedMatrix {
     }
 }
 
-impl LdlFactor {
+impl<const N: usize> LdlFactor<N> {
+    const HALF_BAND: usize = N - 1;
+
     /// Returns the solution x of L D L^T x = b.
     pub(crate) fn solve(&self, mut x: Vec<f64>) -> Vec<f64> {
         // D y = L^-1 b: the rows' own entries are those of L D.
         for row in 0..x.len() {
             let entries = &self.rows[row];
-            for back in 1..=HALF_BAND.min(row) {
-                x[row] -= entries[HALF_BAND - back] * x[row - back];
+            for back in 1..=Self::HALF_BAND.min(row) {
+                x[row] -= entries[Self::HALF_BAND - back] * x[row - back];
             }
-            x[row] *= entries[HALF_BAND];
+            x[row] *= entries[Self::HALF_BAND];
         }
         for row in (0..x.len()).rev() {
             let (entries, value) = (&self.rows[row], x[row]);
-            for back in 1..=HALF_BAND.min(row) {
-                x[row - back] -=
-                    entries[HALF_BAND - back] * self.rows[row - back][HALF_BAND] * value;
+            for back in 1..=Self::HALF_BAND.min(row) {
+                x[row - back] -= entries[Self::HALF_BAND - back]
+                    * self.rows[row - back][Self::HALF_BAND]
+                    * value;
             }
         }
         x
     }
 }
 
-impl CholeskyFactor {
+impl<const N: usize> CholeskyFactor<N> {
+    const HALF_BAND: usize = N - 1;
+
     /// Solves L x = b in place.
     pub(crate) fn solve_lower(&self, x: &mut [f64]) {
         for row in 0..x.len() {
             let entries = &self.rows[row];
             let mut rest = x[row];
-            for back in (1..=HALF_BAND.min(row)).rev() {
-                rest -= entries[HALF_BAND - back] * x[row - back];
+            for back in (1..=Self::HALF_BAND.min(row)).rev() {
+                rest -= entries[Self::HALF_BAND - back] * x[row - back];
             }
-            x[row] = rest * entries[HALF_BAND];
+            x[row] = rest * entries[Self::HALF_BAND];
         }
     }
 
@@ -580,10 +590,10 @@ impl CholeskyFactor {
     pub(crate) fn solve_upper(&self, x: &mut [f64]) {
         for row in (0..x.len()).rev() {
             let entries = &self.rows[row];
-            let value = x[row] * entries[HALF_BAND];
+            let value = x[row] * entries[Self::HALF_BAND];
             x[row] = value;
-            for back in 1..=HALF_BAND.min(row) {
-                x[row - back] -= entries[HALF_BAND - back] * value;
+            for back in 1..=Self::HALF_BAND.min(row) {
+                x[row - back] -= entries[Self::HALF_BAND - back] * value;
             }
         }
     }
@@ -592,9 +602,9 @@ impl CholeskyFactor {
     pub(crate) fn transpose_times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; x.len()];
         for (row, entries) in self.rows.iter().enumerate() {
-            product[row] += x[row] / entries[HALF_BAND];
-            for back in 1..=HALF_BAND.min(row) {
-                product[row - back] += entries[HALF_BAND - back] * x[row];
+            product[row] += x[row] / entries[Self::HALF_BAND];
+            for back in 1..=Self::HALF_BAND.min(row) {
+                product[row - back] += entries[Self::HALF_BAND - back] * x[row];
             }
         }
         product

@@ -1,7 +1,7 @@
 //! A structure of finite elements seen from its joint.
 
 use super::StructureError;
-use super::eigen::{BandedMatrix, Eigenpairs, dot, failure, pairs_for_forces};
+use super::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, dot, failure, pairs_for_forces};
 use super::interface::{AcrossFunctions, Coefficients, InterfaceFunctions};
 use super::specimen::model::{ACROSS, Model, Motion, Place};
 use super::specimen::modes::SHIFT;
@@ -58,18 +58,23 @@ impl InterfaceModes {
     /// those of mode `highest` on any joint.
     ///
     /// # Errors
-    /// [`StructureError`] where a part of the specimen cannot exist.
+    /// [`StructureError`] where a part of the specimen cannot exist, or with resonators.
     pub fn new(
         specimen: &Specimen,
         elements: usize,
         highest: usize,
     ) -> Result<Self, StructureError> {
+        if !specimen.resonators.is_empty() {
+            return Err(failure(
+                "no resonators stand on a structure that is seen from its joint",
+            ));
+        }
         let free = Specimen {
             joint: None,
             ..specimen.clone()
         };
         let model = Model::new(&free, &vec![elements; free.body.beams().len()])?;
-        let (stiffness, mass) = model.matrices();
+        let (stiffness, mass) = model.matrices::<BEAM_ROW>();
         // The lowest mode left out then has about four times the highest frequency.
         let count = 2 * highest + 10;
         let forces = [0, 1].map(|component| model.joint_load(component));

@@ -394,7 +394,12 @@ fn stretch(specimen: &mut Specimen, factor: f64) {
         .iter_mut()
         .map(|spring| &mut spring.position);
     let hinges = specimen.hinges.iter_mut().map(|hinge| &mut hinge.position);
-    for position in masses.chain(springs).chain(hinges) {
+    let sections = specimen.sections.iter_mut();
+    let borders = sections.flat_map(|section| [&mut section.start, &mut section.end]);
+    let resonators = specimen.resonators.iter_mut();
+    let resonators = resonators.map(|resonator| &mut resonator.position);
+    let places = masses.chain(springs).chain(hinges);
+    for position in places.chain(borders).chain(resonators) {
         // A point at the end stays on the beam, whatever the last digit of the product.
         *position = (*position * factor).min(length);
     }

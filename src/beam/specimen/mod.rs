@@ -138,6 +138,52 @@ pub struct Hinge {
     pub compliance: f64,
 }
 
+/// A section of the beam that is stiffer, softer, heavier or lighter than the rest: a strip glued to it, a patch, a step of
+/// a taper.
+///
+/// It is as if modulus and density had these factors there: shear stiffness, rotary inertia and the width's stiffening
+/// follow in proportion. Sections that overlap multiply their factors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeamSection {
+    /// Where it begins (m from the left end).
+    pub start: f64,
+    /// Where it ends (m from the left end).
+    pub end: f64,
+    /// Factor on the bending stiffness (1).
+    pub stiffness: f64,
+    /// Factor on the mass per length (1).
+    pub mass: f64,
+}
+
+impl BeamSection {
+    /// Returns steps of a thickness that changes linearly from `near` to `far` times the beam's (1) over a length (m).
+    pub fn taper(length: f64, near: f64, far: f64, steps: usize) -> Vec<Self> {
+        let step = length / steps as f64;
+        let sections = (0..steps).map(|index| {
+            let middle = (index as f64 + 0.5) / steps as f64;
+            let factor = near + (far - near) * middle;
+            Self {
+                start: step * index as f64,
+                end: step * (index + 1) as f64,
+                stiffness: factor.powi(3),
+                mass: factor,
+            }
+        });
+        sections.collect()
+    }
+}
+
+/// A mass on a spring that stands on the beam.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resonator {
+    /// Distance from the left end (m).
+    pub position: f64,
+    /// Mass (kg).
+    pub mass: f64,
+    /// Natural frequency of the mass on its spring alone (Hz).
+    pub frequency: f64,
+}
+
 /// Division of the beams into finite elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mesh {
@@ -202,6 +248,10 @@ pub struct Specimen {
     pub springs: Vec<PointSpring>,
     /// Cracks.
     pub hinges: Vec<Hinge>,
+    /// Sections that differ from the rest.
+    pub sections: Vec<BeamSection>,
+    /// Sprung masses.
+    pub resonators: Vec<Resonator>,
 }
 
 impl Specimen {
@@ -219,6 +269,8 @@ impl Specimen {
             masses: Vec::new(),
             springs: Vec::new(),
             hinges: Vec::new(),
+            sections: Vec::new(),
+            resonators: Vec::new(),
         }
     }
 
@@ -261,7 +313,7 @@ impl Specimen {
         SpecimenModes::new(self, count, mesh)
     }
 
-    /// Returns the lowest `count` modes of the beam, on a fixture that may give.
+    /// Returns the lowest `count` modes of the beam, on a fixture that may give and with resonators that move on their own.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
@@ -315,6 +367,7 @@ impl Specimen {
             self.on_beam(hinge.position)?;
             not_negative("compliance of a hinge", hinge.compliance)?;
         }
+        self.check_sections_and_resonators()?;
         if let Some(overlap) = &self.overlap {
             not_negative("length of the overlap", overlap.length)?;
             not_negative("mass of the overlap", overlap.mass)?;
@@ -322,6 +375,28 @@ impl Specimen {
             let fits = halves.all(|beam| 0.5 * overlap.length <= beam.length);
             let rule = ": half of it must fit on either side of the joint";
             require(fits, "length of the overlap", overlap.length, rule)?;
+        }
+        Ok(())
+    }
+
+    fn check_sections_and_resonators(&self) -> Result<(), StructureError> {
+        for section in &self.sections {
+            self.on_beam(section.start)?;
+            self.on_beam(section.end)?;
+            let rule = ": it must lie behind the beginning";
+            require(
+                section.start < section.end,
+                "end of a section",
+                section.end,
+                rule,
+            )?;
+            positive("stiffness of a section", section.stiffness)?;
+            positive("mass of a section", section.mass)?;
+        }
+        for resonator in &self.resonators {
+            self.on_beam(resonator.position)?;
+            positive("mass of a resonator", resonator.mass)?;
+            positive("frequency of a resonator", resonator.frequency)?;
         }
         Ok(())
     }
@@ -360,15 +435,19 @@ impl Specimen {
         let Some(Base { frequency, ratio }) = self.base else {
             return Ok(());
         };
-        let is_positive = frequency > 0.0 && frequency.is_finite();
-        let rule = ": it must be positive and finite";
-        require(is_positive, "frequency of the base", frequency, rule)?;
+        positive("frequency of the base", frequency)?;
         let quantity = "stiffness ratio of the base";
         not_negative(quantity, ratio)?;
         let carries = ratio == 0.0 || !is_lap && kr > 0.0 && kr.is_finite();
         let rule = ": a flexible base needs a cantilever whose joint has a finite kr above 0";
         require(carries, quantity, ratio, rule)
     }
+}
+
+fn positive(quantity: &'static str, value: f64) -> Result<(), StructureError> {
+    let is_possible = value > 0.0 && value.is_finite();
+    let rule = ": it must be positive and finite";
+    require(is_possible, quantity, value, rule)
 }
 
 fn not_negative(quantity: &'static str, value: f64) -> Result<(), StructureError> {

@@ -6,10 +6,10 @@
 use super::element::{
     Across, ElementHinge, Ends, HingedElement, Section, Square, Units, Weights, dot, quadratic,
 };
-use super::{Body, Joint, Specimen};
+use super::{BeamSection, Body, Joint, Specimen};
 use crate::eigen::BandedMatrix;
 use crate::width::Curling;
-use crate::{StructureError, WidthStiffening};
+use crate::{Beam, StructureError, WidthStiffening};
 use std::f64::consts::PI;
 
 /// Equation of a motion that does not exist; larger than the number of any that does.
@@ -30,13 +30,16 @@ pub(super) struct Numbering {
     stiffened: bool,
     /// Rotation of the base.
     base: Option<usize>,
+    /// Displacement of each resonator.
+    resonators: Vec<usize>,
     /// Number of equations.
     size: usize,
 }
 
 impl Numbering {
-    /// `elements` of each beam; `has_base` where the fixture has a motion of its own.
-    fn new(specimen: &Specimen, elements: &[usize], has_base: bool) -> Self {
+    /// `elements` of each beam; `has_base` where the fixture has a motion of its own; `resonators` are the near nodes of
+    /// the elements on which they stand.
+    fn new(specimen: &Specimen, elements: &[usize], has_base: bool, resonators: &[usize]) -> Self {
         let [kt, kr] = specimen.joint_stiffnesses().map(f64::is_infinite);
         let held = match specimen.width_stiffening {
             WidthStiffening::HeldAtJoint => specimen.joint.is_some(),
@@ -48,6 +51,7 @@ impl Numbering {
             stiffened: specimen.is_stiffened(),
             nodes: Vec::new(),
             base: None,
+            resonators: vec![HELD; resonators.len()],
             size: 0,
         };
         if has_base {
@@ -59,11 +63,11 @@ impl Numbering {
                 for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
                     first[motion] = numbering.next();
                 }
-                numbering.nodes.push(first);
-                numbering.add_nodes(elements[0]);
+                numbering.add_node(first, resonators);
+                numbering.add_nodes(elements[0], resonators);
             }
             Body::Joined(_) => {
-                numbering.add_nodes(elements[0]);
+                numbering.add_nodes(elements[0], resonators);
                 // The two nodes of the joint.
                 let mut left = [HELD; 3];
                 for shared in [false, true] {
@@ -78,8 +82,9 @@ impl Numbering {
                 for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
                     right[motion] = numbering.next();
                 }
-                numbering.nodes.extend([left, right]);
-                numbering.add_nodes(elements[1]);
+                numbering.add_node(left, resonators);
+                numbering.add_node(right, resonators);
+                numbering.add_nodes(elements[1], resonators);
             }
         }
         numbering
@@ -95,13 +100,22 @@ impl Numbering {
         0..if self.stiffened { 3 } else { 2 }
     }
 
-    fn add_nodes(&mut self, count: usize) {
+    fn add_nodes(&mut self, count: usize, resonators: &[usize]) {
         for _ in 0..count {
             let mut node = [HELD; 3];
             for motion in self.motions() {
                 node[motion] = self.next();
             }
-            self.nodes.push(node);
+            self.add_node(node, resonators);
+        }
+    }
+
+    /// Adds a node, and the motion of a resonator on the element behind it.
+    fn add_node(&mut self, node: [usize; 3], resonators: &[usize]) {
+        let number = self.nodes.len();
+        self.nodes.push(node);
+        for (index, _) in resonators.iter().enumerate().filter(|one| *one.1 == number) {
+            self.resonators[index] = self.next();
         }
     }
 }
@@ -112,6 +126,8 @@ pub(crate) struct Motion {
     pub(super) nodes: Vec<[f64; 3]>,
     /// `None` where the base does not move on its own.
     pub(super) base: Option<f64>,
+    /// Displacement of each resonator.
+    pub(super) resonators: Vec<f64>,
 }
 
 impl Motion {
@@ -124,6 +140,9 @@ impl Motion {
         if let Some(turn) = &mut sum.base {
             *turn += factor * other.base.unwrap_or(0.0);
         }
+        for (own, other) in sum.resonators.iter_mut().zip(&other.resonators) {
+            *own += factor * other;
+        }
         sum
     }
 
@@ -131,6 +150,7 @@ impl Motion {
         let values = self.nodes.as_flattened_mut().iter_mut();
         values
             .chain(&mut self.base)
+            .chain(&mut self.resonators)
             .for_each(|value| *value *= factor);
         self
     }
@@ -186,7 +206,27 @@ pub(super) struct Run {
     pub(super) start: f64,
     pub(super) elements: usize,
     pub(super) first_node: usize,
+    /// Every element, where no section differs.
     pub(super) section: Section,
+    /// Each element for itself, where sections differ; else empty.
+    own: Vec<Section>,
+}
+
+impl Run {
+    /// The element behind a node.
+    fn section_at(&self, node: usize) -> &Section {
+        self.own
+            .get(node - self.first_node)
+            .unwrap_or(&self.section)
+    }
+}
+
+/// A sprung mass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AttachedResonator {
+    pub(super) place: Place,
+    pub(super) mass: f64,
+    stiffness: f64,
 }
 
 /// The base: inertia and stiffness of its rotation.
@@ -249,6 +289,7 @@ pub(crate) struct Model {
     pub(super) base: Option<RotatingBase>,
     pub(crate) masses: Vec<AttachedMass>,
     pub(crate) springs: Vec<AttachedSpring>,
+    pub(super) resonators: Vec<AttachedResonator>,
     hinged: Vec<HingedElement>,
 }
 
@@ -265,13 +306,28 @@ impl Model {
         let mut runs: Vec<Run> = Vec::new();
         for (beam, &elements) in beams.iter().zip(elements) {
             let last = runs.last();
+            let start = last.map_or(0.0, |_| beams[0].length);
+            let first_node = last.map_or(0, |run| run.elements + 1);
             let (shear_rotary, axial_force) = (specimen.shear_rotary, specimen.axial_force);
+            let changed = changed_beams(&specimen.sections, beam, start, elements);
+            let sections = [*beam].into_iter().chain(changed).map(|beam| {
+                Section::new(
+                    &beam,
+                    elements,
+                    shear_rotary,
+                    axial_force,
+                    stiffened,
+                    &units,
+                )
+            });
+            let mut sections: Vec<Section> = sections.collect();
             runs.push(Run {
                 middle: (beam.width / units.length).powi(2) / 24.0,
-                start: last.map_or(0.0, |_| beams[0].length / units.length),
+                start: start / units.length,
                 elements,
-                first_node: last.map_or(0, |run| run.elements + 1),
-                section: Section::new(beam, elements, shear_rotary, axial_force, stiffened, &units),
+                first_node,
+                section: sections.remove(0),
+                own: sections,
             });
         }
         // The base where it gives: k = Kr/ratio, and the inertia that has its frequency on that spring.
@@ -297,17 +353,49 @@ impl Model {
         let mut model = Self {
             joint_across,
             across_ratio,
-            numbering: Numbering::new(specimen, elements, base.is_some()),
+            numbering: Numbering::new(specimen, elements, base.is_some(), &[]),
             runs,
             joint,
             base,
             masses: Vec::new(),
             springs: Vec::new(),
+            resonators: Vec::new(),
             hinged: Vec::new(),
             units,
         };
         model.attach(specimen)?;
+        if !specimen.resonators.is_empty() {
+            model.attach_resonators(specimen, elements)?;
+        }
         Ok(model)
+    }
+
+    /// Adds the resonators and their equations.
+    fn attach_resonators(
+        &mut self,
+        specimen: &Specimen,
+        elements: &[usize],
+    ) -> Result<(), StructureError> {
+        let mut nodes: Vec<usize> = Vec::new();
+        for item in &specimen.resonators {
+            let place = self.place(item.position);
+            if nodes.contains(&place.node) {
+                return Err(StructureError::FiniteElements {
+                    reason: "two resonators stand on one element; divide finer, or set them apart"
+                        .to_owned(),
+                });
+            }
+            nodes.push(place.node);
+            let mass = item.mass / self.units.mass;
+            let omega = 2.0 * PI * item.frequency / self.units.omega;
+            self.resonators.push(AttachedResonator {
+                place,
+                mass,
+                stiffness: mass * omega * omega,
+            });
+        }
+        self.numbering = Numbering::new(specimen, elements, self.base.is_some(), &nodes);
+        Ok(())
     }
 
     /// Adds what is fastened to the beams: hinges first, which change the shape by which the others
@@ -320,7 +408,7 @@ impl Model {
             let known = self.hinged.iter().position(|hinged| hinged.node == node);
             let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
             hinges.push(ElementHinge { within, compliance });
-            let section = &self.runs[run].section;
+            let section = self.runs[run].section_at(node);
             self.hinged.push(HingedElement::new(section, node, hinges)?);
         }
         for item in &specimen.masses {
@@ -355,7 +443,7 @@ impl Model {
         }
         let mut runs = self.runs.iter();
         let right = runs.rposition(|run| run.first_node <= place.node);
-        let section = &self.runs[right.unwrap_or(0)].section;
+        let section = self.runs[right.unwrap_or(0)].section_at(place.node);
         self.masses.push(AttachedMass {
             compliance: section.inner_compliance(place.within, place.within),
             place,
@@ -383,8 +471,8 @@ impl Model {
     }
 
     fn place_in(&self, run: usize, index: usize, within: f64) -> Place {
-        let section = &self.runs[run].section;
         let node = self.runs[run].first_node + index;
+        let section = self.runs[run].section_at(node);
         let mut weights = section.weights(within);
         let mut inner = [0.0; 4];
         match self.hinged_at(node) {
@@ -434,9 +522,11 @@ impl Model {
 
     /// Magnitude of the highest omega^2: that of an element's end alone.
     pub(crate) fn highest_square(&self) -> f64 {
-        let sections = self.runs.iter().map(|run| &run.section);
+        let sections = self.runs.iter();
+        let sections = sections.flat_map(|run| run.own.iter().chain([&run.section]));
         let ratios = sections.map(|section| section.stiffness[0][0] / section.mass[0][0]);
-        ratios.fold(0.0, f64::max)
+        let resonators = self.resonators.iter().map(|one| one.stiffness / one.mass);
+        ratios.chain(resonators).fold(0.0, f64::max)
     }
 
     /// Frequency (Hz) of an omega^2 in the model's units.
@@ -444,15 +534,18 @@ impl Model {
         square.max(0.0).sqrt() * self.units.omega / (2.0 * PI)
     }
 
-    /// Stiffness and mass matrix.
-    pub(crate) fn matrices(&self) -> (BandedMatrix, BandedMatrix) {
+    /// Stiffness and mass matrix. Resonators need rows of [`crate::eigen::RESONATOR_ROW`] entries.
+    pub(crate) fn matrices<const N: usize>(&self) -> (BandedMatrix<N>, BandedMatrix<N>) {
         let size = self.numbering.size;
         let (mut stiffness, mut mass) = (BandedMatrix::zeros(size), BandedMatrix::zeros(size));
         for run in &self.runs {
             for node in run.first_node..run.first_node + run.elements {
                 let (of_stiffness, of_mass) = match self.hinged_at(node) {
                     Some(hinged) => (&hinged.stiffness, &hinged.mass),
-                    None => (&run.section.stiffness, &run.section.mass),
+                    None => {
+                        let section = run.section_at(node);
+                        (&section.stiffness, &section.mass)
+                    }
                 };
                 self.scatter(&mut stiffness, node, of_stiffness);
                 self.scatter(&mut mass, node, of_mass);
@@ -473,6 +566,20 @@ impl Model {
             let matrix =
                 std::array::from_fn(|i| std::array::from_fn(|j| item.stiffness * w[i] * w[j]));
             self.scatter(&mut stiffness, item.place.node, &matrix);
+        }
+        for (item, &own) in self.resonators.iter().zip(&self.numbering.resonators) {
+            mass.add(own, own, item.mass);
+            stiffness.add(own, own, item.stiffness);
+            let w = item.place.weights.displacement;
+            let on_beam =
+                std::array::from_fn(|i| std::array::from_fn(|j| item.stiffness * w[i] * w[j]));
+            self.scatter(&mut stiffness, item.place.node, &on_beam);
+            for (row, weight) in self.equations_behind(item.place.node).into_iter().zip(w) {
+                if row != HELD {
+                    let (low, high) = (row.min(own), row.max(own));
+                    stiffness.add(high, low, -item.stiffness * weight);
+                }
+            }
         }
         let ends = self.joint_ends();
         for &(row, i, row_sign) in &ends {
@@ -499,7 +606,7 @@ impl Model {
         let mut matrix = BandedMatrix::zeros(self.numbering.size);
         for run in &self.runs {
             for node in run.first_node..run.first_node + run.elements {
-                self.scatter(&mut matrix, node, &run.section.second_order);
+                self.scatter(&mut matrix, node, &run.section_at(node).second_order);
             }
         }
         for item in &self.masses {
@@ -519,11 +626,16 @@ impl Model {
     fn across_at<'a>(&'a self, run: &'a Run, node: usize) -> &'a Across {
         match self.hinged_at(node) {
             Some(hinged) => &hinged.across,
-            None => &run.section.across,
+            None => &run.section_at(node).across,
         }
     }
 
-    fn scatter_across(&self, target: &mut BandedMatrix, node: usize, across: &Across) {
+    fn scatter_across<const N: usize>(
+        &self,
+        target: &mut BandedMatrix<N>,
+        node: usize,
+        across: &Across,
+    ) {
         let [near, far] = [self.numbering.nodes[node], self.numbering.nodes[node + 1]];
         let equations = [near[0], near[1], far[0], far[1], near[2], far[2]];
         for (&row, values) in equations.iter().zip(&across.matrix()) {
@@ -535,10 +647,15 @@ impl Model {
         }
     }
 
-    /// Adds the matrix of the element behind a node.
-    fn scatter(&self, target: &mut BandedMatrix, node: usize, matrix: &Square) {
+    /// Equations of the ends of the element behind a node, as [`Motion::ends`].
+    fn equations_behind(&self, node: usize) -> [usize; 4] {
         let [near, far] = [self.numbering.nodes[node], self.numbering.nodes[node + 1]];
-        let equations = [near[0], near[1], far[0], far[1]];
+        [near[0], near[1], far[0], far[1]]
+    }
+
+    /// Adds the matrix of the element behind a node.
+    fn scatter<const N: usize>(&self, target: &mut BandedMatrix<N>, node: usize, matrix: &Square) {
+        let equations = self.equations_behind(node);
         for (&row, values) in equations.iter().zip(matrix) {
             for (&column, value) in equations.iter().zip(values) {
                 if row != HELD && column != HELD {
@@ -619,14 +736,14 @@ impl Model {
         let mut sum = Energies::default();
         for run in &self.runs {
             for node in run.first_node..run.first_node + run.elements {
-                let ends = motion.ends(node);
-                sum.second_order += quadratic(&run.section.second_order, &ends);
+                let (ends, section) = (motion.ends(node), run.section_at(node));
+                sum.second_order += quadratic(&section.second_order, &ends);
                 if let Some(hinged) = self.hinged_at(node) {
-                    sum.strain += hinged.strain_energy(&run.section, &ends);
+                    sum.strain += hinged.strain_energy(section, &ends);
                     sum.kinetic += quadratic(&hinged.mass, &ends);
                 } else {
-                    sum.strain += run.section.strain_energy(&ends);
-                    sum.kinetic += quadratic(&run.section.mass, &ends);
+                    sum.strain += section.strain_energy(&ends);
+                    sum.kinetic += quadratic(&section.mass, &ends);
                 }
                 if self.numbering.stiffened {
                     let across = self.across_at(run, node);
@@ -647,6 +764,11 @@ impl Model {
         for item in &self.springs {
             let w = item.place.displacement(&motion.ends(item.place.node));
             sum.strain += item.stiffness * w.powi(2);
+        }
+        for (item, own) in self.resonators.iter().zip(&motion.resonators) {
+            let stretch = own - item.place.displacement(&motion.ends(item.place.node));
+            sum.strain += item.stiffness * stretch * stretch;
+            sum.kinetic += item.mass * own * own;
         }
         sum.strain += self.joint_energy(motion);
         if let (Some(base), Some(turn)) = (&self.base, motion.base) {
@@ -674,6 +796,12 @@ impl Model {
                 .map(|node| node.map(|row| vector.get(row).copied().unwrap_or(0.0)))
                 .collect(),
             base: self.numbering.base.map(|row| vector[row]),
+            resonators: self
+                .numbering
+                .resonators
+                .iter()
+                .map(|row| vector[*row])
+                .collect(),
         }
     }
 
@@ -683,7 +811,9 @@ impl Model {
         let nodes = self.numbering.nodes.iter().zip(&motion.nodes);
         let moved = nodes.flat_map(|(rows, values)| rows.iter().copied().zip(*values));
         let base = self.numbering.base.zip(motion.base);
-        for (row, value) in moved.chain(base) {
+        let resonators = self.numbering.resonators.iter().copied();
+        let resonators = resonators.zip(motion.resonators.iter().copied());
+        for (row, value) in moved.chain(base).chain(resonators) {
             if row != HELD {
                 vector[row] = value;
             }
@@ -730,6 +860,7 @@ impl Model {
         let mut motion = Motion {
             nodes: vec![[0.0; 3]; self.numbering.nodes.len()],
             base: None,
+            resonators: Vec::new(),
         };
         for run in &self.runs[first..] {
             for index in 0..=run.elements {
@@ -741,8 +872,46 @@ impl Model {
                 };
             }
         }
+        let resonators = self.resonators.iter();
+        let carried = resonators.map(|one| one.place.displacement(&motion.ends(one.place.node)));
+        motion.resonators = carried.collect();
         self.vector(&motion)
     }
+}
+
+/// Returns the beam as each of its equal elements has it; empty where no section differs. `start` is the beam's left end (m).
+///
+/// An element that the border of a section cuts takes the mean mass and the mean compliance, so that frequencies are
+/// continuous in the place of the border.
+fn changed_beams(sections: &[BeamSection], beam: &Beam, start: f64, elements: usize) -> Vec<Beam> {
+    if sections.is_empty() {
+        return Vec::new();
+    }
+    let length = beam.length / elements as f64;
+    let changed = (0..elements).map(|index| {
+        let [from, to] = [index, index + 1].map(|end| start + end as f64 * length);
+        let borders = sections.iter().flat_map(|one| [one.start, one.end]);
+        let inside = borders.filter(|border| from < *border && *border < to);
+        let mut cuts: Vec<f64> = inside.chain([from, to]).collect();
+        cuts.sort_by(f64::total_cmp);
+        let (mut mass, mut compliance) = (0.0, 0.0);
+        for piece in cuts.windows(2) {
+            let (middle, share) = (0.5 * (piece[0] + piece[1]), (piece[1] - piece[0]) / length);
+            let here = sections.iter();
+            let here = here.filter(|one| one.start < middle && middle < one.end);
+            let factors = here.fold((1.0, 1.0), |(mass, stiffness), one| {
+                (mass * one.mass, stiffness * one.stiffness)
+            });
+            mass += share * factors.0;
+            compliance += share / factors.1;
+        }
+        Beam {
+            modulus: beam.modulus / compliance,
+            density: beam.density * mass,
+            ..*beam
+        }
+    });
+    changed.collect()
 }
 
 /// Stiffness of the joint for (w, theta): the inverse of `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`, in the

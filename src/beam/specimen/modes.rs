@@ -3,7 +3,7 @@
 use super::model::{Energies, Model, Motion};
 use super::{Mesh, Specimen};
 use crate::StructureError;
-use crate::eigen::{BandedMatrix, Eigenpairs, dot, lowest_pairs};
+use crate::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, RESONATOR_ROW, dot, lowest_pairs};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -61,7 +61,11 @@ impl Mode {
 /// Corrects the motions of a weak joint. One inverse iteration removes the rest of elastic motions, whose energy would
 /// hide that of the joint. Ritz's method then separates the motions from each other. Where either step fails, nothing
 /// is changed.
-fn refine(model: &Model, [stiffness, mass]: [&BandedMatrix; 2], vectors: &mut [Vec<f64>]) {
+fn refine<const N: usize>(
+    model: &Model,
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    vectors: &mut [Vec<f64>],
+) {
     if vectors.is_empty() {
         return;
     }
@@ -102,6 +106,44 @@ fn refine(model: &Model, [stiffness, mass]: [&BandedMatrix; 2], vectors: &mut [V
     }
 }
 
+/// Returns the lowest pairs of a model, with matrices of so many entries in a row.
+fn pairs_of<const N: usize>(model: &Model, count: usize) -> Result<Eigenpairs, StructureError> {
+    let (stiffness, mass) = model.matrices::<N>();
+    let shift = match model.rigid_motions() {
+        0 if model.is_weakly_held() => SMALL_SHIFT,
+        0 => 0.0,
+        _ => SHIFT,
+    };
+    let (highest, locked) = (model.highest_square(), model.locked_motions());
+    let mut pairs = lowest_pairs(&stiffness, &mass, shift, highest, &locked, count)?;
+    if shift == SMALL_SHIFT {
+        let soft = pairs.values.partition_point(|value| *value < shift);
+        refine(model, [&stiffness, &mass], &mut pairs.vectors[..soft]);
+    }
+    Ok(pairs)
+}
+
+/// Moves each mode by one step of Rayleigh quotient iteration to another model, with matrices of so many entries in a
+/// row. `None` where a step fails.
+fn moved_modes<const N: usize>(from: &SpecimenModes, model: &Model) -> Option<Vec<Mode>> {
+    let (stiffness, mass) = model.matrices::<N>();
+    let mut modes = Vec::with_capacity(from.modes.len());
+    for mode in &from.modes {
+        let vector = from.model.vector(&mode.motion);
+        let pulled = mass.times(&vector);
+        let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
+        let mut moved = stiffness.plus(-square, &mass).ldl().solve(pulled.clone());
+        let along = dot(&moved, &pulled);
+        if !along.is_finite() || along == 0.0 {
+            return None;
+        }
+        // As long as the matrix is near to singular, and of either sign.
+        moved.iter_mut().for_each(|value| *value /= along);
+        modes.push(Mode::new(model, &moved));
+    }
+    Some(modes)
+}
+
 impl SpecimenModes {
     pub(super) fn new(
         specimen: &Specimen,
@@ -109,23 +151,14 @@ impl SpecimenModes {
         mesh: Mesh,
     ) -> Result<Self, StructureError> {
         let model = Model::new(specimen, &mesh.divide(&specimen.body))?;
-        let (stiffness, mass) = model.matrices();
         let rigid = model.rigid_motions();
-        let shift = match rigid {
-            0 if model.is_weakly_held() => SMALL_SHIFT,
-            0 => 0.0,
-            _ => SHIFT,
+        let pairs = match model.resonators.is_empty() {
+            true => pairs_of::<BEAM_ROW>(&model, count + rigid)?,
+            false => pairs_of::<RESONATOR_ROW>(&model, count + rigid)?,
         };
-        let highest = model.highest_square();
-        let locked = model.locked_motions();
-        let mut pairs = lowest_pairs(&stiffness, &mass, shift, highest, &locked, count + rigid)?;
-        if shift == SMALL_SHIFT {
-            let soft = pairs.values.partition_point(|value| *value < shift);
-            refine(&model, [&stiffness, &mass], &mut pairs.vectors[..soft]);
-        }
         let Eigenpairs { values, vectors } = pairs;
         // Rounding moves each value by some parts in 1e16 of the highest one.
-        let rounding = NO_STIFFNESS + 1e-7 * SHIFT + 1e-15 * highest;
+        let rounding = NO_STIFFNESS + 1e-7 * SHIFT + 1e-15 * model.highest_square();
         let slow = &values[..rigid];
         if slow.iter().any(|value| *value < -rounding) {
             return Err(StructureError::FiniteElements {
@@ -231,23 +264,34 @@ impl SpecimenModes {
         inertia * turn * turn / self.modes[mode].energies.kinetic
     }
 
+    /// Returns the share of a resonator in the kinetic energy (1). Over all modes of a structure the shares add up to 1.
+    fn resonator_participation(&self, mode: usize, resonator: usize) -> f64 {
+        let Mode {
+            motion, energies, ..
+        } = &self.modes[mode];
+        let mass = self.model.resonators[resonator].mass;
+        mass * motion.resonators[resonator].powi(2) / energies.kinetic
+    }
+
     /// Returns frequencies (Hz) that Rayleigh's quotient gives for another specimen with these modes' shapes.
     ///
     /// The quotient is stationary at a mode: of another specimen that differs by a small d it is the
     /// other's frequency up to d^2, and its derivative with any parameter is the frequency's.
     ///
     /// # Errors
-    /// As [`Specimen::modes`], and where the other specimen has other beams or other rigid springs.
+    /// As [`Specimen::modes`], and where the other specimen has other beams, rigid springs or resonators.
     pub fn rayleigh_frequencies(&self, other: &Specimen) -> Result<Vec<f64>, StructureError> {
         let model = self.model_of(other)?;
         let same_runs = model.runs.len() == self.model.runs.len()
             && (model.runs.iter().zip(&self.model.runs)).all(|(a, b)| a.elements == b.elements);
         let same_springs =
             (0..2).all(|i| model.joint[i][i].is_infinite() == self.model.joint[i][i].is_infinite());
-        if !same_runs || !same_springs {
+        let same_resonators = model.resonators.len() == self.model.resonators.len();
+        if !same_runs || !same_springs || !same_resonators {
             return Err(StructureError::FiniteElements {
-                reason: "a shape serves specimens of the same beams and rigid springs only"
-                    .to_owned(),
+                reason:
+                    "a shape serves specimens of the same beams, rigid springs and resonators only"
+                        .to_owned(),
             });
         }
         let quotients = self.modes.iter().map(|mode| {
@@ -289,22 +333,11 @@ impl SpecimenModes {
         if model.numbering != self.model.numbering || !self.loose.is_empty() {
             return Ok(None);
         }
-        let (stiffness, mass) = model.matrices();
-        let mut modes = Vec::with_capacity(self.modes.len());
-        for mode in &self.modes {
-            let vector = self.model.vector(&mode.motion);
-            let pulled = mass.times(&vector);
-            let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
-            let mut moved = stiffness.plus(-square, &mass).ldl().solve(pulled.clone());
-            let along = dot(&moved, &pulled);
-            if !along.is_finite() || along == 0.0 {
-                return Ok(None);
-            }
-            // As long as the matrix is near to singular, and of either sign.
-            moved.iter_mut().for_each(|value| *value /= along);
-            modes.push(Mode::new(&model, &moved));
-        }
-        Ok(Some(Self::elastic(model, self.mesh, modes)))
+        let modes = match model.resonators.is_empty() {
+            true => moved_modes::<BEAM_ROW>(self, &model),
+            false => moved_modes::<RESONATOR_ROW>(self, &model),
+        };
+        Ok(modes.map(|modes| Self::elastic(model, self.mesh, modes)))
     }
 
     /// Returns these modes, preceded by the motions that are rigid but for springs to the ground, the
@@ -407,7 +440,7 @@ impl SpecimenModes {
     pub fn joint_compliance_beyond(&self) -> f64 {
         // Loose motions make K singular, and s M is added: sum psi^2/(omega^2 + s).
         let shift = if self.loose.is_empty() { 0.0 } else { SHIFT };
-        let (stiffness, mass) = self.model.matrices();
+        let (stiffness, mass) = self.model.matrices::<RESONATOR_ROW>();
         let Some(factor) = stiffness.plus(shift, &mass).cholesky() else {
             return 0.0;
         };
@@ -428,8 +461,8 @@ impl SpecimenModes {
     }
 }
 
-/// All modes up to some of the beam's own, on a fixture that may give. The fixture's own mode has no
-/// number.
+/// All modes up to some of the beam's own, on a fixture that may give and with resonators. The fixture's own mode has no
+/// number, nor have those of resonators.
 #[derive(Debug, Clone)]
 pub struct BeamModes {
     /// All modes.
@@ -438,6 +471,8 @@ pub struct BeamModes {
     pub numbers: Vec<usize>,
     /// Index of the fixture's own mode; `None` on a fixture that does not give.
     pub fixture: Option<usize>,
+    /// Indices of the resonators' own modes, as far as they lie among these.
+    pub resonators: Vec<usize>,
 }
 
 impl BeamModes {
@@ -449,15 +484,29 @@ impl BeamModes {
         mesh: Mesh,
     ) -> Result<Self, StructureError> {
         let gives = specimen.base.is_some_and(|base| base.ratio > 0.0);
-        let modes = SpecimenModes::new(specimen, count + usize::from(gives), mesh)?;
+        let others = usize::from(gives) + specimen.resonators.len();
+        let modes = SpecimenModes::new(specimen, count + others, mesh)?;
         let all = 0..modes.len();
         let shares = all.clone().map(|mode| modes.base_participation(mode));
         let most = all.clone().zip(shares).max_by(|a, b| a.1.total_cmp(&b.1));
         let fixture = most.filter(|_| gives).map(|(mode, _)| mode);
+        let mut resonators = Vec::new();
+        for resonator in 0..specimen.resonators.len() {
+            let free = all.clone().filter(|mode| Some(*mode) != fixture);
+            let free = free.filter(|mode| !resonators.contains(mode));
+            let shares = free.map(|mode| (mode, modes.resonator_participation(mode, resonator)));
+            let shares: Vec<(usize, f64)> = shares.collect();
+            // With less than half of its energy here, its own mode lies above.
+            let sum: f64 = shares.iter().map(|one| one.1).sum();
+            let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            resonators.extend(most.filter(|_| sum > 0.5).map(|(mode, _)| mode));
+        }
+        let own = all.filter(|mode| Some(*mode) != fixture && !resonators.contains(mode));
         Ok(Self {
-            numbers: all.filter(|mode| Some(*mode) != fixture).collect(),
+            numbers: own.take(count).collect(),
             modes,
             fixture,
+            resonators,
         })
     }
 
@@ -472,6 +521,7 @@ impl BeamModes {
             modes,
             numbers: self.numbers.clone(),
             fixture: self.fixture,
+            resonators: self.resonators.clone(),
         }))
     }
 }

@@ -385,8 +385,8 @@ fn nearest(place: f64, values: impl Iterator<Item = f64>) -> Option<usize> {
 /// The deck of a structure, and the frequencies (Hz) that it is predicted to have.
 ///
 /// # Errors
-/// [`DeckError::NoElement`] of what no element of a plane beam shows: an axial force, a fixture that rocks, a beam
-/// with part of its shear and rotary inertia; [`DeckError::RigidAndCoupled`] as for any joint.
+/// [`DeckError::NoElement`] of what no element of a plane beam shows (an axial force, a fixture that rocks, a beam
+/// with part of its shear and rotary inertia), and of sections and resonators, which no effect has; [`DeckError::RigidAndCoupled`] as for any joint.
 pub fn deck_with_effects(
     name: &str,
     origin: &str,
@@ -459,6 +459,10 @@ fn theory_of(specimen: &Specimen) -> Result<BeamTheory, DeckError> {
         "a fixture that rocks"
     } else if specimen.overlap.is_some_and(|overlap| overlap.mass != 0.0) {
         "the spread mass of an overlap beside effects"
+    } else if !specimen.sections.is_empty() {
+        "a section that differs from the rest of the beam"
+    } else if !specimen.resonators.is_empty() {
+        "a sprung mass"
     } else if specimen.shear_rotary == 0.0 {
         return Ok(BeamTheory::Euler);
     } else if specimen.shear_rotary == 1.0 {

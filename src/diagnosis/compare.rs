@@ -4,7 +4,7 @@ use crate::amplitude::set_joint_motions;
 use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
-use crate::fit::{Search, add_by_multi_start, fit_nominal};
+use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
 use crate::result::{Hypothesis, UnlocatedSensors};
@@ -180,13 +180,18 @@ pub fn set_section_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
     Some(())
 }
 
+/// Effects from whose fits the model without them is fitted again.
+const REFITTED: usize = 2;
+
 /// Fits all hypotheses but pairs of effects.
 fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
-    let (dataset, none) = prepared(test)?;
+    let (dataset, mut none) = prepared(test)?;
     let effects = candidate_effects(&dataset);
+    let by_frequencies = fit_frequencies(&dataset);
     let search = Search {
         dataset: &dataset,
         without: &none,
+        by_frequencies: by_frequencies.as_ref(),
     };
     let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add_any(one)).collect();
     let mut candidates: Vec<Candidate> = Vec::new();
@@ -210,6 +215,26 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     }
     if let Some(fit) = fit_unknown(&dataset, &none) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
+    }
+    // Where an effect is fitted better, the model without it may be, too.
+    let mut better: Vec<&Fit> = candidates
+        .iter()
+        .filter(|one| one.drift.is_none())
+        .map(|one| &one.fit)
+        .collect();
+    better.retain(|fit| fit.best.optimum.objective < none.best.optimum.objective);
+    better.sort_by(|a, b| {
+        a.best
+            .optimum
+            .objective
+            .total_cmp(&b.best.optimum.objective)
+    });
+    for fit in better.into_iter().take(REFITTED) {
+        if let Some(again) = refit_nominal(&dataset, fit)
+            && again.log_evidence > none.log_evidence
+        {
+            none = again;
+        }
     }
     let baseline = fit_exact(&dataset, is_geometry).unwrap_or_else(|| none.clone());
     let drifting = fit_exact(&dataset, is_described).unwrap_or_else(|| baseline.clone());

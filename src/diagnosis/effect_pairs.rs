@@ -89,6 +89,7 @@ impl<'a> PairSearch<'a> {
         Search {
             dataset: self.dataset,
             without,
+            by_frequencies: None,
         }
     }
 

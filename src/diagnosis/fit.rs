@@ -46,6 +46,36 @@ struct Screened {
     log_evidence: f64,
 }
 
+/// Fits the nominal model to the frequencies alone; `None` where there is nothing else.
+pub fn fit_frequencies(dataset: &Dataset) -> Option<Fit> {
+    let mut alone = dataset.clone();
+    let kept: Vec<bool> = dataset
+        .observables
+        .iter()
+        .map(|one| !one.is_shape())
+        .collect();
+    if kept.iter().all(|kept| *kept) {
+        return None;
+    }
+    let mut keep = kept.iter();
+    alone
+        .observables
+        .retain(|_| keep.next().is_some_and(|kept| *kept));
+    let mut keep = kept.iter();
+    alone.data.retain(|_| keep.next().is_some_and(|kept| *kept));
+    alone.shape_slopes = None;
+    fit_nominal(&alone)
+}
+
+/// Fits the nominal model from where an effect was fitted. That search may have led further than the one without.
+pub fn refit_nominal(dataset: &Dataset, with: &Fit) -> Option<Fit> {
+    let forward = Forward::new(dataset, &[]);
+    let joint = forward.layout.joint.len();
+    let mut start = with.parameters().to_vec();
+    start.drain(joint..dataset.layout(&with.effects).first_nuisance());
+    Fit::of_variants(vec![evaluate(&forward, &forward.priors(), &start)?])
+}
+
 /// Nodes of a location at which the true model is fitted.
 const CORRECTED: usize = 6;
 
@@ -56,6 +86,9 @@ pub struct Search<'a> {
     pub dataset: &'a Dataset,
     /// Fit without the effect.
     pub without: &'a Fit,
+    /// Fit without the effect of the frequencies alone, from where errors of the set-up are searched: shapes that contradict
+    /// the described set-up lead astray. `None` where there are no shapes.
+    pub by_frequencies: Option<&'a Fit>,
 }
 
 impl<'a> Search<'a> {
@@ -86,7 +119,8 @@ impl<'a> Search<'a> {
 
     /// Fits an error of the set-up where that promises most; the others count with all but their size held.
     fn add_set_up_error(&self, variants: &[CandidateEffect]) -> Option<Fit> {
-        let models = self.model_with(&[]).solve(self.without.parameters())?;
+        let from = self.by_frequencies.unwrap_or(self.without);
+        let models = self.model_with(&[]).solve(from.parameters())?;
         let screened = variants.iter().map(|one| self.screened(*one, &models));
         let mut screened = screened.collect::<Option<Vec<Screened>>>()?;
         screened.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -98,7 +132,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let forward = self.model_with(&[one.candidate]);
-            let start = start_with(self.without, &forward.layout, one.size, None);
+            let start = start_with(from, &forward.layout, one.size, None);
             let fit = self.fit_from(&forward, &start);
             logs.push(
                 fit.as_ref()
@@ -134,12 +168,13 @@ impl<'a> Search<'a> {
             sizes.retain(|x| (size.low..=size.high).contains(x));
             sizes.sort_by(f64::total_cmp);
         }
+        let from = self.by_frequencies.unwrap_or(self.without);
         let (data, without) = (&self.dataset.data, &self.without.best.optimum);
         let mut held = self.without.best.priors.clone();
         held.insert(forward.layout.last_size(), Prior::held(0.0));
         let (mut best, mut logs): (Option<[f64; 2]>, Vec<f64>) = (None, Vec::new());
         for &value in &sizes {
-            let at = start_with(self.without, &forward.layout, value, None);
+            let at = start_with(from, &forward.layout, value, None);
             let predicted = forward.predict_set_up(&at, models)?;
             let gain = without.objective - objective_at(data, &held, &at, &predicted);
             logs.push(gain + size.log_density(value));

@@ -5,8 +5,8 @@ use crate::description::{SectionSlopes, free_slope, mass_slope, property_of};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
 use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
-use crate::set_up::{Channel, SetUp, loaded};
-use crate::structure::{Arrangement, ModalModel, with_joint};
+use crate::set_up::{Channel, SetUp};
+use crate::structure::{Arrangement, COUPLING, ModalModel, with_joint};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use tapjoint_beam::effects::{Circumstances, EffectId, JointLaw, apply};
@@ -96,7 +96,7 @@ impl<'a> Forward<'a> {
         let arrangements = self.dataset.arrangements.iter();
         let models = solved.iter().zip(arrangements);
         let models = models.map(|(model, arrangement)| ModalModel {
-            set_up: SetUp::new(arrangement, &self.layout, parameters),
+            set_up: SetUp::new(self.dataset, arrangement, &self.layout, parameters),
             ..model.clone()
         });
         Some(self.predict_with(models.collect(), parameters)?.0)
@@ -108,7 +108,6 @@ impl<'a> Forward<'a> {
         models: Vec<ModalModel>,
         parameters: &[f64],
     ) -> Option<(Vec<f64>, Solution)> {
-        use NuisanceParameter::{Amplitude, Damping, DampingTilt, Property};
         let base = self.predictions_of(&models, parameters)?;
         let mut predicted = base.clone();
         let mut slopes = DMatrix::zeros(base.len(), parameters.len());
@@ -116,12 +115,10 @@ impl<'a> Forward<'a> {
         for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
             let nuisance = nuisance.parameter;
             // These enter the solution itself.
-            let always = matches!(nuisance, Damping | DampingTilt | Amplitude);
-            let is_property = matches!(nuisance, Property { .. });
+            let enters = nuisance.is_solved();
             for (row, observable) in self.observables.iter().enumerate() {
-                let is_solved = always || is_property && !observable.is_of_bar();
-                let slope =
-                    self.nuisance_slope(observable, nuisance, &models, base[row], parameters);
+                let is_solved = enters && !observable.is_of_bar();
+                let slope = self.nuisance_slope(row, nuisance, &models, base[row], parameters);
                 slopes[(row, first + k)] = slope;
                 if !is_solved {
                     predicted[row] += parameters[first + k] * slope;
@@ -242,7 +239,9 @@ impl<'a> Forward<'a> {
         let law = self.law(parameters);
         let mut all: Vec<ModalModel> = Vec::with_capacity(self.dataset.arrangements.len());
         for (configuration, arrangement) in self.dataset.arrangements.iter().enumerate() {
-            let (specimen, carried) = loaded(arrangement, &self.layout, parameters);
+            let set_up = SetUp::new(self.dataset, arrangement, &self.layout, parameters);
+            let carried = set_up.carried(arrangement);
+            let specimen = set_up.loaded(arrangement);
             let mut nominal = with_joint(&specimen, &self.layout.joint, parameters);
             self.set_properties(&mut nominal, parameters);
             let motion = arrangement.joint_motion.as_ref().zip(law.as_ref());
@@ -261,7 +260,7 @@ impl<'a> Forward<'a> {
             };
             all.push(ModalModel {
                 seen,
-                set_up: SetUp::new(arrangement, &self.layout, parameters),
+                set_up,
                 own,
                 frequencies,
                 stiffness_changes,
@@ -358,12 +357,13 @@ impl<'a> Forward<'a> {
     /// Returns the derivative of a prediction with respect to a nuisance parameter.
     fn nuisance_slope(
         &self,
-        observable: &Observable,
+        row: usize,
         nuisance: NuisanceParameter,
         models: &[ModalModel],
         predicted: f64,
         parameters: &[f64],
     ) -> f64 {
+        let observable = &self.observables[row];
         if observable.is_damping() {
             let tilt = match nuisance {
                 NuisanceParameter::Damping => 1.0,
@@ -389,6 +389,11 @@ impl<'a> Forward<'a> {
         let Some(place) = ModeInPlace::new(self, observable, models) else {
             return 0.0;
         };
+        if let NuisanceParameter::Property { property } = nuisance
+            && observable.is_shape()
+        {
+            return place.shape_slope(property, predicted, self.shape_slopes_by_joint(row));
+        }
         match observable.kind {
             ObservableKind::Frequency => place.frequency_slope(nuisance, parameters),
             ObservableKind::Constant { sensor } => {
@@ -403,6 +408,21 @@ impl<'a> Forward<'a> {
             | ObservableKind::BeamMass
             | ObservableKind::FreeScale => 0.0,
         }
+    }
+
+    /// Returns the slopes of a shape with respect to the logarithms of the joint's stiffnesses, at the nominal optimum.
+    fn shape_slopes_by_joint(&self, row: usize) -> [f64; 2] {
+        let mut slopes = [0.0; 2];
+        if let Some(known) = &self.dataset.shape_slopes
+            && row < known.nrows()
+        {
+            for (column, direction) in self.layout.joint.iter().enumerate() {
+                if *direction != COUPLING {
+                    slopes[*direction] = known[(row, column)];
+                }
+            }
+        }
+        slopes
     }
 
     /// Returns the logarithm of the mass, or of the free frequencies, of the bar over the nominal ones.
@@ -570,7 +590,12 @@ impl<'a> ModeInPlace<'a> {
 
     fn at_sensor(&self, sensor: usize) -> f64 {
         let channel = self.channel(sensor);
-        channel.factor * self.on_line(channel.position)
+        channel.factor * self.on_line(self.place(channel))
+    }
+
+    /// Where the sensor sits whose signal a channel shows (m).
+    fn place(&self, channel: Channel) -> f64 {
+        self.model.set_up.sensors[channel.sensor].position
     }
 
     /// Displacement on the middle line, where sensors sit and the hammer strikes.
@@ -586,11 +611,16 @@ impl<'a> ModeInPlace<'a> {
         self.model.modes().slope(self.index, position)
     }
 
-    /// Sensors with this index among the indices `keys`.
-    fn sensors(&self, keys: &'a [usize], wanted: usize) -> impl Iterator<Item = &'a PointMass> {
-        let own = keys.iter().zip(&self.arrangement.sensors);
+    /// Sensors with this index among the indices `keys`: with their stated masses, where they are.
+    fn sensors(&self, keys: &'a [usize], wanted: usize) -> impl Iterator<Item = PointMass> {
+        let pairs = self
+            .arrangement
+            .sensors
+            .iter()
+            .zip(&self.model.set_up.sensors);
+        let own = keys.iter().zip(pairs);
         own.filter(move |(key, _)| **key == wanted)
-            .map(|(_, sensor)| sensor)
+            .map(|(_, (stated, sensor))| PointMass::new(sensor.position, stated.mass))
     }
 
     /// Returns d ln f with respect to a nuisance parameter.
@@ -625,7 +655,7 @@ impl<'a> ModeInPlace<'a> {
             NuisanceParameter::SensorInertia { name } => self
                 .sensors(&arrangement.names, name)
                 .map(|sensor| {
-                    let mass = forward.mass_at(sensor, parameters);
+                    let mass = forward.mass_at(&sensor, parameters);
                     self.inertia_slope(mass, sensor.position)
                 })
                 .sum(),
@@ -648,7 +678,7 @@ impl<'a> ModeInPlace<'a> {
                     let spring = forward.size_of(EffectId::SensorCable, parameters);
                     let held = spring / (omega * omega);
                     let moved = self.displacement(sensor.position) * self.slope(sensor.position);
-                    (held - forward.mass_at(sensor, parameters)) * moved
+                    (held - forward.mass_at(&sensor, parameters)) * moved
                 })
                 .sum(),
             // d ln f/d m = -phi^2/2, and d ln f/d x = -m phi phi'.
@@ -670,11 +700,48 @@ impl<'a> ModeInPlace<'a> {
         -0.5 * inertia * self.slope(position).powi(2)
     }
 
-    /// Added masses (kg) with this index, and their positions (m).
+    /// Added masses (kg) with this index as stated, and where they are (m).
     fn fastened(&self, wanted: usize) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let own = self.arrangement.fastened.iter();
-        let own = own.filter(move |(own, _)| *own == wanted);
-        own.map(|(_, mass)| (mass.mass, mass.position))
+        let own = self
+            .arrangement
+            .fastened
+            .iter()
+            .zip(&self.model.set_up.fastened);
+        let own = own.filter(move |((own, _), _)| *own == wanted);
+        own.map(|((_, stated), mass)| (stated.mass, mass.position))
+    }
+
+    /// Returns the derivative of a modal constant or ratio with respect to the logarithm of a property of the beam, `by_joint`
+    /// being those with respect to the joint's stiffnesses. A shape of unit modal mass is m^-1/2 psi(x/L), where psi
+    /// depends on Kt L^3/E I and Kr L/E I alone, but for what is fastened to the beam.
+    fn shape_slope(&self, property: Parameter, predicted: f64, by_joint: [f64; 2]) -> f64 {
+        let [translation, rotation] = by_joint;
+        let by_bending = -(translation + rotation);
+        let (by_mass, along) = match self.observable.kind {
+            ObservableKind::Constant { sensor } => {
+                let tap = self.model.set_up.tap;
+                let at_tap = tap.map_or(0.0, |tap| tap * self.slope(tap) / self.on_line(tap));
+                (-predicted, self.stretched(sensor) + at_tap)
+            }
+            ObservableKind::Ratio { sensor, reference } => {
+                (0.0, self.stretched(sensor) - self.stretched(reference))
+            }
+            _ => (0.0, 0.0),
+        };
+        match property {
+            Parameter::Modulus => by_bending,
+            Parameter::Density => by_mass,
+            Parameter::Thickness => 3.0 * by_bending + by_mass,
+            Parameter::Width => by_bending + by_mass,
+            Parameter::Length => 3.0 * translation + rotation + by_mass - predicted * along,
+            _ => 0.0,
+        }
+    }
+
+    /// Returns x phi'/phi at a sensor.
+    fn stretched(&self, sensor: usize) -> f64 {
+        let x = self.place(self.channel(sensor));
+        x * self.slope(x) / self.on_line(x)
     }
 
     /// Returns the derivative of the modal constant at a sensor with respect to a nuisance parameter.
@@ -684,7 +751,7 @@ impl<'a> ModeInPlace<'a> {
             return 0.0;
         };
         let channel = self.channel(sensor);
-        let x = channel.position;
+        let x = self.place(channel);
         match nuisance {
             NuisanceParameter::Gain { setup, name } if self.is_gain(sensor, setup, name) => {
                 predicted
@@ -694,8 +761,6 @@ impl<'a> ModeInPlace<'a> {
             {
                 channel.factor * self.slope(x) * self.on_line(tap)
             }
-            // Of unit modal mass, which is that of the beam.
-            NuisanceParameter::Property { property } => -predicted * mass_slope(property),
             NuisanceParameter::TapPosition { setup } if arrangement.setup == setup => {
                 channel.factor * self.on_line(x) * self.slope(tap)
             }
@@ -710,7 +775,7 @@ impl<'a> ModeInPlace<'a> {
             NuisanceParameter::SensorPosition { position }
                 if self.arrangement.positions[self.channel(sensor).sensor] == position =>
             {
-                let x = self.channel(sensor).position;
+                let x = self.place(self.channel(sensor));
                 self.slope(x) / self.on_line(x)
             }
             _ => 0.0,

@@ -17,7 +17,7 @@ use crate::structure::{COUPLING, Nominal, ROTATION};
 use tapjoint_beam::effects::{Effect, EffectId, Group};
 use tapjoint_identify::consistent::Parameter;
 
-/// Nuisance parameter: small, unknown, and shared by all hypotheses. Its influence is linear.
+/// Nuisance parameter: small, unknown, and shared by all hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NuisanceParameter {
     /// Property of the beam over its described value (logarithm).
@@ -64,6 +64,26 @@ pub enum NuisanceParameter {
 }
 
 impl NuisanceParameter {
+    /// Returns whether it enters the solution itself; all others add to the predictions in proportion to their size.
+    pub fn is_solved(self) -> bool {
+        use NuisanceParameter::{
+            Amplitude, Damping, DampingTilt, FastenedMass, FastenedPosition, Property, SensorMass,
+            SensorPosition, TapPosition,
+        };
+        matches!(
+            self,
+            Amplitude
+                | Damping
+                | DampingTilt
+                | Property { .. }
+                | SensorMass { .. }
+                | SensorPosition { .. }
+                | TapPosition { .. }
+                | FastenedMass { .. }
+                | FastenedPosition { .. }
+        )
+    }
+
     /// Returns whether it is the joint's drift between set-ups.
     pub fn is_drift(self) -> bool {
         matches!(self, NuisanceParameter::Drift { .. })

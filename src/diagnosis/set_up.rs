@@ -1,15 +1,23 @@
-//! The set-up as it is under a hypothesis: where sensors and hammer are, and what the channels show.
+//! The set-up as it is under a hypothesis: where sensors, masses and hammer are, and what the channels show.
+//!
+//! Errors of the set-up that a hypothesis adds, and the tolerances of the description, enter the solved structure: a mass of a
+//! few percent that sits some millimetres off moves high modes by more than the slope at the stated place says.
 
-use crate::parameters::{Layout, Target};
+use crate::dataset::Dataset;
+use crate::parameters::{Layout, NuisanceParameter, Target};
 use crate::structure::Arrangement;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_beam::specimen::{PointMass, Specimen};
 
-/// Sensors and hammer of one configuration.
+/// Sensors, masses and hammer of one configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetUp {
+    /// Masses and positions of the sensors.
+    pub sensors: Vec<PointMass>,
     /// What each channel shows, in the order of the sensors.
     pub channels: Vec<Channel>,
+    /// Known added masses, in the order of the arrangement.
+    pub fastened: Vec<PointMass>,
     /// Position of the taps (m).
     pub tap: Option<f64>,
 }
@@ -19,49 +27,90 @@ pub struct SetUp {
 pub struct Channel {
     /// Index of the sensor whose signal it is.
     pub sensor: usize,
-    /// Position of that sensor (m).
-    pub position: f64,
     /// Signal over what the description makes of it (1).
     pub factor: f64,
 }
 
 impl SetUp {
     /// Returns the set-up of a configuration with the errors that the parameters give it.
-    pub fn new(arrangement: &Arrangement, layout: &Layout, parameters: &[f64]) -> Self {
-        let sensors = arrangement.sensors.iter().enumerate();
-        let channels = sensors.map(|(sensor, placed)| Channel {
-            sensor,
-            position: placed.position,
-            factor: 1.0,
-        });
+    pub fn new(
+        dataset: &Dataset,
+        arrangement: &Arrangement,
+        layout: &Layout,
+        parameters: &[f64],
+    ) -> Self {
+        let sensors = 0..arrangement.sensors.len();
+        let fastened = arrangement.fastened.iter().map(|one| one.1);
         let mut set_up = SetUp {
-            channels: channels.collect(),
+            sensors: arrangement.sensors.clone(),
+            channels: sensors
+                .map(|sensor| Channel {
+                    sensor,
+                    factor: 1.0,
+                })
+                .collect(),
+            fastened: fastened.collect(),
             tap: arrangement.tap,
         };
+        let values = &parameters[layout.first_nuisance()..];
+        for (nuisance, value) in dataset.nuisances.iter().zip(values) {
+            set_up.tolerate(nuisance.parameter, *value, arrangement);
+        }
         for (k, one) in layout.effects.iter().enumerate() {
-            set_up.add(
-                one.effect,
-                one.target,
-                parameters[layout.size(k)],
-                arrangement,
-            );
+            let size = parameters[layout.size(k)];
+            set_up.add(one.effect, one.target, size, arrangement);
+        }
+        let length = dataset.nominal.length();
+        let masses = set_up.sensors.iter_mut().chain(&mut set_up.fastened);
+        let places = masses.map(|one| &mut one.position).chain(&mut set_up.tap);
+        for place in places {
+            *place = place.clamp(0.0, length);
         }
         set_up
     }
 
-    fn add(&mut self, effect: EffectId, target: Target, size: f64, arrangement: &Arrangement) {
-        match (effect, target) {
-            (EffectId::SensorPosition, Target::Place { position }) => {
-                for channel in &mut self.channels {
-                    if arrangement.positions[channel.sensor] == position {
-                        channel.position += size;
+    /// Adds what a tolerance leaves open.
+    fn tolerate(&mut self, nuisance: NuisanceParameter, value: f64, arrangement: &Arrangement) {
+        match nuisance {
+            NuisanceParameter::SensorMass { name } => {
+                for (sensor, own) in self.sensors.iter_mut().zip(&arrangement.names) {
+                    if *own == name {
+                        sensor.mass *= (1.0 + value).max(0.0);
                     }
                 }
             }
-            (EffectId::TapPosition, Target::Taps { tap }) => {
-                if arrangement.tap_index == Some(tap) {
-                    self.tap = self.tap.map(|x| x + size);
+            NuisanceParameter::SensorPosition { position } => {
+                self.move_sensors(position, value, arrangement);
+            }
+            NuisanceParameter::FastenedMass { fastened } => {
+                for (mass, (own, _)) in self.fastened.iter_mut().zip(&arrangement.fastened) {
+                    if *own == fastened {
+                        mass.mass *= (1.0 + value).max(0.0);
+                    }
                 }
+            }
+            NuisanceParameter::FastenedPosition { fastened } => {
+                for (mass, (own, _)) in self.fastened.iter_mut().zip(&arrangement.fastened) {
+                    if *own == fastened {
+                        mass.position += value;
+                    }
+                }
+            }
+            NuisanceParameter::TapPosition { setup } if setup == arrangement.setup => {
+                self.tap = self.tap.map(|x| x + value);
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds an error of the set-up.
+    fn add(&mut self, effect: EffectId, target: Target, size: f64, arrangement: &Arrangement) {
+        match (effect, target) {
+            (EffectId::SensorPosition, Target::Place { position }) => {
+                self.move_sensors(position, size, arrangement);
+            }
+            (EffectId::TapPosition, Target::Taps { tap }) if arrangement.tap_index == Some(tap) => {
+                self.tap = self.tap.map(|x| x + size);
             }
             (EffectId::SensorPolarity, Target::Sensor { name }) => {
                 self.multiply(Some(name), -1.0, arrangement);
@@ -81,6 +130,15 @@ impl SetUp {
         }
     }
 
+    /// Moves the sensors with this index of their stated position by a distance (m).
+    fn move_sensors(&mut self, position: usize, distance: f64, arrangement: &Arrangement) {
+        for (sensor, own) in self.sensors.iter_mut().zip(&arrangement.positions) {
+            if *own == position {
+                sensor.position += distance;
+            }
+        }
+    }
+
     /// Multiplies the channels of the sensor with this name, or all.
     fn multiply(&mut self, name: Option<usize>, factor: f64, arrangement: &Arrangement) {
         for (channel, own) in self.channels.iter_mut().zip(&arrangement.names) {
@@ -89,30 +147,33 @@ impl SetUp {
             }
         }
     }
-}
 
-/// Returns the structure of a configuration, and the sensors that sit on it, with the sensors where the parameters have
-/// them.
-pub fn loaded(
-    arrangement: &Arrangement,
-    layout: &Layout,
-    parameters: &[f64],
-) -> (Specimen, Vec<PointMass>) {
-    let (mut specimen, mut carried) = (arrangement.specimen.clone(), arrangement.carried.clone());
-    for (k, one) in layout.effects.iter().enumerate() {
-        let (EffectId::SensorPosition, Target::Place { position }) = (one.effect, one.target)
-        else {
-            continue;
-        };
-        let sensors = arrangement.sensors.iter().zip(&arrangement.positions);
-        for (sensor, _) in sensors.filter(|(_, own)| **own == position) {
-            let moved = sensor.position + parameters[layout.size(k)];
-            for list in [&mut specimen.masses, &mut carried] {
-                if let Some(own) = list.iter_mut().find(|one| *one == sensor) {
-                    own.position = moved;
-                }
+    /// Returns the structure of a configuration with the sensors and masses where they are.
+    pub fn loaded(&self, arrangement: &Arrangement) -> Specimen {
+        let mut specimen = arrangement.specimen.clone();
+        // They stand behind what sits on the structure for good.
+        let heavy = arrangement.sensors.iter().zip(&self.sensors);
+        let heavy = heavy.filter(|(stated, _)| stated.mass > 0.0);
+        let moved: Vec<PointMass> = heavy
+            .map(|(_, sensor)| *sensor)
+            .chain(self.fastened.iter().copied())
+            .collect();
+        let own = specimen.masses.len().saturating_sub(moved.len());
+        specimen.masses.truncate(own);
+        specimen.masses.extend(moved);
+        specimen
+    }
+
+    /// Returns the sensors that sit on the structure, where they are.
+    pub fn carried(&self, arrangement: &Arrangement) -> Vec<PointMass> {
+        let mut carried = arrangement.carried.clone();
+        let mut next = carried.iter_mut().peekable();
+        for (stated, sensor) in arrangement.sensors.iter().zip(&self.sensors) {
+            // In the order of the sensors, without those that do not touch it.
+            if let Some(own) = next.next_if(|own| **own == *stated) {
+                own.position = sensor.position;
             }
         }
+        carried
     }
-    (specimen, carried)
 }

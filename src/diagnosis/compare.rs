@@ -217,11 +217,10 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
     // Where an effect is fitted better, the model without it may be, too.
-    let mut better: Vec<&Fit> = candidates
+    let singles = candidates
         .iter()
-        .filter(|one| one.drift.is_none())
-        .map(|one| &one.fit)
-        .collect();
+        .filter(|one| one.drift.is_none() && !one.is_unknown());
+    let mut better: Vec<&Fit> = singles.map(|one| &one.fit).collect();
     better.retain(|fit| fit.best.optimum.objective < none.best.optimum.objective);
     better.sort_by(|a, b| {
         a.best

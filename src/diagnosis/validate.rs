@@ -537,9 +537,10 @@ mod tests {
         let linearised = HoldoutErrors::new(&dataset, &fit).unwrap().goodness();
         let linearised = linearised.unwrap();
         let together = joint_goodness(&dataset, &fit, drift_of(&dataset, &fit)).unwrap();
-        // Curvature over 1e-4 is a share of 1e-4 of the slopes; the search ends 1e-4 from the optimum.
+        // The search ends 1e-4 from the optimum; tolerances of 0.1 % and of 1 mm bend the predictions by a hundredth of the data's
+        // uncertainty.
         assert!(
-            (together / linearised - 1.0).abs() < 2e-3,
+            (together / linearised - 1.0).abs() < 2e-2,
             "{together} {linearised}"
         );
         assert!(linearised < 0.05, "{linearised}: the errors are not small");

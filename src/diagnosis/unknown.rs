@@ -11,9 +11,9 @@
 //! - all frequencies of one set-up are off by a factor of its own.
 //!
 //! By Rayleigh's quotient a relative change e(x) of E I moves ln f by (1/2) int e E I w''^2 dx/omega^2, of the mass by
-//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. All kinds are
-//! equally probable, and all spreads of a kind. What such changes do to shapes and damping is left open: these data count
-//! as less certain in proportion to the spread.
+//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. These four kinds are
+//! equally probable, all ways of a kind, and all spreads of a way. What such changes do to shapes and damping, and a
+//! tenth of what they do to each frequency, is either left open in proportion to the spread, or nothing: both are equally probable.
 
 use crate::dataset::{Dataset, ObservableKind};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
@@ -31,14 +31,28 @@ const OF_MODES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
 /// Spreads of stiffness, mass and thickness along the beam (1): a coat of paint to a glued strip.
 const ALONG_BEAM: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// Spreads of the springs along the beam, over E I/L^4: foam to a second support.
-const OF_SPRINGS: [f64; 5] = [0.01, 0.1, 1.0, 10.0, 100.0];
+const OF_SPRINGS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 /// Spreads of a factor of one set-up (1): several kelvins to a re-clamped beam of another length.
 const OF_SET_UPS: [f64; 3] = [5e-4, 2e-3, 8e-3];
 /// Changes along the beam, up to three waves of it: as fine as six modes resolve.
 const ORDERS: usize = 6;
 
+/// Kinds of ways, which are equally probable; so are all ways of a kind.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Each mode for itself.
+    Modes,
+    /// Stiffness, mass or thickness along the beam.
+    AlongBeam,
+    /// Springs along the beam.
+    Springs,
+    /// Each set-up for itself.
+    SetUps,
+}
+
 /// One way in which a structure may differ from its description.
 struct Way {
+    kind: Kind,
     /// Change of each datum (row) for a unit of each size (column).
     slopes: DMatrix<f64>,
     /// Spreads of the sizes.
@@ -50,25 +64,30 @@ struct Way {
 /// Returns the fit of something unknown. Its parameters are those of the best discrepancy of each mode.
 pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
-    let mut all = Vec::new();
+    let mut all: Vec<(Kind, f64)> = Vec::new();
     let mut best: Option<(f64, f64)> = None;
-    for (kind, way) in ways(dataset, &models).into_iter().enumerate() {
+    for way in ways(dataset, &models) {
         let mut logs = Vec::new();
         for &spread in way.spreads {
-            let log = log_evidence(dataset, nominal, &way, spread);
-            if kind == 0 && best.is_none_or(|(most, _)| log > most) {
+            // A change that the slopes describe well must not pay for one that they do not.
+            let log = log_mean(
+                &[0.0, 1.0].map(|share| log_evidence(dataset, nominal, &way, spread, share)),
+            );
+            if way.kind == Kind::Modes && best.is_none_or(|(most, _)| log > most) {
                 best = Some((log, spread));
             }
             logs.push(log);
         }
-        all.push(log_mean(&logs));
+        all.push((way.kind, log_mean(&logs)));
     }
     let (linear, spread) = best?;
     let modes = discrepancies(dataset, nominal, spread)?;
-    // The true model in the place of the linearised one, where that matters.
-    all[0] += modes.log_evidence - linear;
+    // The true model in the place of the linearised one, where that makes it more probable.
+    all[0].1 += (modes.log_evidence - linear).max(0.0);
+    let kinds = all.chunk_by(|a, b| a.0 == b.0);
+    let kinds = kinds.map(|ways| log_mean(&ways.iter().map(|way| way.1).collect::<Vec<f64>>()));
     Some(Fit {
-        log_evidence: log_mean(&all),
+        log_evidence: log_mean(&kinds.collect::<Vec<f64>>()),
         ..Fit::of_variants(vec![modes])?
     })
 }
@@ -109,6 +128,7 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
     }
     let thickness = 3.0 * &stiffness + &mass;
     let mut all = vec![Way {
+        kind: Kind::Modes,
         slopes: of_modes,
         spreads: &OF_MODES,
         loosened: 2.0,
@@ -117,19 +137,25 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
     for field in [&stiffness, &mass, &thickness] {
         for falls in [true, false] {
             all.push(Way {
+                kind: Kind::AlongBeam,
                 slopes: (field * waves(falls)).columns(1, ORDERS).into_owned(),
                 spreads: &ALONG_BEAM,
                 loosened: 0.3,
             });
         }
     }
-    all.push(Way {
-        slopes: springs * waves(true),
-        spreads: &OF_SPRINGS,
-        loosened: 0.01,
-    });
+    // The same everywhere, or not.
+    for orders in [1, ORDERS + 1] {
+        all.push(Way {
+            kind: Kind::Springs,
+            slopes: (&springs * waves(true)).columns(0, orders).into_owned(),
+            spreads: &OF_SPRINGS,
+            loosened: 0.01,
+        });
+    }
     if setups.len() > 1 {
         all.push(Way {
+            kind: Kind::SetUps,
             slopes: of_setups,
             spreads: &OF_SET_UPS,
             loosened: 0.0,
@@ -151,13 +177,11 @@ fn waves(falls: bool) -> DMatrix<f64> {
     })
 }
 
-/// Returns the evidence of one way with this spread, by the nominal model linearised at its optimum.
-fn log_evidence(dataset: &Dataset, nominal: &Fit, way: &Way, spread: f64) -> f64 {
-    let loose = loosened(
-        dataset,
-        way.loosened * spread,
-        0.1 * frequency_spread(way, spread),
-    );
+/// Returns the evidence of one way with this spread, by the nominal model linearised at its optimum. `share` (1) of what the
+/// slopes may miss counts as uncertain.
+fn log_evidence(dataset: &Dataset, nominal: &Fit, way: &Way, spread: f64, share: f64) -> f64 {
+    let of_frequencies = share * 0.1 * frequency_spread(way, spread);
+    let loose = loosened(dataset, share * way.loosened * spread, of_frequencies);
     let optimum = &nominal.best.optimum;
     let (first, added) = (optimum.parameters.len(), way.slopes.ncols());
     let mut slopes = optimum
@@ -209,7 +233,7 @@ fn loosened(dataset: &Dataset, of_shapes: f64, of_frequencies: f64) -> Dataset {
 
 /// Fits a discrepancy of each mode with this spread by the true model.
 fn discrepancies(dataset: &Dataset, nominal: &Fit, spread: f64) -> Option<LocalOptimum> {
-    let mut loose = loosened(dataset, 2.0 * spread, 0.1 * spread);
+    let mut loose = loosened(dataset, 0.0, 0.0);
     for mode in 1..=dataset.fitted_modes {
         loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
     }

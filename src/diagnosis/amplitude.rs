@@ -275,7 +275,7 @@ fn inflate_shared(dataset: &mut Dataset, models: &[ModalModel], law: &JointLaw) 
         *largest = f64::max(*largest, change);
     }
     let fitted = dataset.observables.iter().zip(&mut dataset.data);
-    let held_out = dataset.holdout.iter_mut();
+    let held_out = dataset.holdout.iter_mut().chain(&mut dataset.spare);
     let held_out = held_out.map(|(one, datum)| (&*one, datum));
     for (observable, datum) in fitted.chain(held_out) {
         let (configuration, mode) = (observable.configuration, observable.mode);

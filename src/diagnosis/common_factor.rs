@@ -51,7 +51,12 @@ fn by_description(dataset: &Dataset) -> Option<[f64; 2]> {
             ObservableKind::FreeScale => free_slope,
             _ => continue,
         };
-        let row = DVector::from_iterator(PROPERTIES.len(), PROPERTIES.map(slope).into_iter());
+        let own = PROPERTIES.map(|property| match property {
+            // A longer bar has a length of its own.
+            Parameter::Length if known.is_longer => 0.0,
+            other => slope(other),
+        });
+        let row = DVector::from_iterator(PROPERTIES.len(), own);
         let towards = &covariance * &row;
         let variance = row.dot(&towards) + datum.std * datum.std;
         mean += &towards * ((datum.value - row.dot(&mean)) / variance);
@@ -61,7 +66,7 @@ fn by_description(dataset: &Dataset) -> Option<[f64; 2]> {
         Parameter::Length => -2.0,
         other => free_slope(other),
     });
-    let slopes = DVector::from_iterator(PROPERTIES.len(), slopes.into_iter());
+    let slopes = DVector::from_iterator(PROPERTIES.len(), slopes);
     let variance = slopes.dot(&(&covariance * &slopes)).max(0.0);
     Some([slopes.dot(&mean), variance.sqrt()])
 }

@@ -202,20 +202,6 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     if !one_stands && !stands(&dataset, &none) {
         add_large_effects(&search, &effects, &mut candidates);
     }
-    if dataset.first_drift().is_some() {
-        // A joint that differs from set-up to set-up.
-        let (layout, best) = (dataset.layout(&[]), &none.best);
-        let found = LARGE_DRIFTS
-            .map(|drift| over_drifts(&dataset, &layout, &best.priors, &best.optimum, &[drift]));
-        let fit = Fit::of_variants(found.into())?;
-        let drift = fit.best.drifts.first().map(|drift| drift.0);
-        let mut candidate = single(EffectId::JointDrift, fit);
-        candidate.drift = drift;
-        candidates.push(candidate);
-    }
-    if let Some(fit) = fit_unknown(&dataset, &none) {
-        candidates.push(Candidate::new(Hypothesis::Unknown, fit));
-    }
     // Where an effect is fitted better, the model without it may be, too.
     let singles = candidates
         .iter()
@@ -234,6 +220,20 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         {
             none = again;
         }
+    }
+    if dataset.first_drift().is_some() {
+        // A joint that differs from set-up to set-up.
+        let (layout, best) = (dataset.layout(&[]), &none.best);
+        let found = LARGE_DRIFTS
+            .map(|drift| over_drifts(&dataset, &layout, &best.priors, &best.optimum, &[drift]));
+        let fit = Fit::of_variants(found.into())?;
+        let drift = fit.best.drifts.first().map(|drift| drift.0);
+        let mut candidate = single(EffectId::JointDrift, fit);
+        candidate.drift = drift;
+        candidates.push(candidate);
+    }
+    if let Some(fit) = fit_unknown(&dataset, &none) {
+        candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
     let baseline = fit_exact(&dataset, is_geometry).unwrap_or_else(|| none.clone());
     let drifting = fit_exact(&dataset, is_described).unwrap_or_else(|| baseline.clone());

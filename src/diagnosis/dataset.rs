@@ -343,7 +343,7 @@ impl Dataset {
             section: SectionSlopes::default(),
             shape_slopes: None,
             tilts: BTreeMap::new(),
-            peaks: UnpairedPeaks::new(observations),
+            peaks: UnpairedPeaks::new(&spare.without(observations)),
         };
         dataset.add_frequencies(observations, &spare);
         // What else these recordings show takes no part either.

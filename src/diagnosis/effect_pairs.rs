@@ -196,9 +196,12 @@ impl<'a> PairSearch<'a> {
             let search = self.beside(if is_first { first } else { second });
             fits.extend(settle(&search, std::slice::from_ref(start)));
         }
-        let fit = fits
+        let mut fit = fits
             .into_iter()
             .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        // Only the best of several things that an effect may act on is fitted.
+        let variants = fit.effects.iter().map(|one| (one.variants as f64).ln());
+        fit.log_evidence -= variants.sum::<f64>();
         let alone = if first.log_evidence > second.log_evidence {
             first
         } else {

@@ -207,8 +207,7 @@ pub fn log_sum(logs: &[f64]) -> f64 {
 ///                    2              2
 /// ```
 ///
-/// The size of a single effect is integrated apart ([`over_size`]); the sizes of two
-/// effects, accepted only if both stand out, are Gaussian too.
+/// Sizes are integrated apart ([`over_size`]).
 fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Optimum) -> f64 {
     let free = free_parameters(priors);
     // A tiny effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
@@ -217,6 +216,8 @@ fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Opt
     for (effect, candidate) in layout.effects.iter().enumerate() {
         if let (Some(at), Some(range)) = (layout.location(effect), candidate.location)
             && !priors[at].is_held()
+            // A location that a datum states has its own density.
+            && !priors[at].std.is_finite()
         {
             let (low, high) = range.searched_bounds();
             ranges.push(high - low);
@@ -441,6 +442,7 @@ mod tests {
                     target: Target::All,
                     size: self.size,
                     location: None,
+                    variants: 1,
                 }],
             };
             let size = Prior {
@@ -588,6 +590,7 @@ mod tests {
                     high: 0.4,
                     nodes: 5,
                 }),
+                variants: 1,
             }],
         };
         let size = Prior {

@@ -720,7 +720,7 @@ impl<'a> ModeInPlace<'a> {
         let (by_mass, along) = match self.observable.kind {
             ObservableKind::Constant { sensor } => {
                 let tap = self.model.set_up.tap;
-                let at_tap = tap.map_or(0.0, |tap| tap * self.slope(tap) / self.on_line(tap));
+                let at_tap = tap.map_or(0.0, |tap| self.stretched_at(tap));
                 (-predicted, self.stretched(sensor) + at_tap)
             }
             ObservableKind::Ratio { sensor, reference } => {
@@ -740,8 +740,13 @@ impl<'a> ModeInPlace<'a> {
 
     /// Returns x phi'/phi at a sensor.
     fn stretched(&self, sensor: usize) -> f64 {
-        let x = self.place(self.channel(sensor));
-        x * self.slope(x) / self.on_line(x)
+        self.stretched_at(self.place(self.channel(sensor)))
+    }
+
+    /// Returns x phi'/phi at a position; 0 at a rigid clamp, where nothing moves.
+    fn stretched_at(&self, x: f64) -> f64 {
+        let ratio = x * self.slope(x) / self.on_line(x);
+        if ratio.is_finite() { ratio } else { 0.0 }
     }
 
     /// Returns the derivative of the modal constant at a sensor with respect to a nuisance parameter.

@@ -167,6 +167,8 @@ pub struct CandidateEffect {
     pub size: Size,
     /// Second parameter, for its location or its law, if it has one.
     pub location: Option<LocationRange>,
+    /// Number of targets that are as probable as this one, itself included.
+    pub variants: usize,
 }
 
 impl CandidateEffect {
@@ -177,6 +179,7 @@ impl CandidateEffect {
             target,
             size,
             location: None,
+            variants: 1,
         }
     }
 }
@@ -421,6 +424,7 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal, end: f64) -> Option
             high,
             nodes,
         }),
+        variants: 1,
     })
 }
 
@@ -501,7 +505,7 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
                 ));
             }
         }
-        EffectId::SensorSwap if several => {
+        EffectId::SensorSwap if several && (has_constants || has_ratios) => {
             for first in names.clone() {
                 for second in first + 1..names.end {
                     let names = [first, second];
@@ -514,15 +518,16 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
             }
         }
         // A wrong sheet, 10 % from sensor to sensor; a wrong unit is a factor of 9.81 or 10.
-        EffectId::SensorScale => {
+        EffectId::SensorScale if has_constants || has_ratios => {
             let size = Size {
                 low: -0.95,
                 ..Size::signed("relative", 0.1, 20.0)
             };
-            if has_constants {
+            // That of the hammer is one of all sensors.
+            if has_constants && several {
                 all.push(CandidateEffect::of_set_up(effect, Target::All, size));
             }
-            if several {
+            if has_constants || several {
                 for name in names {
                     all.push(CandidateEffect::of_set_up(
                         effect,
@@ -533,6 +538,10 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
             }
         }
         _ => {}
+    }
+    let variants = all.len();
+    for one in &mut all {
+        one.variants = variants;
     }
     all
 }

@@ -40,8 +40,8 @@ pub struct Diagnosis {
     pub unlocated: Option<UnlocatedSensors>,
     /// Common factor that the frequencies ask for; `None` where they do not fix it.
     pub common_factor: Option<CommonFactor>,
-    /// Why no data could be spared for the closure; `None` where some were.
-    pub closure_reason: Option<String>,
+    /// What the test would need for data that are spared for the closure; `None` where it has them.
+    pub spare_from: Option<SpareFrom>,
     /// Tests that would decide between the hypotheses, those with most information per cost first.
     pub next_tests: Vec<NextTest>,
 }
@@ -273,6 +273,15 @@ pub struct ParameterValue {
     pub smallest_separable: Option<f64>,
 }
 
+/// Number of modes, or of recordings of which two repeat the sensors of others, from which on data are spared for the closure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SpareFrom {
+    /// Modes.
+    pub modes: usize,
+    /// Recordings.
+    pub recordings: usize,
+}
+
 /// Factor on all frequencies that would suit the data best, if the description were exact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct CommonFactor {
@@ -430,7 +439,7 @@ pub struct LocationMap {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecidedBy {
-    /// The data: the likelihood ratio is 3 or more, or they refute the more probable hypothesis.
+    /// The data: the likelihood ratio is 3 or more.
     #[serde(rename = "readings")]
     Data,
     /// The priors: the data alone would leave both.

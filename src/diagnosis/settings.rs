@@ -305,7 +305,7 @@ pub const RIGID_PRIOR: f64 = 4.0;
 /// Prior probability of something unknown over that of one group of effects: besides the dozen kinds of the catalogue a real
 /// rig has many more, and real beams miss their models by 0.1 to 1 %, each in its own way.
 pub const UNKNOWN_PRIOR: f64 = 4.0;
-/// Standard deviations of an effect's size from zero from which on it is a name: what is within two is as good as none.
+/// Standard deviations of an effect's size from zero from which on it is a name: a size within two may be zero.
 pub const SIZED: f64 = 2.0;
 /// Chi square below which two hypotheses count as one on these data: three standard deviations.
 pub const SEPARATE: f64 = 9.0;

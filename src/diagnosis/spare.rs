@@ -41,7 +41,7 @@ impl SpareData {
                 kept.push(one);
             }
         }
-        // A recording at several levels is needed for that.
+        // A recording whose other level is not repeated stays.
         repeated.retain(|recording| kept.iter().all(|one| one.recording != *recording));
         repeated.dedup();
         let mut all: Vec<Option<usize>> = observations
@@ -62,6 +62,10 @@ impl SpareData {
         for one in &mut kept.configurations {
             if self.recordings.contains(&one.recording) {
                 one.modes.clear();
+                one.extra_peaks.clear();
+                // It counts for no recording that could show a peak.
+                one.recording = None;
+                one.band = None;
             }
         }
         kept

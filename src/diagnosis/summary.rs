@@ -8,10 +8,10 @@ use crate::description::property_of;
 use crate::evidence::{Fit, log_likelihood};
 use crate::location_map::location_map;
 use crate::next_test::next_tests;
-use crate::parameters::{LocationKind, NuisanceParameter, Target};
+use crate::parameters::{CandidateEffect, LocationKind, NuisanceParameter, Target};
 use crate::result::{
     CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
-    ParameterValue, UnlocatedSensors, Verdict,
+    ParameterValue, SpareFrom, UnlocatedSensors, Verdict,
 };
 use crate::settings::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
 use crate::structure::COUPLING;
@@ -75,31 +75,21 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         amplitude_dependence: amplitude_dependence(dataset, &comparison.baseline),
         fitted_modes: dataset.fitted_modes,
         common_factor: common_factor(dataset),
-        closure_reason: dataset.spare.is_empty().then(|| {
-            format!(
-                "neither two modes nor two recordings can be spared: that needs {} modes, or {} recordings of which two \
-                 repeat the sensors of others",
-                dataset.settings.spare_modes_from, dataset.settings.spare_recordings_from
-            )
+        spare_from: dataset.spare.is_empty().then_some(SpareFrom {
+            modes: dataset.settings.spare_modes_from,
+            recordings: dataset.settings.spare_recordings_from,
         }),
         unlocated,
     }
 }
 
 /// Returns what decided: data or priors. It follows from the likelihood ratio of the two best hypotheses at their
-/// optima, and from the refutation of a better one. `unknown` has its own noise model, so that its likelihood is not
-/// comparable with the others.
+/// optima. `unknown` has no optimum of its own.
 fn decided_by(dataset: &Dataset, candidates: &[Candidate]) -> DecidedBy {
-    let known: Vec<&Candidate> = candidates.iter().filter(|one| !one.is_unknown()).collect();
-    let weights = known.iter().map(|one| one.log_weight());
-    let most = weights.fold(f64::NEG_INFINITY, f64::max);
-    let [first, rival, ..] = known[..] else {
+    let mut known = candidates.iter().filter(|one| !one.is_unknown());
+    let (Some(first), Some(rival)) = (known.next(), known.next()) else {
         return DecidedBy::Data;
     };
-    // A misfit of a better one has brought it to the top.
-    if first.log_weight() < most {
-        return DecidedBy::Data;
-    }
     let [first, rival] =
         [first, rival].map(|one| log_likelihood(&dataset.data, &one.fit.best.optimum));
     if first - rival < DECISIVE_RATIO.ln() {
@@ -230,7 +220,7 @@ impl<'a> Reference<'a> {
                     ..value_of(effect.effect, effect.size.name, size, Some(size_std))
                 });
             }
-            for (name, number) in numbers_of(&self.comparison.dataset, effect.target) {
+            for (name, number) in numbers_of(&self.comparison.dataset, effect) {
                 parameters.push(value_of(effect.effect, name, number as f64, None));
             }
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
@@ -269,10 +259,11 @@ impl<'a> Reference<'a> {
 
 /// Returns the numbers of the sensors and recordings on which an effect acts, by the names of its parameters. They count
 /// from 1; 0 means all.
-fn numbers_of(dataset: &Dataset, target: Target) -> Vec<(&'static str, usize)> {
+fn numbers_of(dataset: &Dataset, candidate: &CandidateEffect) -> Vec<(&'static str, usize)> {
     let inventory = &dataset.inventory;
     let mut arrangements = dataset.arrangements.iter();
-    match target {
+    match candidate.target {
+        Target::All if candidate.effect == EffectId::SensorScale => vec![("sensor", 0)],
         Target::All => Vec::new(),
         Target::Sensor { name } => vec![("sensor", number_of(dataset, name))],
         Target::Pair { names } => vec![
@@ -310,15 +301,10 @@ fn effects_of(dataset: &Dataset, fit: &Fit) -> Vec<Effect> {
     let layout = dataset.layout(&fit.effects);
     let mut effects = layout.effects_at(fit.parameters()).unwrap_or_default();
     for (effect, candidate) in effects.iter_mut().zip(&fit.effects) {
-        for (name, number) in numbers_of(dataset, candidate.target) {
+        for (name, number) in numbers_of(dataset, candidate) {
             if let Ok(numbered) = effect.with(name, number as f64) {
                 *effect = numbered;
             }
-        }
-        if candidate.effect == EffectId::SensorScale && candidate.target == Target::All {
-            *effect = effect
-                .with("sensor", 0.0)
-                .unwrap_or_else(|_| effect.clone());
         }
     }
     effects

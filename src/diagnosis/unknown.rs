@@ -7,13 +7,14 @@
 //! - every mode's frequency is off by an amount of its own, in all configurations alike;
 //! - bending stiffness, mass, or both by the thickness, differ along the beam by sum a_k cos(k pi x/L), smoothly
 //!   (the spread of a_k falls with k) or roughly (it does not);
-//! - springs along the beam hold it to the ground;
+//! - springs along the beam hold it to the ground, or take a support away that the description has;
 //! - all frequencies of one set-up are off by a factor of its own.
 //!
 //! By Rayleigh's quotient a relative change e(x) of E I moves ln f by (1/2) int e E I w''^2 dx/omega^2, of the mass by
 //! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. These four kinds are
-//! equally probable, all ways of a kind, and all spreads of a way. What such changes do to shapes and damping, and a
-//! tenth of what they do to each frequency, is either left open in proportion to the spread, or nothing: both are equally probable.
+//! equally probable, all ways of a kind, and all spreads of a way. The slopes
+//! miss a part of what large changes do. Either they miss nothing, or a tenth of the change of each frequency, and a share of the
+//! shapes and of the damping in proportion to the spread. Both are equally probable.
 
 use crate::dataset::{Dataset, ObservableKind};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
@@ -65,30 +66,30 @@ struct Way {
 pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
     let mut all: Vec<(Kind, f64)> = Vec::new();
-    let mut best: Option<(f64, f64)> = None;
+    let mut modes: Option<LocalOptimum> = None;
     for way in ways(dataset, &models) {
-        let mut logs = Vec::new();
-        for &spread in way.spreads {
-            // A change that the slopes describe well must not pay for one that they do not.
-            let log = log_mean(
-                &[0.0, 1.0].map(|share| log_evidence(dataset, nominal, &way, spread, share)),
-            );
-            if way.kind == Kind::Modes && best.is_none_or(|(most, _)| log > most) {
-                best = Some((log, spread));
+        // A change that the slopes describe well must not pay for one that they do not.
+        let mut logs: Vec<f64> = Vec::new();
+        for share in [0.0, 1.0] {
+            for &spread in way.spreads {
+                logs.push(log_evidence(dataset, nominal, &way, spread, share));
             }
-            logs.push(log);
+        }
+        if way.kind == Kind::Modes {
+            // The true model in the place of the linearised one, at the most probable spread.
+            let (exact, _) = logs.split_at(way.spreads.len());
+            let best = (0..exact.len()).max_by(|&a, &b| exact[a].total_cmp(&exact[b]))?;
+            let fitted = discrepancies(dataset, nominal, way.spreads[best])?;
+            logs[best] = fitted.log_evidence;
+            modes = Some(fitted);
         }
         all.push((way.kind, log_mean(&logs)));
     }
-    let (linear, spread) = best?;
-    let modes = discrepancies(dataset, nominal, spread)?;
-    // The true model in the place of the linearised one, where that makes it more probable.
-    all[0].1 += (modes.log_evidence - linear).max(0.0);
     let kinds = all.chunk_by(|a, b| a.0 == b.0);
     let kinds = kinds.map(|ways| log_mean(&ways.iter().map(|way| way.1).collect::<Vec<f64>>()));
     Some(Fit {
         log_evidence: log_mean(&kinds.collect::<Vec<f64>>()),
-        ..Fit::of_variants(vec![modes])?
+        ..Fit::of_variants(vec![modes?])?
     })
 }
 
@@ -120,10 +121,9 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
             let [by_stiffness, by_mass] = local_slopes(model, index, piece, length);
             stiffness[(row, piece)] = by_stiffness;
             mass[(row, piece)] = by_mass;
-            let x = (piece as f64 + 0.5) / PIECES as f64 * length;
-            let w = model.modes().displacement(index, x);
-            springs[(row, piece)] =
-                0.5 * unit * w * w / model.omega(index).powi(2) * length / PIECES as f64;
+            // The integral of w^2 is that of the mass over the mass per length.
+            let square = -2.0 * by_mass / mass_per_length(dataset, piece);
+            springs[(row, piece)] = 0.5 * unit * square / model.omega(index).powi(2);
         }
     }
     let thickness = 3.0 * &stiffness + &mass;
@@ -162,6 +162,16 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
         });
     }
     all
+}
+
+/// Returns the mass per length (kg/m) of the beam that a piece belongs to.
+fn mass_per_length(dataset: &Dataset, piece: usize) -> f64 {
+    let beams = dataset.nominal.specimen.body.beams();
+    let x = (piece as f64 + 0.5) / PIECES as f64 * dataset.nominal.length();
+    match beams[..] {
+        [left, right] if x > left.length => right.mass_per_length(),
+        _ => beams[0].mass_per_length(),
+    }
 }
 
 /// Returns cos(k pi x/L) at the pieces of the beam (rows) for k from 0 (columns), over k where it falls.
@@ -223,8 +233,9 @@ fn loosened(dataset: &Dataset, of_shapes: f64, of_frequencies: f64) -> Dataset {
         let extra = match observable.kind {
             ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => of_shapes * size,
             ObservableKind::Damping => 25.0 * of_shapes,
-            ObservableKind::Frequency | ObservableKind::Slope => of_frequencies,
-            ObservableKind::BeamMass | ObservableKind::FreeScale => 0.0,
+            ObservableKind::Frequency => of_frequencies,
+            // What does not depend on the amplitude changes nothing along a decay.
+            ObservableKind::Slope | ObservableKind::BeamMass | ObservableKind::FreeScale => 0.0,
         };
         datum.std = datum.std.hypot(extra);
     }

@@ -38,7 +38,7 @@ pub struct GoodnessOfFit {
     pub freedom: Option<DegreesOfFreedom>,
     /// Its closure on hold-out data; `None` where the nominal model has no gap there.
     pub closure: Option<Closure>,
-    /// The size of each effect is told from nothing.
+    /// The size of each effect differs from zero by two standard deviations.
     is_sized: bool,
     /// The gap on hold-out data exceeds what the prediction leaves open, so that the closure can be certain.
     pub is_decisive: bool,
@@ -148,7 +148,7 @@ impl GoodnessOfFit {
     }
 }
 
-/// Returns whether the size of each effect of a fit is told from nothing. An effect that is there or not has no size, and a
+/// Returns whether the size of each effect of a fit differs from zero by two standard deviations. An effect that is there or not has no size, and a
 /// joint that gives may do so in either direction.
 fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
     let layout = dataset.layout(&fit.effects);
@@ -267,9 +267,14 @@ fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }
 
-/// Returns the best explanation that can be shown: `unknown` has no residual.
+/// Returns the best explanation that can be shown, which is tested and may be named: the most probable member of the most
+/// probable group. `unknown` has no residual.
 pub fn best_known(candidates: &[Candidate]) -> Option<usize> {
-    candidates.iter().position(|one| !one.is_unknown())
+    let groups = by_group(candidates).into_iter();
+    let leaders = groups.map(|group| group.members[0]);
+    leaders
+        .filter(|&leader| !candidates[leader].is_unknown())
+        .next()
 }
 
 /// Returns the highest odds against an explanation whose misfit has the probability `p`.
@@ -401,8 +406,8 @@ pub fn verdict(
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
     }
-    // A refuted nominal model makes no effect probable that explains the data less well; if
-    // it stands, the effects that alone would have been detected are refuted themselves.
+    // A refuted nominal model makes no effect probable that explains the data less well. If it stands, many weak effects
+    // of one group share out the probability.
     if evidence_over_none(candidates, first) < DETECTED {
         return if is_refuted {
             Verdict::Unknown
@@ -427,7 +432,7 @@ pub fn verdict(
             freedom.data
         ));
     }
-    // What is not told from nothing is no name.
+    // A size that may be zero is no name.
     if !tested.is_sized {
         return if is_refuted {
             Verdict::Unknown
@@ -458,19 +463,14 @@ fn evidence_over_none(candidates: &[Candidate], candidate: &Candidate) -> f64 {
     })
 }
 
-/// Returns the members of a group that the data do not separate from the one that explains them best. Their priors do not
-/// count: which property of the beam is more often wrong says nothing about this beam.
+/// Returns the members of a group that the data do not separate from its most probable one. Their priors do not count: which
+/// property of the beam is more often wrong says nothing about this beam.
 fn inseparable(candidates: &[Candidate], members: &[usize]) -> Vec<usize> {
-    let objectives = members.iter();
-    let least = objectives
-        .map(|&k| candidates[k].fit.best.optimum.objective)
-        .fold(f64::INFINITY, f64::min);
+    let first = &candidates[members[0]].fit;
     let members = members.iter().copied();
-    let close = members.filter(|&k| {
-        let objective = candidates[k].fit.best.optimum.objective;
-        2.0 * (objective - least) < SEPARATE
-    });
-    close.collect()
+    members
+        .filter(|&k| delta_chi_square(first, &candidates[k].fit) < SEPARATE)
+        .collect()
 }
 
 fn effects_of(candidates: &[Candidate], members: &[usize]) -> Vec<EffectId> {

@@ -1255,7 +1255,7 @@ fn regress_run_diagnoses_with_the_seed_that_diagnose_takes() {
     let closures = |command: &[&str]| {
         let gap = &document(&text, command)["gap"];
         let all = gap["hypotheses"].as_array().unwrap().iter();
-        let low = |one: &Value| one["closure"]["low"].as_f64();
+        let low = |one: &Value| one["withheld_closure"]["low"].as_f64();
         all.filter_map(low).collect::<Vec<f64>>()
     };
     let run = closures(&["run", "test.toml", "--seed", "7", "--json", "-"]);

@@ -624,7 +624,7 @@ const TAP_POSITION: &[ParameterInfo] = &[
 ];
 
 impl EffectId {
-    /// Returns its parameters. The first one measures its size, but for the fixture.
+    /// Returns its parameters. The first one measures its size, but for the fixture, for polarity and for a swap.
     pub fn parameters(self) -> &'static [ParameterInfo] {
         match self {
             Self::SensorMass => SENSOR_MASS,

@@ -134,7 +134,13 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         along_decays: found.amplitude_dependence.clone(),
         map: found.location_map.clone(),
         common_factor: found.common_factor,
-        closure_reason: found.closure_reason.clone(),
+        closure_reason: found.spare_from.map(|spare| {
+            format!(
+                "neither two modes nor two recordings can be spared: that needs {} modes, or {} recordings of which \
+                 two repeat the sensors of others",
+                spare.modes, spare.recordings
+            )
+        }),
         baselines: baselines.collect(),
         next_test: found.next_tests.clone(),
         updated_model: None,

@@ -402,7 +402,7 @@ fn asked(factor: &CommonFactor) -> String {
     }
 }
 
-/// Standard uncertainties from which on a common factor is worth a sentence.
+/// Standard uncertainties from which on a common factor is stated.
 const ASKED: f64 = 2.0;
 
 /// Tells that the frequencies ask for a common factor that the tolerances allow; nothing where they ask for none.

@@ -290,7 +290,7 @@ impl Answer {
                     std: found.std,
                 })
                 .collect(),
-            closure: named.and_then(|found| Some(found.closure?.value)),
+            closure: named.and_then(|found| Some(found.withheld_closure?.value)),
             effects,
         }
     }

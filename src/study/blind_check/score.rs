@@ -217,7 +217,7 @@ fn names_exactly(truth: &Truth, answer: &Answer) -> bool {
 }
 
 /// Returns false where an effect is named, but of another sensor than the planted one. An answer that gives no sensor
-/// cannot be wrong in it. Sensor 0 stands for all: of a single sensor both numbers are right.
+/// cannot be wrong in it. Sensor 0 stands for all.
 fn names_the_sensor(truth: &Truth, answer: &Answer) -> bool {
     truth.catalogue().all(|(id, values)| {
         let found = ["sensor", "other"]
@@ -228,7 +228,7 @@ fn names_the_sensor(truth: &Truth, answer: &Answer) -> bool {
         let Some(&planted) = values.get("sensor") else {
             return true;
         };
-        let is_same = found == planted || found == 0.0 || planted == 0.0;
+        let is_same = found == planted || planted == 0.0;
         match (other, values.get("other")) {
             // A swap has no direction.
             (Some(other), Some(&planted_other)) => {

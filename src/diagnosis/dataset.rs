@@ -13,7 +13,6 @@ use crate::observations::{
 };
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::settings::{DISTINCT_AMPLITUDES, GapSettings};
-use crate::spare::SpareData;
 use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -299,6 +298,9 @@ const SLOPE_FLOOR: f64 = 5e-6;
 /// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
 const AMPLITUDE_STD: f64 = 0.25;
 
+/// Number of the highest modes that are spared for the closure, where there are enough. One alone says little about a root
+/// mean square.
+const SPARED_MODES: usize = 2;
 /// Number of modes that a next test may add.
 pub const MORE_MODES: usize = 2;
 
@@ -314,8 +316,12 @@ impl Dataset {
     pub fn new(observations: &Observations, nominal: &Nominal, settings: &GapSettings) -> Self {
         let highest = highest_mode(observations).min(settings.highest_mode);
         let observations = &up_to(highest, observations);
-        let spare = SpareData::new(observations, highest, settings);
-        let tested = highest - spare.modes;
+        let spared = if highest >= settings.spare_modes_from {
+            SPARED_MODES
+        } else {
+            0
+        };
+        let tested = highest.saturating_sub(spared);
         let held_out = if tested >= settings.withhold_from {
             settings.withheld_modes
         } else {
@@ -343,11 +349,9 @@ impl Dataset {
             section: SectionSlopes::default(),
             shape_slopes: None,
             tilts: BTreeMap::new(),
-            peaks: UnpairedPeaks::new(&spare.without(observations)),
+            peaks: UnpairedPeaks::new(observations),
         };
-        dataset.add_frequencies(observations, &spare);
-        // What else these recordings show takes no part either.
-        let observations = &spare.without(observations);
+        dataset.add_frequencies(observations, tested);
         dataset.add_shapes(observations);
         dataset.add_damping(observations);
         dataset.add_slopes(observations);
@@ -361,7 +365,7 @@ impl Dataset {
         self.data.push(datum);
     }
 
-    fn add_frequencies(&mut self, observations: &Observations, spare: &SpareData) {
+    fn add_frequencies(&mut self, observations: &Observations, tested: usize) {
         let mut observed: Vec<(usize, &ObservedMode)> = Vec::new();
         let mut data = Vec::new();
         for (configuration, one) in observations.configurations.iter().enumerate() {
@@ -392,7 +396,7 @@ impl Dataset {
             let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
             let observable = Observable::frequency(configuration, mode);
-            if mode > spare.highest || spare.recordings.contains(&one.recording) {
+            if mode > tested {
                 self.spare.push((observable, datum));
             } else if mode > self.fitted_modes {
                 self.holdout.push((observable, datum));

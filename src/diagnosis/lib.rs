@@ -4,7 +4,6 @@
 //! ```text
 //! Observations, Nominal -> observations   common modes, unpaired peaks, checks
 //!                          dataset        data with their uncertainties, nuisance parameters
-//!                          spare          data for the closure alone
 //!                          structure      the described structure, how well it is known, and its modal models
 //!                          description    what an error of the description does to the frequencies
 //!                          set_up         sensors and hammer as a hypothesis has them
@@ -53,7 +52,6 @@ mod set_up;
 #[cfg(test)]
 mod set_up_tests;
 mod settings;
-mod spare;
 mod structure;
 mod summary;
 mod synthetic;

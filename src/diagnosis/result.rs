@@ -40,8 +40,8 @@ pub struct Diagnosis {
     pub unlocated: Option<UnlocatedSensors>,
     /// Common factor that the frequencies ask for; `None` where they do not fix it.
     pub common_factor: Option<CommonFactor>,
-    /// What the test would need for data that are spared for the closure; `None` where it has them.
-    pub spare_from: Option<SpareFrom>,
+    /// Number of modes from which on two are spared for the closure; `None` where they were.
+    pub spare_modes_from: Option<usize>,
     /// Tests that would decide between the hypotheses, those with most information per cost first.
     pub next_tests: Vec<NextTest>,
 }
@@ -199,7 +199,7 @@ pub struct HypothesisResult {
     /// gap is below two noise floors.
     pub withheld_closure: Option<Closure>,
     /// Root mean square error under the nominal model of the frequencies that are spared for the closure (%); `None` where
-    /// neither two modes nor two recordings can be spared.
+    /// two modes cannot be spared.
     pub spare_before: Option<f64>,
     /// That error under this hypothesis (%).
     pub spare_after: Option<f64>,
@@ -271,15 +271,6 @@ pub struct ParameterValue {
     /// none would, and for parameters other than sizes.
     #[serde(rename = "smallest_isolable")]
     pub smallest_separable: Option<f64>,
-}
-
-/// Number of modes, or of recordings of which two repeat the sensors of others, from which on data are spared for the closure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SpareFrom {
-    /// Modes.
-    pub modes: usize,
-    /// Recordings.
-    pub recordings: usize,
 }
 
 /// Factor on all frequencies that would suit the data best, if the description were exact.

@@ -123,10 +123,8 @@ pub struct GapSettings {
     /// Number of the highest modes that are held out: 1.
     pub withheld_modes: usize,
     /// Number of modes from which on the two highest are spared for the closure alone: 8, so that five are left to fit and one
-    /// to test.
+    /// to test. No recording is spared: one that differs from the others must be seen, and one that repeats them says little.
     pub spare_modes_from: usize,
-    /// Number of recordings from which on two are spared for the closure alone, if others were taken alike: 6, so that four are left.
-    pub spare_recordings_from: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
     /// Seed of random draws.
@@ -184,7 +182,6 @@ impl Default for GapSettings {
             withhold_from: 6,
             withheld_modes: 1,
             spare_modes_from: 8,
-            spare_recordings_from: 6,
             unknown_positions: 12,
             seed: 0,
         }

@@ -11,7 +11,7 @@ use crate::next_test::next_tests;
 use crate::parameters::{CandidateEffect, LocationKind, NuisanceParameter, Target};
 use crate::result::{
     CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
-    ParameterValue, SpareFrom, UnlocatedSensors, Verdict,
+    ParameterValue, UnlocatedSensors, Verdict,
 };
 use crate::settings::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
 use crate::structure::COUPLING;
@@ -75,10 +75,10 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         amplitude_dependence: amplitude_dependence(dataset, &comparison.baseline),
         fitted_modes: dataset.fitted_modes,
         common_factor: common_factor(dataset),
-        spare_from: dataset.spare.is_empty().then_some(SpareFrom {
-            modes: dataset.settings.spare_modes_from,
-            recordings: dataset.settings.spare_recordings_from,
-        }),
+        spare_modes_from: dataset
+            .spare
+            .is_empty()
+            .then_some(dataset.settings.spare_modes_from),
         unlocated,
     }
 }

@@ -127,15 +127,13 @@ fn recover_a_joint_with_the_bar_measured_free() {
         assert!(row["error_percent"].as_f64().unwrap().abs() < 0.05, "{row}");
     }
     // A test that was made is not proposed.
-    for (name, is_proposed) in [("plain", true), ("with", false)] {
-        let report = document(
-            here,
-            &format!("diagnose joint/{name}.toml --quiet --json -"),
-        );
-        let next = report["gap"]["next_test"].as_array().unwrap();
-        let found = next.iter().any(|next| next["id"] == "bare-beam");
-        assert_eq!(found, is_proposed, "{name}: {next:?}");
-    }
+    let report = document(here, "diagnose joint/with.toml --quiet --json -");
+    let next = report["gap"]["next_test"].as_array().unwrap();
+    assert!(!next.is_empty());
+    assert!(
+        next.iter().all(|next| next["id"] != "bare-beam"),
+        "{next:?}"
+    );
     // Both sensors load the model: 5 g at the free bar's end lower its first mode by 1.3 %.
     let budget = with["estimate"]["kr"]["budget"].as_array().unwrap();
     let has = |name: &str| budget.iter().any(|row| row["input"] == name);

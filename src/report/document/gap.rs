@@ -134,13 +134,9 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         along_decays: found.amplitude_dependence.clone(),
         map: found.location_map.clone(),
         common_factor: found.common_factor,
-        closure_reason: found.spare_from.map(|spare| {
-            format!(
-                "neither two modes nor two recordings can be spared: that needs {} modes, or {} recordings of which \
-                 two repeat the sensors of others",
-                spare.modes, spare.recordings
-            )
-        }),
+        closure_reason: found
+            .spare_modes_from
+            .map(|modes| format!("two modes cannot be spared: that needs {modes} modes or more")),
         baselines: baselines.collect(),
         next_test: found.next_tests.clone(),
         updated_model: None,

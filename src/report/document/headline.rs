@@ -68,10 +68,11 @@ impl HeadlineSection {
         for hypothesis in &listed {
             names.push(match hypothesis {
                 Hypothesis::None => "nothing".to_owned(),
+                Hypothesis::Unknown => "something unknown".to_owned(),
                 _ => hypothesis.name(),
             });
             let own = match hypothesis {
-                Hypothesis::None => described.cloned(),
+                Hypothesis::None | Hypothesis::Unknown => described.cloned(),
                 _ => gap.result(hypothesis).and_then(Self::of_hypothesis),
             };
             // Without one of the joints no limits hold all.

@@ -271,10 +271,8 @@ fn sort(candidates: &mut [Candidate]) {
 /// probable group. `unknown` has no residual.
 pub fn best_known(candidates: &[Candidate]) -> Option<usize> {
     let groups = by_group(candidates).into_iter();
-    let leaders = groups.map(|group| group.members[0]);
-    leaders
-        .filter(|&leader| !candidates[leader].is_unknown())
-        .next()
+    let mut leaders = groups.map(|group| group.members[0]);
+    leaders.find(|&leader| !candidates[leader].is_unknown())
 }
 
 /// Returns the highest odds against an explanation whose misfit has the probability `p`.

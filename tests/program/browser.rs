@@ -456,7 +456,7 @@ fn titles_say_values(titles: &Value, case: &str) {
             " % \u{b7} that is ",
             " standard deviations",
         ],
-        &["found, sensor-mass \u{b7} probability 99.", " %"],
+        &["found, sensor-mass \u{b7} probability 98.", " %"],
         &[
             "bending stiffness \u{b7} position from the joint ",
             " mm \u{b7} local change ",

@@ -140,11 +140,11 @@ mod tests {
 
     #[test]
     fn limit_a_few_of_many_likenesses_are_named() {
-        let all = &EffectId::ALL[7..14];
+        let all = &EffectId::ALL[8..15];
         assert_eq!(looks_like(&all[..0]), "");
-        let five = "fixture, modulus, length, timebase, added-mass";
+        let five = "fixture, modulus, length, density, thickness";
         assert_eq!(looks_like(&all[..5]), five);
-        let seven = "fixture, modulus, length, timebase and 3 more";
+        let seven = "fixture, modulus, length, density and 3 more";
         assert_eq!(looks_like(all), seven);
     }
 }

@@ -5,9 +5,10 @@ use crate::dataset::{Dataset, Datum, chi_square_tail};
 use crate::evidence::Fit;
 use crate::forward::{Forward, slope_along_decay};
 use crate::joint_motion::JointMotion;
+use crate::modal_model::{ModalModel, joint_amplitude};
 use crate::result::{AmplitudeDependence, FrequencyChange, LARGEST_STIFFNESS_CHANGE};
 use crate::settings::{CHANGE_BY_CHANCE, LAW_DETECTED};
-use crate::structure::{ModalModel, ROTATION, joint_amplitude};
+use crate::structure::ROTATION;
 use tapjoint_beam::effects::{JointLaw, JointLawKind};
 use tapjoint_identify::observation::Observations;
 

@@ -1,12 +1,13 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
 use crate::amplitude::set_joint_motions;
+use crate::candidates::candidate_effects;
 use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
 use crate::forward::Forward;
-use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
+use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::{Hypothesis, UnlocatedSensors};
 use crate::settings::{GapError, GapSettings};
 use crate::structure::Nominal;

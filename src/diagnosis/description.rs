@@ -12,7 +12,8 @@
 //! since f L^2 (rho A/E I)^1/2 depends on K_t L^3/E I, K_r L/E I, m/(rho A L), x/L and (h/L)^2 alone. Thickness and width follow
 //! from E I and rho A. Rotary inertias and other springs enter in the same way.
 
-use crate::structure::{ModalModel, ROTATION};
+use crate::modal_model::ModalModel;
+use crate::structure::ROTATION;
 use std::f64::consts::TAU;
 use tapjoint_beam::specimen::{Body, Mesh, PointInertia, PointMass, Specimen};
 use tapjoint_beam::{Beam, WidthStiffening};

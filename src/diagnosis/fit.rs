@@ -9,10 +9,11 @@ use crate::evidence::{
 };
 use crate::fixture::with_peaks;
 use crate::forward::Forward;
+use crate::modal_model::ModalModel;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
 use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
 use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
-use crate::structure::{COUPLING, ModalModel};
+use crate::structure::COUPLING;
 use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_numerics::stats::root_mean_square;
 
@@ -97,24 +98,13 @@ impl<'a> Search<'a> {
         Forward::new(self.dataset, &[&self.without.effects[..], added].concat())
     }
 
-    /// Fits an effect beside those of the fit without it: on each of the things that it may act on, which are equally
+    /// Fits an effect beside those of the fit without it. Only errors of the set-up have several variants, which are equally
     /// probable.
     pub fn add_any(&self, variants: &[CandidateEffect]) -> Option<Fit> {
-        if variants[0].effect.group() == Group::SetUp {
-            return self.add_set_up_error(variants);
+        match variants {
+            [one] if one.effect.group() != Group::SetUp => self.add(*one),
+            _ => self.add_set_up_error(variants),
         }
-        let fits: Vec<Fit> = variants.iter().filter_map(|one| self.add(*one)).collect();
-        let mut logs: Vec<f64> = fits.iter().map(|fit| fit.log_evidence).collect();
-        // A fit that failed has no evidence.
-        logs.resize(variants.len(), f64::NEG_INFINITY);
-        let log_evidence = log_mean(&logs);
-        let best = fits
-            .into_iter()
-            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        Some(Fit {
-            log_evidence,
-            ..best
-        })
     }
 
     /// Fits an error of the set-up where that promises most; the others count with all but their size held.

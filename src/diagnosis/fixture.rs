@@ -23,10 +23,10 @@
 use crate::dataset::{Dataset, chi_square_tail};
 use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
 use crate::forward::Forward;
+use crate::modal_model::fixture_strength;
 use crate::observations::{DECIBEL, FIXTURE_FREQUENCY_STD, UnpairedPeak};
 use crate::parameters::{LocationKind, Prior};
 use crate::settings::{FIXTURE_LEVEL, SPLIT_POLE};
-use crate::structure::fixture_strength;
 use std::f64::consts::TAU;
 use tapjoint_numerics::stats::median;
 

@@ -4,10 +4,13 @@
 //! ```text
 //! Observations, Nominal -> observations   common modes, unpaired peaks, checks
 //!                          dataset        data with their uncertainties, nuisance parameters
-//!                          structure      the described structure, how well it is known, and its modal models
+//!                          structure      the described structure, and how well it is known
 //!                          description    what an error of the description does to the frequencies
 //!                          set_up         sensors and hammer as a hypothesis has them
-//!                          parameters     effects, priors, order of the parameters
+//!                          parameters     priors, nuisance parameters, order of the parameters
+//!                          modal_model    modes of a structure under a hypothesis
+//!                          candidates     effects that are hypotheses
+//!                          mode_in_place  modes where sensors and masses sit
 //!                          forward        predictions of a hypothesis and their slopes
 //!                          evidence       evidence of a hypothesis (with optimum)
 //!                          common_factor  what all frequencies have in common
@@ -32,6 +35,7 @@
 //! it.
 
 mod amplitude;
+mod candidates;
 mod common_factor;
 mod compare;
 mod dataset;
@@ -43,6 +47,8 @@ mod fixture;
 mod forward;
 mod joint_motion;
 mod location_map;
+mod modal_model;
+mod mode_in_place;
 mod next_test;
 mod observations;
 mod optimum;

@@ -8,11 +8,11 @@
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
 use crate::forward::Forward;
+use crate::modal_model::ModalModel;
 use crate::optimum::{LinearModel, Optimum, maximise};
 use crate::parameters::Prior;
 use crate::result::LocationMap;
 use crate::settings::LEAST_MAP_DATA;
-use crate::structure::ModalModel;
 use nalgebra::DMatrix;
 use tapjoint_beam::specimen::Body;
 

@@ -5,15 +5,12 @@
 //! the sizes are smaller. Four fifths lie between 0.16 and 6.3 times the scale, which is 1.6 decades. It reaches zero, so that
 //! a little of an effect is never excluded by definition, and its tail leaves room for gross errors. The scales come
 //! from what such things weigh and yield, not from any study of the diagnosis; each stands with its reason in
-//! [`candidate_effect`].
+//! [`candidates`](crate::candidates).
 //!
 //! Sizes that belong to the structure are fractions of its own: masses of the beam's mass, compliances of L/(E I),
 //! axial forces of E I/L^2. Those of sensors, cables, rules and clocks are absolute.
 
-use crate::dataset::Dataset;
-use crate::fixture::unseen_frequencies;
-use crate::result::LARGEST_STIFFNESS_CHANGE;
-use crate::structure::{COUPLING, Nominal, ROTATION};
+use crate::structure::Nominal;
 use tapjoint_beam::effects::{Effect, EffectId, Group};
 use tapjoint_identify::consistent::Parameter;
 
@@ -171,19 +168,6 @@ pub struct CandidateEffect {
     pub variants: usize,
 }
 
-impl CandidateEffect {
-    /// Returns an error of the set-up.
-    fn of_set_up(effect: EffectId, target: Target, size: Size) -> Self {
-        CandidateEffect {
-            effect,
-            target,
-            size,
-            location: None,
-            variants: 1,
-        }
-    }
-}
-
 /// Prior of an effect's size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Size {
@@ -308,7 +292,7 @@ impl Size {
         self.neutral + 0.05 * self.scale
     }
 
-    fn positive(name: &'static str, scale: f64, high: f64) -> Self {
+    pub fn positive(name: &'static str, scale: f64, high: f64) -> Self {
         Size {
             low: 0.0,
             ..Size::signed(name, scale, high)
@@ -316,7 +300,7 @@ impl Size {
     }
 
     /// Returns the size of an effect that is there or not.
-    fn fixed(name: &'static str) -> Self {
+    pub fn fixed(name: &'static str) -> Self {
         Size {
             low: 1.0,
             ..Size::signed(name, 1.0, 1.0)
@@ -325,7 +309,7 @@ impl Size {
 
     /// Returns the distance (m) of a place from where it is stated, both on a beam of this length (m): half of all that are
     /// misread are within 5 mm.
-    fn offset(stated: f64, length: f64) -> Self {
+    pub fn offset(stated: f64, length: f64) -> Self {
         Size {
             low: -stated,
             high: (length - stated).max(0.0),
@@ -333,7 +317,7 @@ impl Size {
         }
     }
 
-    fn signed(name: &'static str, scale: f64, reach: f64) -> Self {
+    pub fn signed(name: &'static str, scale: f64, reach: f64) -> Self {
         Size {
             name,
             scale,
@@ -342,208 +326,6 @@ impl Size {
             high: reach,
         }
     }
-}
-
-/// Returns an effect of the structure or of the clock with its priors; `None` for an effect that is no hypothesis of this
-/// kind: joint drift changes the spread of a nuisance parameter and not a prediction, and an error of the set-up has a
-/// target. `end` is the highest frequency (Hz) that was looked at.
-pub fn candidate_effect(effect: EffectId, nominal: &Nominal, end: f64) -> Option<CandidateEffect> {
-    let (length, mass) = (nominal.length(), nominal.beam_mass());
-    let spring = nominal.bending_stiffness() / length.powi(3);
-    let force = nominal.bending_stiffness() / length.powi(2);
-    let size = match effect {
-        // Accelerometers weigh 0.5 g (miniature) to 50 g (seismic).
-        EffectId::SensorMass => Size::positive("mass", 0.005, 0.3 * mass),
-        // A coaxial cable, E I of 1e-3 to 1e-2 N m2 over 0.1 to 0.3 m, to a rubber band.
-        EffectId::SensorCable => Size::positive("stiffness", 30.0, 3.0 * spring),
-        // 0 for symmetric bolts; sqrt(3)/2 for a bed of springs that begins at the beam's root.
-        EffectId::CrossCoupling => Size::signed("coupling", 0.1, 0.95),
-        // Bolt, nut and washers beside a beam that they hold.
-        EffectId::JointMass => Size::positive("mass", 0.03 * mass, 0.6 * mass),
-        // Bolted joints soften by 0.2 to 20 % from a tap to a hard tap.
-        EffectId::JointNonlinearity => Size::signed("ratio", 0.03, LARGEST_STIFFNESS_CHANGE),
-        // Loss factors of bolted joints: 0.002 to 0.1.
-        EffectId::JointDamping => Size::positive("loss_factor", 0.01, 0.5),
-        // A vice is a hundred times stiffer than the joint on it, a table ten times.
-        EffectId::Fixture => Size::positive("ratio", 0.02, 0.5),
-        // Tables of one kind of alloy differ by so much; the direction of rolling adds as much.
-        EffectId::Modulus | EffectId::Density => Size::signed("relative", 0.02, 0.3),
-        // Rolled strip: ISO 9445 and EN 10029 allow 1 to 8 %.
-        EffectId::Thickness => Size::signed("relative", 0.01, 0.2),
-        // Where a clamp begins to hold is known to some millimetres.
-        EffectId::Length => Size::signed("relative", 0.005, 0.1),
-        // Crystals are good to 5e-5; a rate typed from memory is not.
-        EffectId::Timebase => Size::signed("relative", 0.0005, 0.2),
-        // Glue, tape, a nut or a magnet.
-        EffectId::AddedMass => Size::positive("mass", 0.01 * mass, 0.3 * mass),
-        // A crack a third of the thickness deep, h/L = 0.012 (Tada, Paris & Irwin: c E I/L = 6 pi h/L F).
-        EffectId::LocalCrack => Size::positive("compliance", 0.01, 0.5),
-        EffectId::AxialLoad => Size {
-            // A beam on springs buckles at P L^2/(E I) = -pi^2/4 or above.
-            low: -1.5 * force,
-            // A beam's own weight makes 0.01, a clamp that was tightened askew 0.1.
-            ..Size::signed("force", 0.05 * force, 5.0 * force)
-        },
-        // What Timoshenko's beam says is 1; layers and holes make it more.
-        EffectId::ShearRotary => Size::positive("factor", 1.0, 10.0),
-        EffectId::Resolution => Size::signed("offset", 0.125, 2.0),
-        // Clamps described as rigid: E I/L over their stiffness is 0.005 to 0.1, and E I/L^3 a thirtieth of it.
-        EffectId::JointCompliance => match nominal.rigid_directions() {
-            [_, true] => Size::positive("rotation", 0.02, 5.0),
-            [true, false] => Size::positive("translation", 0.0007, 0.5),
-            [false, false] => return None,
-        },
-        EffectId::JointDrift
-        | EffectId::SensorPosition
-        | EffectId::SensorPolarity
-        | EffectId::SensorSwap
-        | EffectId::SensorScale
-        | EffectId::TapPosition => return None,
-    };
-    let range = match effect {
-        EffectId::JointMass => Some((LocationKind::Gyration, 0.003, 0.03, 2)),
-        EffectId::JointNonlinearity => Some((LocationKind::Exponent, 0.5, 2.0, 3)),
-        EffectId::Fixture => {
-            let [from, to] = unseen_frequencies(end);
-            Some((LocationKind::FixtureFrequency, from, to, 6))
-        }
-        EffectId::AddedMass => Some((LocationKind::Position, 0.01 * length, length, 12)),
-        EffectId::LocalCrack => Some((LocationKind::Position, 0.01 * length, length, 18)),
-        EffectId::JointCompliance if nominal.rigid_directions() == [true; 2] => {
-            Some((LocationKind::Translation, 1e-6, 0.1, 4))
-        }
-        _ => None,
-    };
-    Some(CandidateEffect {
-        effect,
-        target: Target::All,
-        size,
-        location: range.map(|(kind, low, high, nodes)| LocationRange {
-            kind,
-            low,
-            high,
-            nodes,
-        }),
-        variants: 1,
-    })
-}
-
-/// Returns the effects that can be hypotheses for a test: those whose object it has. An effect that may act on several
-/// things has a variant for each.
-pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
-    let (nominal, arrangements) = (&dataset.nominal, &dataset.arrangements);
-    let has_joint = nominal.has_joint();
-    let has_clamp = has_joint && nominal.is_one_beam();
-    let gives = !nominal.fitted_springs().is_empty();
-    let possible = EffectId::ALL.into_iter().filter(|effect| {
-        let mut sensors = arrangements.iter().flat_map(|one| &one.carried);
-        match effect {
-            EffectId::SensorMass => sensors.any(|sensor| sensor.mass == 0.0),
-            EffectId::SensorCable => sensors.next().is_some(),
-            EffectId::CrossCoupling => {
-                has_clamp && !nominal.fits(COUPLING) && nominal.fitted_springs().len() == 2
-            }
-            // No force pulls on a free end, nor on beams that overlap.
-            EffectId::AxialLoad => has_clamp,
-            EffectId::Fixture => has_clamp && nominal.fits(ROTATION),
-            // What is held rigidly neither moves nor dissipates.
-            EffectId::JointMass | EffectId::JointDamping => has_joint && gives,
-            EffectId::JointNonlinearity => nominal.fits(ROTATION),
-            EffectId::JointCompliance => has_joint,
-            EffectId::Resolution => nominal.reading_bias.is_some(),
-            _ => true,
-        }
-    });
-    let mut all: Vec<Vec<CandidateEffect>> = Vec::new();
-    for effect in possible {
-        if effect.group() == Group::SetUp {
-            all.push(set_up_errors(effect, dataset));
-        } else if let Some(mut candidate) = candidate_effect(effect, nominal, dataset.peaks.end) {
-            if let (EffectId::Resolution, Some(bias)) = (effect, nominal.reading_bias) {
-                candidate.size.scale = bias;
-            }
-            all.push(vec![candidate]);
-        }
-    }
-    all.retain(|variants| !variants.is_empty());
-    all
-}
-
-/// Returns an error of the set-up for everything that it may act on. Only shapes and modal constants show it.
-fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
-    let (inventory, length) = (&dataset.inventory, dataset.nominal.length());
-    let [has_constants, has_ratios] = dataset.kinds_of_shapes();
-    let names = 0..inventory.names.len();
-    let several = names.len() > 1;
-    let mut all = Vec::new();
-    match effect {
-        // A rule is misread by a centimetre, or the wrong end of the sensor is meant.
-        EffectId::SensorPosition if has_constants || has_ratios => {
-            for (position, (_, stated)) in inventory.positions.iter().enumerate() {
-                all.push(CandidateEffect::of_set_up(
-                    effect,
-                    Target::Place { position },
-                    Size::offset(*stated, length),
-                ));
-            }
-        }
-        EffectId::TapPosition if has_constants => {
-            for (tap, stated) in inventory.taps.iter().enumerate() {
-                all.push(CandidateEffect::of_set_up(
-                    effect,
-                    Target::Taps { tap },
-                    Size::offset(*stated, length),
-                ));
-            }
-        }
-        EffectId::SensorPolarity if has_constants || has_ratios => {
-            for name in names {
-                all.push(CandidateEffect::of_set_up(
-                    effect,
-                    Target::Sensor { name },
-                    Size::fixed("flipped"),
-                ));
-            }
-        }
-        EffectId::SensorSwap if several && (has_constants || has_ratios) => {
-            for first in names.clone() {
-                for second in first + 1..names.end {
-                    let names = [first, second];
-                    all.push(CandidateEffect::of_set_up(
-                        effect,
-                        Target::Pair { names },
-                        Size::fixed("swapped"),
-                    ));
-                }
-            }
-        }
-        // A wrong sheet, 10 % from sensor to sensor; a wrong unit is a factor of 9.81 or 10.
-        EffectId::SensorScale if has_constants || has_ratios => {
-            let size = Size {
-                low: -0.95,
-                ..Size::signed("relative", 0.1, 20.0)
-            };
-            // That of the hammer is one of all sensors.
-            if has_constants && several {
-                all.push(CandidateEffect::of_set_up(effect, Target::All, size));
-            }
-            if has_constants || several {
-                for name in names {
-                    all.push(CandidateEffect::of_set_up(
-                        effect,
-                        Target::Sensor { name },
-                        size,
-                    ));
-                }
-            }
-        }
-        _ => {}
-    }
-    let variants = all.len();
-    for one in &mut all {
-        one.variants = variants;
-    }
-    all
 }
 
 /// Order of the parameters of a hypothesis: joint, effects (size and location of each), nuisance parameters.
@@ -594,6 +376,13 @@ impl Layout {
         self.location(effect)
     }
 
+    /// Returns the sum of the sizes of all effects of a kind; 0 without any.
+    pub fn size_of(&self, wanted: EffectId, parameters: &[f64]) -> f64 {
+        let effects = self.effects.iter().enumerate();
+        let own = effects.filter(|(_, one)| one.effect == wanted);
+        own.map(|(k, _)| parameters[self.size(k)]).sum()
+    }
+
     /// Returns whether one of its effects is an error of the set-up.
     pub fn has_set_up_error(&self) -> bool {
         let mut effects = self.effects.iter();
@@ -623,44 +412,5 @@ impl Layout {
                 Effect::from_pairs(candidate.effect, &pairs).ok()
             })
             .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Over all sizes the density integrates to 1, and half of it lies below the scale where there is no bound.
-    #[test]
-    fn val_the_prior_of_a_size_is_normalised_and_has_its_scale_in_the_middle() {
-        for size in [
-            Size::positive("mass", 0.01, 0.25),
-            Size::signed("relative", 0.02, 0.3),
-            Size::offset(0.338, 0.423),
-        ] {
-            const STEPS: usize = 400_000;
-            let step = (size.high - size.low) / STEPS as f64;
-            let (mut all, mut below) = (0.0, 0.0);
-            for k in 0..STEPS {
-                let at = size.low + step * (k as f64 + 0.5);
-                let share = step * size.log_density(at).exp();
-                all += share;
-                if at.abs() < size.scale {
-                    below += share;
-                }
-            }
-            // The midpoint rule over a peak as wide as a thousandth of the range.
-            assert!((all - 1.0).abs() < 1e-6, "{}: {all}", size.name);
-            // Bounds at 5 to 25 scales and more cut off up to a twelfth of the tail.
-            assert!((0.5..0.56).contains(&below), "{}: {below}", size.name);
-        }
-    }
-
-    #[test]
-    fn limit_an_effect_that_is_there_or_not_has_no_density() {
-        let size = Size::fixed("flipped");
-        assert!(size.is_fixed());
-        assert_eq!(size.log_density(1.0), 0.0);
-        assert_eq!(size.small(), 1.0);
     }
 }

@@ -3,10 +3,9 @@
 //! Errors of the set-up that a hypothesis adds, and the tolerances of the description, enter the solved structure: a mass of a
 //! few percent that sits some millimetres off moves high modes by more than the slope at the stated place says.
 
-use crate::dataset::Dataset;
-use crate::parameters::{Layout, NuisanceParameter, Target};
+use crate::parameters::{Layout, Nuisance, NuisanceParameter, Target};
 use crate::structure::Arrangement;
-use tapjoint_beam::effects::EffectId;
+use tapjoint_beam::effects::{EffectId, SensorSignal};
 use tapjoint_beam::specimen::{PointMass, Specimen};
 
 /// Sensors, masses and hammer of one configuration.
@@ -15,28 +14,19 @@ pub struct SetUp {
     /// Masses and positions of the sensors.
     pub sensors: Vec<PointMass>,
     /// What each channel shows, in the order of the sensors.
-    pub channels: Vec<Channel>,
+    pub channels: Vec<SensorSignal>,
     /// Known added masses, in the order of the arrangement.
     pub fastened: Vec<PointMass>,
     /// Position of the taps (m).
     pub tap: Option<f64>,
 }
 
-/// What a channel shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Channel {
-    /// Index of the sensor whose signal it is.
-    pub sensor: usize,
-    /// Signal over what the description makes of it (1).
-    pub factor: f64,
-}
-
 impl SetUp {
     /// Returns the set-up of a configuration with the errors that the parameters give it.
     pub fn new(
-        dataset: &Dataset,
         arrangement: &Arrangement,
         layout: &Layout,
+        nuisances: &[Nuisance],
         parameters: &[f64],
     ) -> Self {
         let sensors = 0..arrangement.sensors.len();
@@ -44,7 +34,7 @@ impl SetUp {
         let mut set_up = SetUp {
             sensors: arrangement.sensors.clone(),
             channels: sensors
-                .map(|sensor| Channel {
+                .map(|sensor| SensorSignal {
                     sensor,
                     factor: 1.0,
                 })
@@ -53,14 +43,14 @@ impl SetUp {
             tap: arrangement.tap,
         };
         let values = &parameters[layout.first_nuisance()..];
-        for (nuisance, value) in dataset.nuisances.iter().zip(values) {
+        for (nuisance, value) in nuisances.iter().zip(values) {
             set_up.tolerate(nuisance.parameter, *value, arrangement);
         }
         for (k, one) in layout.effects.iter().enumerate() {
             let size = parameters[layout.size(k)];
             set_up.add(one.effect, one.target, size, arrangement);
         }
-        let length = dataset.nominal.length();
+        let length = arrangement.specimen.body.length();
         let masses = set_up.sensors.iter_mut().chain(&mut set_up.fastened);
         let places = masses.map(|one| &mut one.position).chain(&mut set_up.tap);
         for place in places {
@@ -139,10 +129,10 @@ impl SetUp {
         }
     }
 
-    /// Multiplies the channels of the sensor with this name, or all.
+    /// Multiplies the signal of the sensor with this name, or all.
     fn multiply(&mut self, name: Option<usize>, factor: f64, arrangement: &Arrangement) {
-        for (channel, own) in self.channels.iter_mut().zip(&arrangement.names) {
-            if name.is_none_or(|name| *own == name) {
+        for channel in &mut self.channels {
+            if name.is_none_or(|name| arrangement.names[channel.sensor] == name) {
                 channel.factor *= factor;
             }
         }

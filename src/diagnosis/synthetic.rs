@@ -6,9 +6,10 @@
 //! Where the set-up is not as described, the configurations state the described places, and the readings are those of the
 //! true ones. Interchanged sensors count as equally sensitive, since a plan states no scales.
 
+use crate::modal_model::{fixture_strength, joint_amplitude};
 use crate::observations::DECIBEL;
 use crate::settings::{FIXTURE_LEVEL, GapError};
-use crate::structure::{Nominal, fixture_strength, joint_amplitude};
+use crate::structure::Nominal;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -1,6 +1,7 @@
 //! Test data of the unit tests, and tests of predictions at fitted models.
 
 use crate::amplitude::{sensitivity, set_joint_motions};
+use crate::candidates::candidate_effect;
 use crate::compare::set_section_slopes;
 use crate::dataset::{Dataset, Datum, MORE_MODES, Observable, ObservableKind};
 use crate::description::{PROPERTIES, SectionSlopes, property_of};
@@ -8,11 +9,12 @@ use crate::diagnose;
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
 use crate::forward::Forward;
+use crate::modal_model::ModalModel;
 use crate::optimum::Model;
-use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effect};
+use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::set_up::SetUp;
 use crate::settings::GapSettings;
-use crate::structure::{DescriptionUncertainty, ModalModel, Nominal, NominalSensor};
+use crate::structure::{DescriptionUncertainty, Nominal, NominalSensor};
 use crate::synthetic::{PlannedConfiguration, TestPlan, observe};
 use std::sync::Arc;
 use tapjoint_beam::Beam;

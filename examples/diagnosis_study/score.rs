@@ -6,7 +6,7 @@ use tapjoint::effects::{Effect, EffectId, Group};
 use tapjoint::gap::{SET_PROBABILITY, Verdict};
 use tapjoint::study::blind_check::Rate;
 
-/// Least errors of the set-up that are worth a name: 5 mm of a position, 10 % of a scale.
+/// Least errors of the set-up that should be named: 5 mm of a position, 10 % of a scale.
 const LEAST_OFFSET: f64 = 5e-3;
 const LEAST_SCALE: f64 = 0.1;
 /// Standard uncertainties within which a stated size should hold the truth.
@@ -395,7 +395,7 @@ fn named_size_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
     is_named.then(|| size_holds(effect, answer))?
 }
 
-/// Returns the planted error of the set-up where it is worth a name.
+/// Returns the planted error of the set-up if it should be named.
 fn worthy_set_up(trial: &Trial) -> Option<&Effect> {
     let [effect] = trial.truth.effects.as_slice() else {
         return None;

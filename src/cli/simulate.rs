@@ -50,9 +50,9 @@ fn list_of_effects() -> String {
         let _ = writeln!(text, "  {}: {}", id.name(), id.meaning());
         let _ = writeln!(text, "      {}", parameters.join(", "));
     }
-    text + "\nSensors and recordings are numbered from 1, as in TEST. sensor=0 means all sensors. recording=0 means all \
-            recordings; another number means those with the same described place as this one. An error of the set-up \
-            leaves the places in test.toml as they are described in TEST.\n\n"
+    text + "\nSensors and recordings are numbered from 1, as in TEST. For sensor-scale, sensor=0 means all sensors. recording=0 \
+            means all recordings. Any other number means all recordings with the same described place. An error of \
+            the set-up does not change the places in the new test.toml.\n\n"
         + EXAMPLES
 }
 

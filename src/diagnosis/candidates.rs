@@ -44,7 +44,7 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal, end: f64) -> Option
         EffectId::JointDamping => Size::positive("loss_factor", 0.01, 0.5),
         // A vice is a hundred times stiffer than the joint on it, a table ten times.
         EffectId::Fixture => Size::positive("ratio", 0.02, 0.5),
-        // Tables of one kind of alloy differ by so much; the direction of rolling adds as much.
+        // Table values of one alloy differ by 2 %. The direction of rolling adds as much.
         EffectId::Modulus | EffectId::Density => Size::signed("relative", 0.02, 0.3),
         // Rolled strip: ISO 9445 and EN 10029 allow 1 to 8 %.
         EffectId::Thickness => Size::signed("relative", 0.01, 0.2),
@@ -147,7 +147,8 @@ pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
     all
 }
 
-/// Returns an error of the set-up for everything that it may act on. Only shapes and modal constants show it.
+/// Returns an error of the set-up for each thing that it may act on. It is tried only where shapes or modal constants
+/// were measured.
 fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
     let (inventory, length) = (&dataset.inventory, dataset.nominal.length());
     let [has_constants, has_ratios] = dataset.kinds_of_shapes();

@@ -11,7 +11,8 @@ use tapjoint_identify::consistent::Parameter;
 /// Standard deviation of the factor's logarithm before the data (1): anything.
 const ANY_FACTOR: f64 = 0.3;
 
-/// Returns the common factor of the frequencies. `None` where the data do not fix it, or a property is estimated.
+/// Returns the common factor of the frequencies (%). `None` if the data leave its standard deviation above 3 %, or a
+/// property is estimated.
 pub fn common_factor(dataset: &Dataset) -> Option<CommonFactor> {
     let [allowed, allowed_std] = by_description(dataset)?;
     let mut free = dataset.clone();

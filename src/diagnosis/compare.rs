@@ -181,7 +181,7 @@ pub fn set_section_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
     Some(())
 }
 
-/// Effects from whose fits the model without them is fitted again.
+/// Number of single effects from whose fits the nominal model is fitted again.
 const REFITTED: usize = 2;
 
 /// Fits all hypotheses but pairs of effects.
@@ -203,7 +203,7 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     if !one_stands && !stands(&dataset, &none) {
         add_large_effects(&search, &effects, &mut candidates);
     }
-    // Where an effect is fitted better, the model without it may be, too.
+    // A better fit with an effect may lead to a better one without it.
     let singles = candidates
         .iter()
         .filter(|one| one.drift.is_none() && !one.is_unknown());
@@ -295,7 +295,8 @@ fn add_large_effects(
 /// Standard deviation (1) of a parameter that is taken as exact: far below the resolution of any datum.
 const EXACT: f64 = 1e-8;
 
-/// Fits the nominal model with some nuisance parameters taken as exact.
+/// Fits the nominal model with the nuisance parameters that `is_exact` selects held at their described values. `None`
+/// if the fit fails.
 pub fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) -> Option<Fit> {
     let mut exact = dataset.clone();
     for nuisance in &mut exact.nuisances {

@@ -304,8 +304,8 @@ const SPARED_MODES: usize = 2;
 /// Number of modes that a next test may add.
 pub const MORE_MODES: usize = 2;
 
-/// Standard deviation of a size in the search, over its scale: far beyond what the size's own prior, which replaces it in
-/// the evidence, makes probable (3 % of Cauchy's distribution).
+/// Standard deviation of a size during the search, over its scale. It is wide: only 3 % of the size's own prior lie
+/// beyond. The evidence takes that prior instead.
 const SIZE_REACH: f64 = 20.0;
 
 /// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).

@@ -207,7 +207,7 @@ pub fn log_sum(logs: &[f64]) -> f64 {
 ///                    2              2
 /// ```
 ///
-/// Sizes are integrated apart ([`over_size`]).
+/// Sizes are integrated separately ([`over_size`]).
 fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Optimum) -> f64 {
     let free = free_parameters(priors);
     // A tiny effect may lie anywhere, but not outside the range: as broad a Gaussian at most.

@@ -33,8 +33,7 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
 
 /// Largest size from which a search begins, over its scale.
 const LARGEST_STEP: f64 = 10.0;
-/// Sizes of errors of the set-up that are tried, over their scale: from 0.1, each 1.4 times the one before, to 80. These are
-/// 0.5 mm to 40 cm, and 1 % to a factor of 9.
+/// Smallest size of an error of the set-up that is tried, over its scale: 0.5 mm, or 1 %.
 const SMALLEST_ERROR: f64 = 0.1;
 const ERROR_RATIO: f64 = 1.4;
 const SET_UP_STEPS: i32 = 21;
@@ -69,6 +68,7 @@ pub fn fit_frequencies(dataset: &Dataset) -> Option<Fit> {
 }
 
 /// Fits the nominal model from where an effect was fitted. That search may have led further than the one without.
+/// `None` if the fit fails.
 pub fn refit_nominal(dataset: &Dataset, with: &Fit) -> Option<Fit> {
     let forward = Forward::new(dataset, &[]);
     let joint = forward.layout.joint.len();
@@ -87,8 +87,8 @@ pub struct Search<'a> {
     pub dataset: &'a Dataset,
     /// Fit without the effect.
     pub without: &'a Fit,
-    /// Fit without the effect of the frequencies alone, from where errors of the set-up are searched: shapes that contradict
-    /// the described set-up lead astray. `None` where there are no shapes.
+    /// Fit without the effect to the frequencies alone. The search for errors of the set-up begins here, because wrong
+    /// shapes would mislead the joint. `None` without shapes.
     pub by_frequencies: Option<&'a Fit>,
 }
 
@@ -142,8 +142,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the best size of an error of the set-up with everything else held, and the evidence with that: the integral of
-    /// prior times likelihood over a row of sizes from small to gross.
+    /// Returns the best size of an error of the set-up, and its evidence, with all other parameters held. `None` if a
+    /// prediction fails.
     fn screened(&self, candidate: CandidateEffect, models: &[ModalModel]) -> Option<Screened> {
         let forward = self.model_with(&[candidate]);
         let size = &candidate.size;

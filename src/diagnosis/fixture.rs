@@ -1,7 +1,7 @@
 //! The fixture's own resonance as a datum: a peak that belongs to no mode of the beam.
 //!
-//! A fixture is a hypothesis only where its own resonance is seen, or lies above all that was looked at: one whose resonance
-//! should be seen and is not would explain much and predict a peak that is missing.
+//! A fixture is a hypothesis only where its own resonance is seen, or lies above all searched frequencies. Otherwise
+//! it would explain much, and predict a peak that is missing.
 //!
 //! Peaks of other causes (torsion, bending the other way, something on the structure) may stand anywhere
 //! between the lowest and the highest mode. Under every hypothesis each has the same density 1/B over
@@ -15,10 +15,9 @@
 //! p(peaks | any other)    n
 //! ```
 //!
-//! Integrated with the likelihood of all other data over the fixture's frequency, whose prior has the density 1/R over the
-//! logarithm, every peak gives a fit whose frequency the peak states, with the factor v B/(n R). A frequency above
-//! all that was looked at has the share of R that lies there. A fit whose frequency is stated is refuted by a strength
-//! that does not suit it.
+//! Each peak gives one fit, and the peak states its frequency. Let s = d x_b/d ln(frequency of the fixture alone). The
+//! prior of that logarithm has the density 1/R. Integration over it gives the factor v B/(n R s). A fixture above all
+//! searched frequencies has the remaining share of R. A peak whose strength does not suit the fixture refutes the fit.
 
 use crate::dataset::{Dataset, chi_square_tail};
 use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
@@ -153,7 +152,8 @@ pub fn goodness(dataset: &Dataset, fit: &Fit) -> Option<f64> {
     Some(two_sided(excess))
 }
 
-/// Lowest and highest frequency of a fixture (Hz), between which its logarithm is uniform: a rig on a soft table, a vice.
+/// Lowest and highest frequency of a fixture (Hz), for a rig on a soft table and for a vice. The prior is uniform in
+/// the logarithm. A band that reaches further widens it: to its end below, to four times its end above.
 const FIXTURES: [f64; 2] = [30.0, 2000.0];
 
 /// Returns the lowest and the highest frequency (Hz) of a fixture whose resonance was not looked for: above this `end` of

@@ -92,8 +92,8 @@ impl Model for Forward<'_> {
 const WIDE_STEP: f64 = 1e-2;
 
 impl<'a> Forward<'a> {
-    /// Returns the predictions with the errors of the set-up that the parameters state, by modes that are solved. A sensor's
-    /// mass stays where it was.
+    /// Returns the predictions with errors of the set-up, by modes that are already solved. Masses of the sensors stay
+    /// at their old places. `None` where a mode is missing.
     pub fn predict_set_up(&self, parameters: &[f64], solved: &[ModalModel]) -> Option<Vec<f64>> {
         let arrangements = self.dataset.arrangements.iter();
         let models = solved.iter().zip(arrangements);

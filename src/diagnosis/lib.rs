@@ -30,7 +30,7 @@
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
 //! Under each, the joint's stiffnesses and all nuisance parameters are fitted and integrated over. Nuisance
 //! parameters are the beam's properties, what the model misses of each mode, and drift of the joint and temperature
-//! between set-ups. So are masses, inertias and positions of sensors, and calibration. The uncertainty of the data comes from the measurement, never
+//! between set-ups. So are masses and places of sensors and added masses, places of the taps, and calibration. The uncertainty of the data comes from the measurement, never
 //! from a residual. This crate cannot reach the simulator, so that its answers to virtual tests are independent of
 //! it.
 

@@ -174,8 +174,8 @@ impl<'a> ModeInPlace<'a> {
         own.map(|((_, stated), mass)| (stated.mass, mass.position))
     }
 
-    /// Returns the derivative of a modal constant or ratio with respect to the logarithm of a property of the beam, `by_joint`
-    /// being those with respect to the joint's stiffnesses. A shape of unit modal mass is m^-1/2 psi(x/L), where psi
+    /// Returns the derivative of a modal constant or ratio with respect to ln of a property of the beam. `by_joint`
+    /// has the derivatives with respect to ln of the joint's stiffnesses. A shape of unit modal mass is m^-1/2 psi(x/L), where psi
     /// depends on Kt L^3/E I and Kr L/E I alone, but for what is fastened to the beam.
     pub fn shape_slope(&self, property: Parameter, predicted: f64, by_joint: [f64; 2]) -> f64 {
         let [translation, rotation] = by_joint;

@@ -1,8 +1,8 @@
 //! Parameters of a hypothesis and their priors: joint, effects, and nuisance parameters.
 //!
-//! The prior of an effect's size is a half-Cauchy distribution (Gelman 2006, "Prior distributions for variance parameters",
-//! section 3), cut off where the size cannot be, and symmetric where the sign is open. It has one number, `scale`: half of
-//! the sizes are smaller. Four fifths lie between 0.16 and 6.3 times the scale, which is 1.6 decades. It reaches zero, so that
+//! The prior of an effect's size is Cauchy's distribution (Gelman 2006, "Prior distributions for variance parameters",
+//! section 3), cut off at the bounds of the size. It is one-sided where only one sign is possible. It has one number,
+//! `scale`: about half of the sizes are smaller. Four fifths lie between 0.16 and 6.3 times the scale, which is 1.6 decades. It reaches zero, so that
 //! a little of an effect is never excluded by definition, and its tail leaves room for gross errors. The scales come
 //! from what such things weigh and yield, not from any study of the diagnosis; each stands with its reason in
 //! [`candidates`](crate::candidates).
@@ -175,7 +175,7 @@ pub struct Size {
     pub name: &'static str,
     /// Size that half of all effects of the kind do not reach (SI).
     pub scale: f64,
-    /// Value without the effect: 0, or that of the nominal model.
+    /// Value without the effect: 0 for all effects of the catalogue.
     pub neutral: f64,
     /// Lowest value.
     pub low: f64,
@@ -307,8 +307,8 @@ impl Size {
         }
     }
 
-    /// Returns the distance (m) of a place from where it is stated, both on a beam of this length (m): half of all that are
-    /// misread are within 5 mm.
+    /// Returns the prior of an offset (m) from the stated place, on a beam of this length (m). Half of the offsets are
+    /// below 5 mm.
     pub fn offset(stated: f64, length: f64) -> Self {
         Size {
             low: -stated,

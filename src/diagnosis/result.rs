@@ -40,7 +40,7 @@ pub struct Diagnosis {
     pub unlocated: Option<UnlocatedSensors>,
     /// Common factor that the frequencies ask for; `None` where they do not fix it.
     pub common_factor: Option<CommonFactor>,
-    /// Number of modes from which on two are spared for the closure; `None` where they were.
+    /// Least number of modes from which two are spared for the closure; `None` if two were spared.
     pub spare_modes_from: Option<usize>,
     /// Tests that would decide between the hypotheses, those with most information per cost first.
     pub next_tests: Vec<NextTest>,
@@ -195,16 +195,15 @@ pub struct HypothesisResult {
     /// Root mean square error that the measurement uncertainty of the hold-out frequencies alone would leave (%).
     #[serde(rename = "withheld_floor")]
     pub holdout_floor: Option<f64>,
-    /// Share of the gap on those frequencies that the hypothesis closes, which is a condition for its name; `None` where the
-    /// gap is below two noise floors.
+    /// Share of the gap on the withheld frequencies that the hypothesis closes. A name needs at least half of it where
+    /// these can decide. Null where the gap is below two noise floors.
     pub withheld_closure: Option<Closure>,
-    /// Root mean square error under the nominal model of the frequencies that are spared for the closure (%); `None` where
-    /// two modes cannot be spared.
+    /// Root mean square error of the spared frequencies under the nominal model (%); null without spared frequencies.
     pub spare_before: Option<f64>,
-    /// That error under this hypothesis (%).
+    /// Root mean square error of the spared frequencies under this hypothesis (%); null without spared frequencies.
     pub spare_after: Option<f64>,
-    /// Share of the gap that the hypothesis closes on the spared frequencies, which take no part in anything else; `None`
-    /// where there are none, or the gap is below two noise floors.
+    /// Share of the gap on the spared frequencies that the hypothesis closes. They take part in nothing else. Null
+    /// without them, or where the gap is below two noise floors.
     pub closure: Option<Closure>,
     /// Each recording predicted from the others; `None` with fewer than three, and for improbable hypotheses.
     #[serde(rename = "left_out_recordings")]
@@ -276,13 +275,14 @@ pub struct ParameterValue {
 /// Factor on all frequencies that would suit the data best, if the description were exact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct CommonFactor {
-    /// Measured over described frequencies, less 1 (%).
+    /// Common factor on all frequencies less 1 (%), if the description were exact.
     pub percent: f64,
     /// Its standard uncertainty (%).
     pub std_percent: f64,
-    /// Standard uncertainty of the same factor by the description's tolerances, by weight and free test (%).
+    /// Standard uncertainty of the factor by tolerances, weight and free test (%).
     pub tolerance_percent: f64,
-    /// Distance from what the description says, in standard deviations of both together.
+    /// Factor less that of the description, over the standard deviation of both (1); positive if measured frequencies
+    /// are higher.
     pub deviation: f64,
 }
 

@@ -1,7 +1,7 @@
 //! The set-up as it is under a hypothesis: where sensors, masses and hammer are, and what the channels show.
 //!
-//! Errors of the set-up that a hypothesis adds, and the tolerances of the description, enter the solved structure: a mass of a
-//! few percent that sits some millimetres off moves high modes by more than the slope at the stated place says.
+//! Errors of the set-up and the tolerances of the description enter the solved structure. Slopes would not do: a mass
+//! a few millimetres off moves high modes by more than its slope predicts.
 
 use crate::parameters::{Layout, Nuisance, NuisanceParameter, Target};
 use crate::structure::Arrangement;

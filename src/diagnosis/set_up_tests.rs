@@ -67,7 +67,7 @@ fn named(id: EffectId, pairs: &[(&str, f64)]) -> usize {
     right
 }
 
-/// Of four seeds one may miss 2 standard deviations: the chance of two or more is 2 % at a rate of 95 %.
+/// One of four seeds may fail: at a rate of 95 % two or more fail in 1.4 % of such tests.
 #[test]
 fn recover_errors_of_the_set_up_and_their_sizes() {
     for (id, pairs) in [

@@ -123,7 +123,8 @@ pub struct GapSettings {
     /// Number of the highest modes that are held out: 1.
     pub withheld_modes: usize,
     /// Number of modes from which on the two highest are spared for the closure alone: 8, so that five are left to fit and one
-    /// to test. No recording is spared: one that differs from the others must be seen, and one that repeats them says little.
+    /// to test. No recording is spared. One that differs is needed in the fit, and one that repeats the others tests
+    /// little.
     pub spare_modes_from: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
@@ -296,11 +297,11 @@ pub const LEAST_DATA_FOR_PAIRS: usize = 6;
 /// effect too small to be noticed is as good as none; and most of the dozen things that may be wrong
 /// with a test are right.
 pub const NO_GAP_PRIOR: f64 = 4.0;
-/// Prior probability that a joint that is described as rigid gives, over that of one group of effects: all clamps give,
-/// and how much matters is the question.
+/// Prior probability that a joint described as rigid gives, over that of one group of effects. All clamps give a
+/// little.
 pub const RIGID_PRIOR: f64 = 4.0;
-/// Prior probability of something unknown over that of one group of effects: besides the dozen kinds of the catalogue a real
-/// rig has many more, and real beams miss their models by 0.1 to 1 %, each in its own way.
+/// Prior probability of something unknown over that of one group of effects. A real rig has many more causes than the
+/// catalogue. Real beams miss their models by 0.1 to 1 %.
 pub const UNKNOWN_PRIOR: f64 = 4.0;
 /// Standard deviations of an effect's size from zero from which on it is a name: a size within two may be zero.
 pub const SIZED: f64 = 2.0;

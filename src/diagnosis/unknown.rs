@@ -11,10 +11,10 @@
 //! - all frequencies of one set-up are off by a factor of its own.
 //!
 //! By Rayleigh's quotient a relative change e(x) of E I moves ln f by (1/2) int e E I w''^2 dx/omega^2, of the mass by
-//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. These four kinds are
-//! equally probable, all ways of a kind, and all spreads of a way. The slopes
-//! miss a part of what large changes do. Either they miss nothing, or a tenth of the change of each frequency, and a share of the
-//! shapes and of the damping in proportion to the spread. Both are equally probable.
+//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. All
+//! kinds are equally probable. So are all ways of a kind, and all spreads of a way. The fourth kind needs several
+//! set-ups. Slopes miss a part of what large changes do. Either they miss nothing, or a tenth of the change of each
+//! frequency, and a share of shapes and damping in proportion to the spread. Both are equally probable.
 
 use crate::dataset::{Dataset, ObservableKind};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
@@ -68,7 +68,7 @@ pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     let mut all: Vec<(Kind, f64)> = Vec::new();
     let mut modes: Option<LocalOptimum> = None;
     for way in ways(dataset, &models) {
-        // A change that the slopes describe well must not pay for one that they do not.
+        // With and without the error of linear slopes, so that small changes keep their full evidence.
         let mut logs: Vec<f64> = Vec::new();
         for share in [0.0, 1.0] {
             for &spread in way.spreads {
@@ -76,7 +76,7 @@ pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
             }
         }
         if way.kind == Kind::Modes {
-            // The true model in the place of the linearised one, at the most probable spread.
+            // The model solved anew in the place of the linearised one, at the most probable spread.
             let (exact, _) = logs.split_at(way.spreads.len());
             let best = (0..exact.len()).max_by(|&a, &b| exact[a].total_cmp(&exact[b]))?;
             let fitted = discrepancies(dataset, nominal, way.spreads[best])?;
@@ -133,7 +133,7 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
         spreads: &OF_MODES,
         loosened: 2.0,
     }];
-    // A uniform change is one of the scale, which the catalogue has.
+    // Order 0 is left out: a uniform change is a common factor, which the catalogue has.
     for field in [&stiffness, &mass, &thickness] {
         for falls in [true, false] {
             all.push(Way {
@@ -144,7 +144,7 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
             });
         }
     }
-    // The same everywhere, or not.
+    // Uniform springs, then springs that vary along the beam.
     for orders in [1, ORDERS + 1] {
         all.push(Way {
             kind: Kind::Springs,
@@ -221,8 +221,8 @@ fn frequency_spread(way: &Way, spread: f64) -> f64 {
     spread * root_mean_square(&moved)
 }
 
-/// Returns the data with a relative uncertainty of shapes and damping, and of each single frequency, added (1). Damping may
-/// be anything if the cause is not known.
+/// Returns the data with more uncertainty: `of_shapes` (1, relative) for shapes, 25 times that for damping ratios,
+/// `of_frequencies` (1, relative) for each frequency.
 fn loosened(dataset: &Dataset, of_shapes: f64, of_frequencies: f64) -> Dataset {
     let pairs = dataset.observables.iter().zip(&dataset.data);
     let shapes = pairs.filter(|(observable, _)| observable.is_shape());
@@ -242,7 +242,7 @@ fn loosened(dataset: &Dataset, of_shapes: f64, of_frequencies: f64) -> Dataset {
     loose
 }
 
-/// Fits a discrepancy of each mode with this spread by the true model.
+/// Fits a discrepancy of each mode with this spread (1) by the model solved anew. `None` if the fit fails.
 fn discrepancies(dataset: &Dataset, nominal: &Fit, spread: f64) -> Option<LocalOptimum> {
     let mut loose = loosened(dataset, 0.0, 0.0);
     for mode in 1..=dataset.fitted_modes {

@@ -32,7 +32,8 @@ pub struct GoodnessOfFit {
     pub blocks: Vec<Block>,
     /// Goodness of its prediction of hold-out data; `None` without any.
     holdout: Option<f64>,
-    /// Probability of the peak of its fixture, or of its absence; `None` without a fixture.
+    /// Probability of a strength as far from the predicted one, for the peak that states the fixture's frequency (1).
+    /// `None` without a fixture, or with one above the band.
     peak: Option<f64>,
     /// Numbers of data and parameters; `None` where they are not tested.
     pub freedom: Option<DegreesOfFreedom>,
@@ -47,7 +48,8 @@ pub struct GoodnessOfFit {
 /// Numbers of data and parameters of a hypothesis.
 #[derive(Debug, Clone, Copy)]
 pub struct DegreesOfFreedom {
-    /// Frequencies of different modes and arrangements, and other data on which the effects act.
+    /// Frequencies of different modes and arrangements. Slopes along decays count for a nonlinear joint, damping
+    /// ratios for a lossy one.
     pub data: usize,
     /// Parameters of joint and effects.
     pub parameters: usize,
@@ -233,9 +235,9 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
     all.find(|one| one.hypothesis == Hypothesis::None)
 }
 
-/// Gives every group the same prior probability, split evenly inside; `none` has that of [`NO_GAP_PRIOR`] groups, `unknown`
-/// of [`UNKNOWN_PRIOR`], a joint that gives although it is described as rigid of [`RIGID_PRIOR`]. The pairs that were `tried` share one unit among themselves, the accepted
-/// and the others. Sorts the most probable first.
+/// Sets the prior of each group to 1, split evenly inside. Exceptions are `none` ([`NO_GAP_PRIOR`]), `unknown`
+/// ([`UNKNOWN_PRIOR`]) and a rigid joint that gives ([`RIGID_PRIOR`]). All `tried` pairs share 1. Sorts the most
+/// probable first.
 pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
     for k in 0..candidates.len() {
         let one = &candidates[k];
@@ -404,8 +406,8 @@ pub fn verdict(
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
     }
-    // A refuted nominal model makes no effect probable that explains the data less well. If it stands, many weak effects
-    // of one group share out the probability.
+    // An effect needs evidence of its own, even where the nominal model is refuted. Many weak effects of one group may
+    // hold the probability together.
     if evidence_over_none(candidates, first) < DETECTED {
         return if is_refuted {
             Verdict::Unknown
@@ -461,8 +463,7 @@ fn evidence_over_none(candidates: &[Candidate], candidate: &Candidate) -> f64 {
     })
 }
 
-/// Returns the members of a group that the data do not separate from its most probable one. Their priors do not count: which
-/// property of the beam is more often wrong says nothing about this beam.
+/// Returns the members of a group that the data do not separate from its most probable one. Priors do not count.
 fn inseparable(candidates: &[Candidate], members: &[usize]) -> Vec<usize> {
     let first = &candidates[members[0]].fit;
     let members = members.iter().copied();

@@ -321,7 +321,7 @@ fn prop_mutations_lose() {
     let right = score(&all).top_1;
     assert_eq!(right.hits, right.of);
     let share = |cases: &[Case]| score(cases).top_1.hits as f64 / right.of as f64;
-    // Of 24 effects in 16 groups at most the five of one group can be right by chance together,
+    // Of 24 effects in 15 groups at most the five of one group can be right by chance together,
     // plus a few that the shuffle left in place.
     assert!(share(&shuffled(&all, 1)) < 0.4);
     let scale = EffectId::ALL

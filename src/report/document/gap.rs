@@ -39,7 +39,7 @@ pub struct GapSection {
     pub map: Option<LocationMap>,
     /// Common factor that the frequencies ask for; null where they do not fix it.
     pub common_factor: Option<CommonFactor>,
-    /// Why no closure is stated on data that took no part in anything else; null where there are such data.
+    /// Reason why there are no spared frequencies, and so no closure; null where there are some.
     pub closure_reason: Option<String>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
@@ -134,9 +134,9 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         along_decays: found.amplitude_dependence.clone(),
         map: found.location_map.clone(),
         common_factor: found.common_factor,
-        closure_reason: found
-            .spare_modes_from
-            .map(|modes| format!("two modes cannot be spared: that needs {modes} modes or more")),
+        closure_reason: found.spare_modes_from.map(|modes| {
+            format!("no modes are spared for the closure: that needs {modes} modes or more")
+        }),
         baselines: baselines.collect(),
         next_test: found.next_tests.clone(),
         updated_model: None,

@@ -79,8 +79,8 @@ pub struct Truth {
     pub detectable: Option<bool>,
     /// True where such readings show that nothing in the catalogue explains them.
     pub refutable: Option<bool>,
-    /// True where one common factor on all frequencies was planted that the tolerances of the description cover: it is a
-    /// part of what is described, and no effect. `None` where no such factor was planted, or this is not known.
+    /// True if a planted common factor lies within the tolerances of the description: it counts as no effect. `None`
+    /// without such a factor, or if unknown.
     pub within_tolerance: Option<bool>,
 }
 

@@ -42,12 +42,12 @@ pub struct Scores {
     pub single_named: Rate,
     /// `named_right_of_all` of such verdicts.
     pub single_named_right_of_all: Rate,
-    /// One clear error of the set-up (an offset of 5 mm and more, a polarity, a swap, a scale that is 10 % off and more):
-    /// it is named.
+    /// One clear error of the set-up is named: an offset of 5 mm or more, a polarity, a swap, or a scale 10 % off or
+    /// more.
     pub set_up_named: Rate,
     /// One error of the set-up, rightly named, its size estimated: the size lies within 2 stated standard deviations.
     pub set_up_size_within_2_std: Rate,
-    /// The same of one effect of any kind.
+    /// One effect of any kind, rightly named with a size: the size lies within 2 stated standard deviations.
     pub size_within_2_std: Rate,
     /// Nothing planted, yet an effect is answered.
     pub null_called_effect: Rate,

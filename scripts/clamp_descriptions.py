@@ -13,6 +13,7 @@ nothing in the catalogue, the second by at most a common factor.
 import argparse
 import collections
 import json
+import math
 import os
 import random
 import subprocess
@@ -62,12 +63,14 @@ def bolted(draw, data):
 
 
 def free(draw, data):
-    """The free beam: 112 Hz to 974 Hz, of unknown size; a steel bar whose thickness makes the first one."""
-    length = draw.choice([0.6, 0.8, 1.0])
+    """The free beam: 112 Hz to 974 Hz, of unknown size. Its ratios are those of a bar with h/L = 0.030, here of steel or
+    aluminium and as long as its first frequency asks for."""
     modulus, density = draw.choice([(207e9, 7850), (70e9, 2700)])
-    thickness = 111.995 * length**2 * 12**0.5 * 2 * 3.14159265 / 4.73004**2 / (modulus / density) ** 0.5
-    thickness *= 1.004 * (1 + draw.choice([0, 0.005, -0.01, 0.02]))
-    return (f"[beam]\nlength = {length}\nwidth = 0.04\nthickness = {thickness:.6f}\nmodulus = {modulus:e}\ndensity = {density}\n"
+    # f = 4.73004^2 (h/L)/L sqrt(E/(12 rho))/(2 pi), of which shear and rotary inertia take 0.327 % at this h/L.
+    speed = (modulus / density / 12) ** 0.5
+    length = 0.996726 * 4.73004**2 * 0.030 * speed / (2 * math.pi * 111.995)
+    thickness = 0.030 * length * (1 + draw.choice([0, 0.005, -0.01, 0.02]))
+    return (f"[beam]\nlength = {length:.5f}\nwidth = 0.04\nthickness = {thickness:.6f}\nmodulus = {modulus:e}\ndensity = {density}\n"
             f'{draw.choice(TOLERANCES)}[joint]\nkind = "free"\n[measured]\n'
             "frequencies = [111.995, 306.855, 596.368, 974.132]\nstd = 0.03\n")
 

@@ -11,37 +11,25 @@ use super::structures::{Needs, Structure, Support};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tapjoint::effects::{Effect, EffectId, Group};
+use tapjoint::identify::consistent::Parameter;
 use tapjoint::structure::BeamTheory;
+use tapjoint::study::blind_check::GROUPS as PLANTED;
 
-/// Groups of effects that are planted, each with its members.
-pub const GROUPS: [&[EffectId]; 14] = [
-    &[EffectId::SensorMass],
-    &[EffectId::SensorCable],
-    &[EffectId::CrossCoupling],
-    &[EffectId::JointMass],
-    &[EffectId::JointNonlinearity],
-    &[EffectId::JointDamping],
-    &[EffectId::JointCompliance],
-    &[EffectId::Fixture],
-    &[
-        EffectId::Modulus,
-        EffectId::Length,
-        EffectId::Density,
-        EffectId::Thickness,
-        EffectId::Timebase,
-    ],
-    &[EffectId::AddedMass],
-    &[EffectId::LocalCrack],
-    &[EffectId::AxialLoad],
-    &[EffectId::ShearRotary],
-    &[
-        EffectId::SensorPosition,
-        EffectId::SensorPolarity,
-        EffectId::SensorSwap,
-        EffectId::SensorScale,
-        EffectId::TapPosition,
-    ],
-];
+/// Place of the joint's compliance among the groups: with the other effects of the joint.
+const COMPLIANCE: usize = 6;
+
+/// Groups of effects that are planted, each with its members: those of the blind check, and the compliance of a joint that is
+/// described as rigid.
+pub const GROUPS: [&[EffectId]; PLANTED.len() + 1] = {
+    let mut groups: [&[EffectId]; PLANTED.len() + 1] =
+        [&[EffectId::JointCompliance]; PLANTED.len() + 1];
+    let mut index = 0;
+    while index < PLANTED.len() {
+        groups[if index < COMPLIANCE { index } else { index + 1 }] = PLANTED[index];
+        index += 1;
+    }
+    groups
+};
 
 /// A class of tests: a cell of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -395,11 +383,8 @@ fn common_factor(effects: &[Effect]) -> f64 {
     let shifts = effects.iter().map(|effect| {
         let relative = effect.value("relative").unwrap_or(0.0);
         let power = match effect.id {
-            EffectId::Modulus => 0.5,
-            EffectId::Density => -0.5,
-            EffectId::Length => -2.0,
-            EffectId::Thickness | EffectId::Timebase => 1.0,
-            _ => 0.0,
+            EffectId::Timebase => 1.0,
+            id => Parameter::of_effect(id).map_or(0.0, Parameter::frequency_power),
         };
         power * relative
     });

@@ -4,7 +4,7 @@ use super::draws::{ErrorShape, log_normal, log_uniform, weighted};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tapjoint::gap::DescriptionUncertainty;
-use tapjoint::identify::consistent::BeamTolerances;
+use tapjoint::identify::consistent::{BeamTolerances, Parameter};
 use tapjoint::structure::specimen::{Joint, LapLayout, LapOverlap, Specimen};
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
 
@@ -232,15 +232,15 @@ impl Structure {
     /// f is proportional to h/L^2 (E/rho)^1/2.
     pub fn scale_std(&self) -> f64 {
         let known = &self.uncertainty.beam;
-        let parts = [
-            (1.0, known.thickness),
-            (2.0, known.length),
-            (0.5, known.modulus),
-            (0.5, known.density),
+        let properties = [
+            Parameter::Thickness,
+            Parameter::Length,
+            Parameter::Modulus,
+            Parameter::Density,
         ];
-        let squares = parts
-            .iter()
-            .map(|(power, std)| (power * std.unwrap_or(0.0)).powi(2));
+        let squares = properties.iter().map(|property| {
+            (property.frequency_power() * known.of(*property).unwrap_or(0.0)).powi(2)
+        });
         squares.sum::<f64>().sqrt()
     }
 }

@@ -3,8 +3,9 @@
 use super::StructureError;
 use super::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, dot, failure, pairs_for_forces};
 use super::interface::{AcrossFunctions, Coefficients, InterfaceFunctions};
-use super::specimen::model::{ACROSS, Model, Motion, Place};
+use super::specimen::model::{Model, Place};
 use super::specimen::modes::SHIFT;
+use super::specimen::numbering::{ACROSS, Motion};
 use super::specimen::{Body, Specimen};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::ops::{Add, Mul, Sub};
@@ -97,7 +98,9 @@ impl InterfaceModes {
         pairs.vectors.truncate(moving);
         let second_order = SecondOrder::of(&pairs, &model.second_order_matrix())?;
         let vectors = pairs.vectors.iter();
-        let motions: Vec<Motion> = vectors.map(|vector| model.motion(vector)).collect();
+        let motions: Vec<Motion> = vectors
+            .map(|vector| model.numbering.motion(vector))
+            .collect();
         let joint: Vec<[f64; 3]> = motions
             .iter()
             .map(|motion| {

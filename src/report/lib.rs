@@ -27,6 +27,7 @@ pub mod charts {
 pub mod words {
     pub mod diagnosis;
     pub mod findings;
+    pub(crate) mod sizes;
 }
 
 pub use data_files::{

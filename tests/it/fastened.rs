@@ -14,7 +14,9 @@ use tapjoint::identify::observation::Observations;
 use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
 use tapjoint::structure::specimen::{Joint, Mesh, PointMass};
 
-use crate::shared::{five_recordings, planned, strip_on_springs, strip_table, tapped_strip};
+use crate::shared::{
+    five_recordings, planned, recording_table, strip_on_springs, strip_table, tapped_strip,
+};
 
 // ---------------------------------------------------------------- the description
 
@@ -202,18 +204,9 @@ fn limit_a_mass_that_tends_to_nothing_does_nothing() {
 /// The strip bare and with an eighth of its mass fastened to its end, which takes the first frequency down
 /// by a sixth: further than a reading may lie from a mode of the reference configuration.
 const VIRTUAL: &str = tapped_strip!(
-    r#"[[recording]]
-file = "bare.csv"
-tap = 0.385
-band = [0, 1000]
-[[recording]]
-file = "loaded.csv"
-tap = 0.385
-band = [0, 1000]
-[[recording.mass]]
-position = 0.423
-mass = "100 g"
-"#
+    recording_table!("bare.csv", 0.385, 1000),
+    recording_table!("loaded.csv", 0.385, 1000),
+    "[[recording.mass]]\nposition = 0.423\nmass = \"100 g\"\n"
 );
 
 fn tapjoint(folder: &Path, arguments: &[&str]) {

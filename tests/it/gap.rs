@@ -1,6 +1,6 @@
 //! The diagnosis of the gap, on observations drawn from structures on another mesh and off all grids.
 
-use crate::shared::{five_recordings, strip_on_springs};
+use crate::shared::{effect, five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     Diagnosis, GapError, GapSettings, Hypothesis, HypothesisResult, Nominal, TestPlan, Verdict,
@@ -28,10 +28,6 @@ fn diagnosed(mass: Option<f64>, effects: &[Effect], seed: u64) -> Diagnosis {
         &GapSettings::default(),
     )
     .unwrap()
-}
-
-fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
-    Effect::from_pairs(id, pairs).unwrap()
 }
 
 fn result<'a>(diagnosis: &'a Diagnosis, name: &str) -> &'a HypothesisResult {

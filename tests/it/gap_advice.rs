@@ -1,6 +1,6 @@
 //! Which test the diagnosis advises next, and whether making it decides; recordings left out in turn.
 
-use crate::shared::{five_recordings, strip_on_springs};
+use crate::shared::{effect, five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     Diagnosis, GapSettings, NextTest, Nominal, PlannedConfiguration, Proposal, TestPlan, Verdict,
@@ -38,10 +38,6 @@ fn recording(sensor: f64, level: f64) -> PlannedConfiguration {
         tap: 0.95 * LENGTH,
         level,
     }
-}
-
-fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
-    Effect::from_pairs(id, pairs).unwrap()
 }
 
 /// The plan with the test added; `None` of tests that are no recordings.

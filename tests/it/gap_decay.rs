@@ -1,8 +1,7 @@
 //! Joints whose stiffness depends on the amplitude: what recordings of them are diagnosed as.
 
 use crate::joint_law::LawInClosedForm;
-use crate::shared::data;
-use crate::shared::virtual_strip;
+use crate::shared::{calibrated_strip, data, record, recording_table};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -12,30 +11,14 @@ use tapjoint::gap::{
     AmplitudeDependence, Diagnosis, FrequencyChange, GapSettings, Hypothesis, Verdict,
 };
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
-use tapjoint::recording::{WavFormat, write_wav};
-use tapjoint::simulate::{Laboratory, TestPlan, VirtualTest, nominal_description, plan_test};
+use tapjoint::recording::WavFormat;
+use tapjoint::simulate::{Laboratory, TestPlan, nominal_description, plan_test};
 
-const CANTILEVER: &str = virtual_strip!(
-    r#"model = "2p"
-[hammer]
-channel = 1
-scale = 400
-[[sensor]]
-name = "A"
-channel = 2
-scale = 4000
-position = 0.338
-mass = "1.5 g"
-[[recording]]
-file = "hard.wav"
-tap = 0.385
-level = 4
-band = [0, 700]
-[[recording]]
-file = "soft.wav"
-tap = 0.385
-band = [0, 700]
-"#
+const CANTILEVER: &str = calibrated_strip!(
+    "mass = \"1.5 g\"\n",
+    recording_table!("hard.wav", 0.385, 700),
+    "level = 4\n",
+    recording_table!("soft.wav", 0.385, 700)
 );
 
 fn diagnosed(text: &str, folder: &Path) -> Diagnosis {
@@ -43,27 +26,6 @@ fn diagnosed(text: &str, folder: &Path) -> Diagnosis {
     let settings = IdentifySettings::default();
     let analysis = run_test(&test, (folder, "test.toml"), &settings).unwrap();
     diagnose_test(&test, &analysis, &GapSettings::default()).unwrap()
-}
-
-fn record(test: &VirtualTest, laboratory: &Laboratory, folder: &Path) {
-    for recording in &test.recordings {
-        let mut run = recording.begin(laboratory);
-        let mut frame = vec![0.0; test.scales.len()];
-        let mut channels = vec![Vec::new(); frame.len()];
-        while run.next_frame(&mut frame) {
-            for (channel, value) in channels.iter_mut().zip(&frame) {
-                channel.push(*value);
-            }
-        }
-        let path = folder.join(&recording.file);
-        write_wav(
-            &path,
-            recording.plan.sample_rate,
-            &channels,
-            WavFormat::Pcm24,
-        )
-        .unwrap();
-    }
 }
 
 /// The cantilever with these effects, recorded, and diagnosed from what its user believes.
@@ -79,7 +41,7 @@ fn virtual_test(effects: &[Effect], seed: u64) -> Diagnosis {
         seed,
     };
     let test = plan_test(&plan).unwrap();
-    record(&test, &laboratory, folder.path());
+    record(&test, &laboratory, folder.path(), WavFormat::Pcm24);
     let text = nominal_description(CANTILEVER, &description, &test).unwrap();
     diagnosed(&text, folder.path())
 }

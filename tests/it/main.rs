@@ -55,7 +55,6 @@ mod simulate_cli;
 mod simulate_motion;
 mod simulate_seen;
 mod simulate_test;
-mod specimen;
 mod strengths;
 mod structure;
 mod taps_double_hit;

@@ -1,56 +1,31 @@
 //! Set-ups that are not as described: what recordings and planned observations of them show.
 
 use crate::golden::assert_snapshot;
-use crate::shared::{planned, steel_strip, strip_on_springs, virtual_strip};
+use crate::shared::{
+    calibrated_strip, described, effect, planned, record, recording_table, steel_strip,
+    strip_on_springs,
+};
 use std::fmt::Write;
 use tapjoint::description::TestDescription;
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{PlannedConfiguration, TestPlan, observe};
 use tapjoint::identify::observation::{Observations, ObservedMode};
 use tapjoint::pipeline::{IdentifySettings, observations, run_test};
-use tapjoint::recording::{WavFormat, write_wav};
+use tapjoint::recording::WavFormat;
 use tapjoint::simulate::{
     Laboratory, TestPlan as SimulatedTest, Truth, nominal_description, plan_test, truth_of,
 };
 use tapjoint::structure::specimen::{Body, Joint, Mesh, Specimen, SpecimenModes};
 
-const CANTILEVER: &str = virtual_strip!(
-    r#"model = "2p"
-[hammer]
-channel = 1
-scale = 400
-[[sensor]]
-name = "A"
-channel = 2
-scale = 4000
-position = 0.338
-[[sensor]]
-name = "B"
-channel = 3
-scale = 2000
-position = 0.205
-[[recording]]
-file = "first.wav"
-tap = 0.385
-band = [0, 700]
-[[recording]]
-file = "moved.wav"
-tap = 0.26
-band = [0, 700]
-at = { A = 0.12 }
-"#
+const CANTILEVER: &str = calibrated_strip!(
+    "[[sensor]]\nname = \"B\"\nchannel = 3\nscale = 2000\nposition = 0.205\n",
+    recording_table!("first.wav", 0.385, 700),
+    recording_table!("moved.wav", 0.26, 700),
+    "at = { A = 0.12 }\n"
 );
 
 /// Modes in the band.
 const MODES: usize = 4;
-
-fn described(text: &str) -> TestDescription {
-    TestDescription::parse(text, "test.toml").unwrap()
-}
-
-fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
-    Effect::from_pairs(id, pairs).unwrap()
-}
 
 fn plan<'a>(
     description: &'a TestDescription,
@@ -75,19 +50,7 @@ fn recorded(effects: &[Effect]) -> Observations {
     laboratory.hammer.interval = Some(5.0);
     let test = plan_test(&plan(&description, effects, &laboratory)).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for recording in &test.recordings {
-        let mut run = recording.begin(&laboratory);
-        let mut frame = vec![0.0; test.scales.len()];
-        let mut channels = vec![Vec::new(); frame.len()];
-        while run.next_frame(&mut frame) {
-            for (channel, value) in channels.iter_mut().zip(&frame) {
-                channel.push(*value);
-            }
-        }
-        let path = folder.path().join(&recording.file);
-        let rate = recording.plan.sample_rate;
-        write_wav(&path, rate, &channels, WavFormat::Float32).unwrap();
-    }
+    record(&test, &laboratory, folder.path(), WavFormat::Float32);
     let text = nominal_description(CANTILEVER, &description, &test).unwrap();
     let told = described(&text);
     let settings = IdentifySettings::unperturbed();

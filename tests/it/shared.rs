@@ -1,6 +1,8 @@
 //! What several modules begin with: a beam, its tests, and the real recordings where they are at hand.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use tapjoint::description::TestDescription;
+use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     DescriptionUncertainty, Nominal, NominalSensor, PlannedConfiguration, TestPlan,
 };
@@ -8,6 +10,8 @@ use tapjoint::identify::consistent::{
     BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, JointedStructure,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
+use tapjoint::recording::{WavFormat, write_wav};
+use tapjoint::simulate::{Laboratory, VirtualTest};
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{Body, Joint, Specimen};
@@ -56,15 +60,70 @@ pub(crate) use virtual_strip;
 
 /// The strip with a hammer and sensor A at four fifths; the given text follows.
 macro_rules! tapped_strip {
-    ($rest:literal) => {
+    ($($rest:expr),* $(,)?) => {
         concat!(
             $crate::shared::virtual_strip!(""),
             "[hammer]\nchannel = 1\n[[sensor]]\nname = \"A\"\nposition = 0.338\n",
-            $rest
+            $($rest),*
         )
     };
 }
 pub(crate) use tapped_strip;
+
+/// The strip with a calibrated hammer and a calibrated sensor A at four fifths; the given text follows.
+macro_rules! calibrated_strip {
+    ($($rest:expr),* $(,)?) => {
+        concat!(
+            $crate::shared::virtual_strip!("model = \"2p\"\n"),
+            "[hammer]\nchannel = 1\nscale = 400\n",
+            "[[sensor]]\nname = \"A\"\nchannel = 2\nscale = 4000\nposition = 0.338\n",
+            $($rest),*
+        )
+    };
+}
+pub(crate) use calibrated_strip;
+
+/// A recording's table: its file, the place of its taps (m), and the end of its band (Hz).
+macro_rules! recording_table {
+    ($file:literal, $tap:literal, $highest:literal) => {
+        concat!(
+            "[[recording]]\nfile = \"",
+            $file,
+            "\"\ntap = ",
+            $tap,
+            "\nband = [0, ",
+            $highest,
+            "]\n"
+        )
+    };
+}
+pub(crate) use recording_table;
+
+/// The description that this text is.
+pub fn described(text: &str) -> TestDescription {
+    TestDescription::parse(text, "test.toml").unwrap()
+}
+
+/// An effect with these values (SI); the others are typical ones.
+pub fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
+    Effect::from_pairs(id, pairs).unwrap()
+}
+
+/// Writes the recordings of a virtual test into a folder.
+pub fn record(test: &VirtualTest, laboratory: &Laboratory, folder: &Path, format: WavFormat) {
+    for recording in &test.recordings {
+        let mut run = recording.begin(laboratory);
+        let mut frame = vec![0.0; test.scales.len()];
+        let mut channels = vec![Vec::new(); frame.len()];
+        while run.next_frame(&mut frame) {
+            for (channel, value) in channels.iter_mut().zip(&frame) {
+                channel.push(*value);
+            }
+        }
+        let path = folder.join(&recording.file);
+        write_wav(&path, recording.plan.sample_rate, &channels, format).unwrap();
+    }
+}
 
 /// The strip on springs of `off` times the joint of Ingole & Chatterjee, without coupling, as it is described
 /// with a sensor A of this mass (kg).

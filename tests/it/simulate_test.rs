@@ -1,7 +1,7 @@
 //! Virtual tests as a whole: what the recordings say against closed forms, and what may not change them.
 
 use crate::joint_law::LawInClosedForm;
-use crate::shared::tapped_strip;
+use crate::shared::{described, tapped_strip};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -20,10 +20,6 @@ file = "taps.csv"
 tap = 0.3
 "#
 );
-
-fn described(text: &str) -> TestDescription {
-    TestDescription::parse(text, "test.toml").unwrap()
-}
 
 fn plan<'a>(
     description: &'a TestDescription,

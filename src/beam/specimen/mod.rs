@@ -13,6 +13,7 @@ mod clamp;
 mod element;
 pub(crate) mod model;
 pub(crate) mod modes;
+pub(crate) mod numbering;
 
 pub use crate::joint::Joint;
 use crate::{Assembly, Beam, BeamTheory, STIFFNESS_RULE, StructureError, WidthStiffening, require};

@@ -4,169 +4,14 @@
 //! all numbers stay near 1. Rotations are dw/dx with x in units of the length.
 
 use super::element::{
-    Across, ElementHinge, Ends, HingedElement, Section, Square, Units, Weights, dot, quadratic,
+    Across, ElementHinge, HingedElement, Section, Square, Units, Weights, dot, quadratic,
 };
+use super::numbering::{ACROSS, HELD, Motion, Numbering};
 use super::{BeamSection, Body, Joint, Specimen};
 use crate::eigen::BandedMatrix;
 use crate::width::Curling;
 use crate::{Beam, StructureError, WidthStiffening};
 use std::f64::consts::PI;
-
-/// Equation of a motion that does not exist; larger than the number of any that does.
-const HELD: usize = usize::MAX;
-
-/// Index of the curvature across the width among a node's motions, and among the joint's.
-pub(crate) const ACROSS: usize = 2;
-
-/// Equations of a specimen's motions.
-///
-/// About a lap joint the order is chosen so that merged motions stay within the half-bandwidth of an
-/// element: left end's own, shared, right end's own.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Numbering {
-    /// For each node displacement, rotation, and curvature across the width.
-    nodes: Vec<[usize; 3]>,
-    /// Whether nodes have a curvature across the width.
-    stiffened: bool,
-    /// Rotation of the base.
-    base: Option<usize>,
-    /// Displacement of each resonator.
-    resonators: Vec<usize>,
-    /// Number of equations.
-    size: usize,
-}
-
-impl Numbering {
-    /// `elements` of each beam; `has_base` where the fixture has a motion of its own; `resonators` are the near nodes of
-    /// the elements on which they stand.
-    fn new(specimen: &Specimen, elements: &[usize], has_base: bool, resonators: &[usize]) -> Self {
-        let [kt, kr] = specimen.joint_stiffnesses().map(f64::is_infinite);
-        let held = match specimen.width_stiffening {
-            WidthStiffening::HeldAtJoint => specimen.joint.is_some(),
-            WidthStiffening::SprungAtJoint => kt,
-            WidthStiffening::FreeAtJoint | WidthStiffening::Ignored => false,
-        };
-        let rigid = [kt, kr, held];
-        let mut numbering = Self {
-            stiffened: specimen.is_stiffened(),
-            nodes: Vec::new(),
-            base: None,
-            resonators: vec![HELD; resonators.len()],
-            size: 0,
-        };
-        if has_base {
-            numbering.base = Some(numbering.next());
-        }
-        match specimen.body {
-            Body::One(_) => {
-                let mut first = [HELD; 3];
-                for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
-                    first[motion] = numbering.next();
-                }
-                numbering.add_node(first, resonators);
-                numbering.add_nodes(elements[0], resonators);
-            }
-            Body::Joined(_) => {
-                numbering.add_nodes(elements[0], resonators);
-                // The two nodes of the joint.
-                let mut left = [HELD; 3];
-                for shared in [false, true] {
-                    for motion in numbering
-                        .motions()
-                        .filter(|&motion| rigid[motion] == shared)
-                    {
-                        left[motion] = numbering.next();
-                    }
-                }
-                let mut right = left;
-                for motion in numbering.motions().filter(|&motion| !rigid[motion]) {
-                    right[motion] = numbering.next();
-                }
-                numbering.add_node(left, resonators);
-                numbering.add_node(right, resonators);
-                numbering.add_nodes(elements[1], resonators);
-            }
-        }
-        numbering
-    }
-
-    fn next(&mut self) -> usize {
-        self.size += 1;
-        self.size - 1
-    }
-
-    /// Motions of a node that exist.
-    fn motions(&self) -> std::ops::Range<usize> {
-        0..if self.stiffened { 3 } else { 2 }
-    }
-
-    fn add_nodes(&mut self, count: usize, resonators: &[usize]) {
-        for _ in 0..count {
-            let mut node = [HELD; 3];
-            for motion in self.motions() {
-                node[motion] = self.next();
-            }
-            self.add_node(node, resonators);
-        }
-    }
-
-    /// Adds a node, and the motion of a resonator on the element behind it.
-    fn add_node(&mut self, node: [usize; 3], resonators: &[usize]) {
-        let number = self.nodes.len();
-        self.nodes.push(node);
-        for (index, _) in resonators.iter().enumerate().filter(|one| *one.1 == number) {
-            self.resonators[index] = self.next();
-        }
-    }
-}
-
-/// Displacement, rotation and curvature across the width of every node, and the rotation of the base.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Motion {
-    pub(super) nodes: Vec<[f64; 3]>,
-    /// `None` where the base does not move on its own.
-    pub(super) base: Option<f64>,
-    /// Displacement of each resonator.
-    pub(super) resonators: Vec<f64>,
-}
-
-impl Motion {
-    /// Returns self + factor other.
-    pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
-        let mut sum = self.clone();
-        for (node, other) in sum.nodes.iter_mut().zip(&other.nodes) {
-            *node = std::array::from_fn(|i| node[i] + factor * other[i]);
-        }
-        if let Some(turn) = &mut sum.base {
-            *turn += factor * other.base.unwrap_or(0.0);
-        }
-        for (own, other) in sum.resonators.iter_mut().zip(&other.resonators) {
-            *own += factor * other;
-        }
-        sum
-    }
-
-    pub(super) fn scaled(mut self, factor: f64) -> Self {
-        let values = self.nodes.as_flattened_mut().iter_mut();
-        values
-            .chain(&mut self.base)
-            .chain(&mut self.resonators)
-            .for_each(|value| *value *= factor);
-        self
-    }
-
-    /// Motions of both ends of the element behind a node.
-    pub(crate) fn ends(&self, node: usize) -> [f64; 4] {
-        let ([w0, t0, _], [w1, t1, _]) = (self.nodes[node], self.nodes[node + 1]);
-        [w0, t0, w1, t1]
-    }
-
-    /// The same, with the curvatures across the width.
-    fn all_ends(&self, node: usize) -> Ends {
-        let ([w0, t0, a0], [w1, t1, a1]) = (self.nodes[node], self.nodes[node + 1]);
-        [w0, t0, w1, t1, a0, a1]
-    }
-}
 
 /// Twice the strain energy, twice the kinetic energy over omega squared, and what omega^4 adds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -278,7 +123,7 @@ pub(crate) struct AttachedSpring {
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     pub(super) runs: Vec<Run>,
-    pub(super) numbering: Numbering,
+    pub(crate) numbering: Numbering,
     pub(super) units: Units,
     /// Stiffness of the joint for (w, theta), infinite where rigid.
     pub(super) joint: [[f64; 2]; 2],
@@ -574,7 +419,12 @@ impl Model {
             let on_beam =
                 std::array::from_fn(|i| std::array::from_fn(|j| item.stiffness * w[i] * w[j]));
             self.scatter(&mut stiffness, item.place.node, &on_beam);
-            for (row, weight) in self.equations_behind(item.place.node).into_iter().zip(w) {
+            for (row, weight) in self
+                .numbering
+                .equations_behind(item.place.node)
+                .into_iter()
+                .zip(w)
+            {
                 if row != HELD {
                     let (low, high) = (row.min(own), row.max(own));
                     stiffness.add(high, low, -item.stiffness * weight);
@@ -647,15 +497,9 @@ impl Model {
         }
     }
 
-    /// Equations of the ends of the element behind a node, as [`Motion::ends`].
-    fn equations_behind(&self, node: usize) -> [usize; 4] {
-        let [near, far] = [self.numbering.nodes[node], self.numbering.nodes[node + 1]];
-        [near[0], near[1], far[0], far[1]]
-    }
-
     /// Adds the matrix of the element behind a node.
     fn scatter<const N: usize>(&self, target: &mut BandedMatrix<N>, node: usize, matrix: &Square) {
-        let equations = self.equations_behind(node);
+        let equations = self.numbering.equations_behind(node);
         for (&row, values) in equations.iter().zip(matrix) {
             for (&column, value) in equations.iter().zip(values) {
                 if row != HELD && column != HELD {
@@ -787,40 +631,6 @@ impl Model {
         ]
     }
 
-    /// A vector of the equations as motions of the nodes.
-    pub(crate) fn motion(&self, vector: &[f64]) -> Motion {
-        // The equation of a motion that does not exist is behind the last one.
-        let nodes = self.numbering.nodes.iter();
-        Motion {
-            nodes: nodes
-                .map(|node| node.map(|row| vector.get(row).copied().unwrap_or(0.0)))
-                .collect(),
-            base: self.numbering.base.map(|row| vector[row]),
-            resonators: self
-                .numbering
-                .resonators
-                .iter()
-                .map(|row| vector[*row])
-                .collect(),
-        }
-    }
-
-    /// The equations' vector of a motion.
-    pub(super) fn vector(&self, motion: &Motion) -> Vec<f64> {
-        let mut vector = vec![0.0; self.numbering.size];
-        let nodes = self.numbering.nodes.iter().zip(&motion.nodes);
-        let moved = nodes.flat_map(|(rows, values)| rows.iter().copied().zip(*values));
-        let base = self.numbering.base.zip(motion.base);
-        let resonators = self.numbering.resonators.iter().copied();
-        let resonators = resonators.zip(motion.resonators.iter().copied());
-        for (row, value) in moved.chain(base).chain(resonators) {
-            if row != HELD {
-                vector[row] = value;
-            }
-        }
-        vector
-    }
-
     /// Rigid motions that nothing withstands: their eigenvalues are equal.
     pub(crate) fn locked_motions(&self) -> Vec<Vec<f64>> {
         match self.rigid_motions() > 0 && !self.is_supported() {
@@ -845,7 +655,7 @@ impl Model {
 
     /// Up and down, and rocking about the centre of mass, both of unit modal mass.
     pub(super) fn rigid_pair(&self) -> [Motion; 2] {
-        let [up, turn] = [0, 1].map(|kind| self.motion(&self.rigid_vector(kind, 0)));
+        let [up, turn] = [0, 1].map(|kind| self.numbering.motion(&self.rigid_vector(kind, 0)));
         let [_, first] = self.products(&up, &turn);
         let centre = first / self.energies(&up).kinetic;
         let rock = turn.plus(-centre, &up);
@@ -875,7 +685,7 @@ impl Model {
         let resonators = self.resonators.iter();
         let carried = resonators.map(|one| one.place.displacement(&motion.ends(one.place.node)));
         motion.resonators = carried.collect();
-        self.vector(&motion)
+        self.numbering.vector(&motion)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The modes of a specimen, of specimens that differ little from it, and of one on a suspension.
 
-use super::model::{Energies, Model, Motion};
+use super::model::{Energies, Model};
+use super::numbering::Motion;
 use super::{Mesh, Specimen};
 use crate::StructureError;
 use crate::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, RESONATOR_ROW, dot, lowest_pairs};
@@ -46,7 +47,7 @@ struct Mode {
 
 impl Mode {
     fn new(model: &Model, vector: &[f64]) -> Self {
-        let motion = model.motion(vector);
+        let motion = model.numbering.motion(vector);
         let energies = model.energies(&motion);
         let square = energies.quotient();
         let factor = energies.modal_mass(square).sqrt().recip();
@@ -77,7 +78,7 @@ fn refine<const N: usize>(
         let mut answer = mass.times(vector);
         factor.solve_lower(&mut answer);
         factor.solve_upper(&mut answer);
-        motions.push(model.motion(&answer));
+        motions.push(model.numbering.motion(&answer));
     }
     let count = motions.len();
     let (mut strain, mut kinetic) = (DMatrix::zeros(count, count), DMatrix::zeros(count, count));
@@ -102,7 +103,7 @@ fn refine<const N: usize>(
         for (row, motion) in motions.iter().enumerate().skip(1) {
             sum = sum.plus(shapes[(row, column)], motion);
         }
-        *vector = model.vector(&sum);
+        *vector = model.numbering.vector(&sum);
     }
 }
 
@@ -129,7 +130,7 @@ fn moved_modes<const N: usize>(from: &SpecimenModes, model: &Model) -> Option<Ve
     let (stiffness, mass) = model.matrices::<N>();
     let mut modes = Vec::with_capacity(from.modes.len());
     for mode in &from.modes {
-        let vector = from.model.vector(&mode.motion);
+        let vector = from.model.numbering.vector(&mode.motion);
         let pulled = mass.times(&vector);
         let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
         let mut moved = stiffness.plus(-square, &mass).ldl().solve(pulled.clone());

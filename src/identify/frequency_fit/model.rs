@@ -8,6 +8,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::PI;
+use tapjoint_beam::effects::EffectId;
 use tapjoint_beam::interface::{InterfaceModes, JoinedHalf, JointedBody, LAST_STEP};
 use tapjoint_beam::specimen::{Body, LapLayout, PointMass, PointSpring, Specimen};
 use tapjoint_beam::{
@@ -222,6 +223,34 @@ impl Parameter {
 
     pub(super) fn index(self) -> usize {
         self as usize
+    }
+
+    /// Returns the power with which a property of the beam enters its natural frequencies, h/L^2 sqrt(E/rho), where they are
+    /// all multiplied by one factor (1); 0 for the joint. The width drops out of I/A.
+    pub fn frequency_power(self) -> f64 {
+        match self {
+            Self::Modulus => 0.5,
+            Self::Density => -0.5,
+            Self::Thickness => 1.0,
+            Self::Kt | Self::Kr | Self::Coupling | Self::Width => 0.0,
+            Self::Length
+            | Self::SecondLength
+            | Self::ThirdLength
+            | Self::FourthLength
+            | Self::FifthLength
+            | Self::SixthLength => -2.0,
+        }
+    }
+
+    /// Returns the property of the beam that an effect changes; `None` where it changes none.
+    pub fn of_effect(effect: EffectId) -> Option<Self> {
+        match effect {
+            EffectId::Modulus => Some(Self::Modulus),
+            EffectId::Density => Some(Self::Density),
+            EffectId::Length => Some(Self::Length),
+            EffectId::Thickness => Some(Self::Thickness),
+            _ => None,
+        }
     }
 
     /// Name as in test descriptions and reports.

@@ -6,9 +6,9 @@ use super::{Table, number, page_words, words};
 use crate::document::{Baseline, Document, GapSection};
 use crate::format::{MISSING, or_missing, probability, significant};
 use crate::words::diagnosis::{
-    EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, left, names, not_predicted, percent, sizes,
-    together, unit_of,
+    EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, names, not_predicted, together,
 };
+use crate::words::sizes::{left, percent, sizes, unit_of};
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{Hypothesis, Verdict};
 

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::sizes::{left, percent, sizes, stiffness_with_limits};
 use crate::document::{Document, GapSection};
-use crate::format::{
-    RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
-};
+use crate::format::{probability, rounded, signed_percent, significant, trimmed};
 use tapjoint_beam::effects::{EffectId, Group, Place};
 use tapjoint_diagnosis::{
-    Closure, CommonFactor, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest,
-    ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
+    Closure, CommonFactor, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest, Proposal,
+    Residual, UnlocatedSensors, Verdict,
 };
 use tapjoint_numerics::stats::times;
 
@@ -328,22 +327,6 @@ fn joint(found: &HypothesisResult) -> Option<String> {
     let kt = stiffness_with_limits(kt, of_kt, "N/m");
     // A value stays on the line of its name and unit.
     Some(format!("Kt\u{a0}=\u{a0}{kt}, Kr\u{a0}=\u{a0}{kr}"))
-}
-
-/// "1.995 MN/m (95 %: 1.991 to 1.999)", the value on one line with its unit.
-pub(super) fn stiffness_with_limits(value: f64, interval: Option<[f64; 2]>, unit: &str) -> String {
-    if value.is_infinite() {
-        return RIGID.to_owned();
-    }
-    let (factor, letter) = prefix(value);
-    let known = interval.filter(|ends| ends.iter().all(|end| end.is_finite()));
-    let Some([low, high]) = known.map(|ends| ends.map(|end| factor * end)) else {
-        return format!("{}\u{a0}{letter}{unit}", significant(factor * value, 4));
-    };
-    // All with the digits that the interval supports.
-    let shown = rounded(factor * value, Some(0.5 * (high - low))).value;
-    let decimals = shown.split_once('.').map_or(0, |(_, behind)| behind.len());
-    format!("{shown}\u{a0}{letter}{unit} (95 %: {low:.decimals$} to {high:.decimals$})")
 }
 
 fn verdict(gap: &GapSection, has_joint: bool) -> String {
@@ -669,9 +652,6 @@ pub(crate) const EQUALLY_LIKELY: &str = "if all effects of the catalogue are equ
 /// Hypotheses less probable than this are not listed.
 pub(crate) const LEAST_PROBABILITY: f64 = 0.005;
 
-/// A size below this is zero but for rounding, in the unit that it is written in.
-const NOTHING: f64 = 1e-9;
-
 /// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
 pub(crate) fn together(hypothesis: &Hypothesis) -> String {
     hypothesis.name().replace('+', " + ")
@@ -683,126 +663,9 @@ pub(crate) fn names(effects: &[EffectId]) -> String {
     names.join(", ")
 }
 
-/// "mass 24.10 ± 0.30 g"; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
-pub(crate) fn sizes(found: &HypothesisResult) -> String {
-    let mut sorted: Vec<&ParameterValue> = found.parameters.iter().collect();
-    sorted.sort_by_key(|one| (one.effect.name(), one.name));
-    let alone = sorted.iter().all(|one| one.effect == sorted[0].effect);
-    // A place that may be anywhere, and the inertia of no mass, are left out.
-    sorted.retain(|parameter| match parameter.std {
-        None => !matches!(
-            parameter.name,
-            "position" | "frequency" | "exponent" | "inertia"
-        ),
-        Some(std) => parameter.name != "inertia" || std != 0.0,
-    });
-    let of_effects = sorted.chunk_by(|one, next| one.effect == next.effect);
-    let parts: Vec<String> = of_effects
-        .map(|own| {
-            let sizes: Vec<String> = own.iter().map(|one| size(one)).collect();
-            match alone {
-                true => sizes.join(", "),
-                false => format!("{}: {}", own[0].effect.name(), sizes.join(", ")),
-            }
-        })
-        .collect();
-    parts.join("; ")
-}
-
-fn size(parameter: &ParameterValue) -> String {
-    let (unit, factor) = unit_of(parameter);
-    let value = factor * parameter.value;
-    let known = parameter.std.map(|std| factor * std);
-    let size = match known.filter(|std| std.is_finite() && *std > 0.0) {
-        Some(std) => rounded(value, Some(std)).joined(),
-        None if value.abs() < NOTHING => "0".to_owned(),
-        None => significant(value, 3),
-    };
-    format!("{} {size}{unit}", parameter.name.replace('_', " "))
-}
-
-/// The unit a parameter is read in, and how many of it one SI unit is.
-pub(crate) fn unit_of(parameter: &ParameterValue) -> (&'static str, f64) {
-    match parameter.name {
-        // A place that is off; that of readings is a frequency.
-        "offset" if parameter.effect.group() == Group::SetUp => (" mm", 1e3),
-        "mass" => (" g", 1e3),
-        "inertia" => (" kg mm\u{b2}", 1e6),
-        "position" => (" mm", 1e3),
-        "stiffness" => (" N/m", 1.0),
-        "frequency" | "offset" => (" Hz", 1.0),
-        "force" => (" N", 1.0),
-        // A hinge's rotational compliance times E I/L.
-        "compliance" => (" L/EI", 1.0),
-        "relative" | "ratio" | "std" | "loss_factor" => (" %", 1e2),
-        _ => ("", 1.0),
-    }
-}
-
-/// An error that is left (%). Far below what noise leaves (%) it says nothing but that.
-pub(crate) fn left(error: Option<f64>, noise: Option<f64>) -> String {
-    const FAR_BELOW: f64 = 0.2;
-    let least = noise.map(|noise| FAR_BELOW * noise);
-    match error.zip(least) {
-        Some((error, least)) if error < least => format!("<{}", significant(least, 1)),
-        _ => percent(error),
-    }
-}
-
-/// A value in percent with two digits.
-pub(crate) fn percent(value: Option<f64>) -> String {
-    or_missing(value.map(|value| significant(value, 2)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn regress_an_error_far_below_the_noise_has_no_digits() {
-        assert_eq!(left(Some(3.5e-6), Some(0.0052)), "<0.001");
-        assert_eq!(left(Some(0.0011), Some(0.0052)), "0.0011");
-        assert_eq!(left(Some(3.5e-6), None), "0.0000035");
-        assert_eq!(left(None, Some(0.0052)), "\u{2013}");
-    }
-
-    #[test]
-    fn limit_sizes_of_two_effects_stand_under_their_names() {
-        let parameter =
-            |effect: EffectId, name: &'static str, value: f64, std: Option<f64>| ParameterValue {
-                effect,
-                name,
-                value,
-                std,
-                smallest_detectable: None,
-                smallest_separable: None,
-            };
-        let of = |parameters: Vec<ParameterValue>| {
-            sizes(&HypothesisResult {
-                parameters,
-                ..HypothesisResult::default()
-            })
-        };
-        let known = |value: f64, std: Option<f64>| {
-            let mass = parameter(EffectId::AddedMass, "mass", 0.0, Some(1e-3));
-            of(vec![
-                mass,
-                parameter(EffectId::AddedMass, "position", value, std),
-            ])
-        };
-        // Next to nothing of it may be anywhere.
-        assert_eq!(known(0.004, None), "mass 0.0 \u{b1} 1.0 g");
-        let somewhere = known(0.004, Some(0.001));
-        assert_eq!(
-            somewhere,
-            "mass 0.0 \u{b1} 1.0 g, position 4.0 \u{b1} 1.0 mm"
-        );
-        let mass = parameter(EffectId::SensorMass, "mass", 0.024, None);
-        assert_eq!(of(vec![mass.clone()]), "mass 24.0 g");
-        let crack = parameter(EffectId::LocalCrack, "compliance", 0.01, None);
-        let words = "local-crack: compliance 0.0100 L/EI; sensor-mass: mass 24.0 g";
-        assert_eq!(of(vec![mass, crack]), words);
-    }
 
     #[test]
     fn regress_every_verdict_has_its_words() {

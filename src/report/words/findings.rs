@@ -1,8 +1,7 @@
 //! The findings: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::diagnosis::{
-    gap_in_short, gap_story, listed, missing, shows_gap, stiffness_with_limits,
-};
+use super::diagnosis::{gap_in_short, gap_story, listed, missing, shows_gap};
+use super::sizes::stiffness_with_limits;
 use crate::document::{
     Document, EstimateSection, HeadlineSection, HeadlineValue, PredictionSection, ReadBy,
 };

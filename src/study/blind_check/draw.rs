@@ -21,6 +21,7 @@ use tapjoint_description::{DescriptionError, TestDescription};
 use tapjoint_diagnosis::{
     DETECTABLE, GapError, GapSettings, Hypothesis, diagnose, nominal_chi_square, observe,
 };
+use tapjoint_identify::consistent::Parameter;
 use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
 use tapjoint_simulate::{
     Damping, Laboratory, ObservedStructure, SimulateError, TestPlan, VirtualRecording, add_noise,
@@ -226,15 +227,12 @@ impl Campaign {
 /// Standard deviations of what the tolerances leave open up to which a common factor on all frequencies is no effect.
 const COVERED: f64 = 2.0;
 
-/// Power with which a property enters the frequencies of a beam, h/L^2 sqrt(E/rho), and the clock; 0 where it is no common
-/// factor on all of them. The width has almost no influence.
+/// Power with which the quantity that an effect changes enters all frequencies, the clock's among them; 0 where it is no
+/// common factor.
 fn power_of(effect: EffectId) -> f64 {
     match effect {
-        EffectId::Modulus => 0.5,
-        EffectId::Thickness | EffectId::Timebase => 1.0,
-        EffectId::Density => -0.5,
-        EffectId::Length => -2.0,
-        _ => 0.0,
+        EffectId::Timebase => 1.0,
+        _ => Parameter::of_effect(effect).map_or(0.0, Parameter::frequency_power),
     }
 }
 
@@ -247,15 +245,15 @@ fn within_tolerance(effects: &[Effect], description: &TestDescription) -> Option
         .collect();
     let (beam, tolerance) = (&description.beam, &description.beam.tolerance);
     let variances = [
-        (EffectId::Modulus, tolerance.modulus.std / beam.modulus),
+        (Parameter::Modulus, tolerance.modulus.std / beam.modulus),
         (
-            EffectId::Thickness,
+            Parameter::Thickness,
             tolerance.thickness.std / beam.thickness,
         ),
-        (EffectId::Density, tolerance.density.std / beam.density),
-        (EffectId::Length, tolerance.length.std / beam.length),
+        (Parameter::Density, tolerance.density.std / beam.density),
+        (Parameter::Length, tolerance.length.std / beam.length),
     ]
-    .map(|(property, relative)| (power_of(property) * relative).powi(2));
+    .map(|(property, relative)| (property.frequency_power() * relative).powi(2));
     let std = variances.iter().sum::<f64>().sqrt();
     (!changes.is_empty()).then(|| changes.iter().sum::<f64>().abs() < COVERED * std)
 }

@@ -5,4 +5,6 @@
 mod plate;
 mod sections;
 mod set_up;
+mod shared;
+mod specimen;
 mod width;

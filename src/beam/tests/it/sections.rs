@@ -1,23 +1,11 @@
 //! Sections that differ from the rest of the beam, and sprung masses.
 
+use super::shared::{MESH, assert_close, frequencies, strip};
 use std::f64::consts::PI;
 use tapjoint_beam::specimen::{
     BeamModes, BeamSection, Hinge, LapLayout, Mesh, PointMass, Resonator, Specimen,
 };
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
-
-const MESH: Mesh = Mesh::SIMULATION;
-
-fn strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
 
 fn jointed(theory: BeamTheory, beam: &Beam, assembly: Assembly, kx: f64, ky: f64) -> Specimen {
     // Springs of the strip, whatever the beam.
@@ -35,23 +23,6 @@ fn clamped() -> Specimen {
         rigid,
         rigid,
     )
-}
-
-fn frequencies(specimen: &Specimen, count: usize, mesh: Mesh) -> Vec<f64> {
-    let modes = specimen.modes(count, mesh).unwrap();
-    modes.frequencies().to_vec()
-}
-
-fn assert_close(found: &[f64], expected: &[f64], tolerance: f64, case: &str) {
-    assert_eq!(found.len(), expected.len(), "{case}");
-    for (mode, (a, b)) in found.iter().zip(expected).enumerate() {
-        let error = (a / b - 1.0).abs();
-        assert!(
-            error < tolerance,
-            "{case}, mode {}: {a} for {b}, off by {error:e}",
-            mode + 1
-        );
-    }
 }
 
 /// All assemblies, each with either theory.

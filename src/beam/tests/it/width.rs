@@ -1,32 +1,17 @@
 //! Stiffening by the width: against a plate, in the limits, and by both routes of the theory.
 
 use super::plate;
+use super::shared::{MESH, frequencies, strip};
 use tapjoint_beam::interface::{InterfaceModes, JointedBody, LAST_STEP};
 use tapjoint_beam::specimen::{Hinge, LapLayout, Mesh, PointMass, Specimen};
 use tapjoint_beam::{
     Assembly, Beam, BeamTheory, JointStiffness, WidthStiffening, natural_frequencies, natural_modes,
 };
 
-fn strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
-
 fn jointed(beam: &Beam, assembly: Assembly, joint: &JointStiffness) -> Specimen {
     let (theory, layout) = (BeamTheory::Timoshenko, LapLayout::default());
     let springs = (assembly != Assembly::Free).then(|| joint.in_si(beam));
     Specimen::jointed(theory, beam, assembly, &layout, springs)
-}
-
-fn frequencies(specimen: &Specimen, count: usize) -> Vec<f64> {
-    let modes = specimen.modes(count, Mesh::SIMULATION).unwrap();
-    modes.frequencies().to_vec()
 }
 
 #[test]
@@ -47,9 +32,9 @@ fn val_corrections_are_those_of_a_plate() {
         };
         let euler = natural_frequencies(BeamTheory::Euler, &beam, assembly, &joint, 6).unwrap();
         let specimen = jointed(&beam, assembly, &joint);
-        let mut found = frequencies(&specimen, 6);
+        let mut found = frequencies(&specimen, 6, MESH);
         if support == "clamp" {
-            let more = specimen.clamp_differences(6, Mesh::SIMULATION).unwrap();
+            let more = specimen.clamp_differences(6, MESH).unwrap();
             for (frequency, more) in found.iter_mut().zip(more) {
                 *frequency *= 1.0 + more;
             }
@@ -107,7 +92,7 @@ fn prop_frequency_equation_and_specimen_agree() {
             if with_mass {
                 specimen.masses.push(PointMass::new(0.2, 0.02));
             }
-            let exact = frequencies(&specimen, 7);
+            let exact = frequencies(&specimen, 7, MESH);
             let body = body_of(&specimen);
             for (mode, exact) in (1..).zip(&exact) {
                 let guess = 3.0 * mode as f64;
@@ -166,7 +151,7 @@ fn limit_a_section_without_poissons_ratio_does_not_curl() {
         for poisson in [0.0, 1e-9] {
             let specimen = jointed(&Beam { poisson, ..beam }, assembly, &joint);
             assert_eq!(specimen.is_stiffened(), poisson > 0.0);
-            for (exact, found) in exact.iter().zip(frequencies(&specimen, 6)) {
+            for (exact, found) in exact.iter().zip(frequencies(&specimen, 6, MESH)) {
                 let exact = beam.frequency_of(exact.lambda);
                 // What elements leave in the sixth mode.
                 let off = (found / exact - 1.0).abs();
@@ -175,7 +160,7 @@ fn limit_a_section_without_poissons_ratio_does_not_curl() {
                     "{assembly:?} {joint:?} {poisson}: {found} against {exact}"
                 );
             }
-            let more = specimen.clamp_differences(6, Mesh::SIMULATION).unwrap();
+            let more = specimen.clamp_differences(6, MESH).unwrap();
             // nu^2, and what rounding leaves of two solutions.
             assert!(more.iter().all(|more| more.abs() < 1e-8), "{more:?}");
         }
@@ -245,7 +230,7 @@ fn prop_the_correction_is_smooth_in_width_and_poisson() {
             thickness: 1e-5,
             ..strip()
         };
-        frequencies(&jointed(&beam, Assembly::Cantilever, &joint), 6)
+        frequencies(&jointed(&beam, Assembly::Cantilever, &joint), 6, MESH)
     };
     let at = of(0.05, 0.3);
     for (by_width, by_poisson) in [(1e-4, 0.0), (0.0, 1e-3)] {
@@ -313,10 +298,10 @@ fn prop_springs_lie_between_a_free_and_a_clamped_end() {
             width_stiffening: WidthStiffening::FreeAtJoint,
             ..nominal.clone()
         };
-        let more = nominal.clamp_differences(6, Mesh::SIMULATION).unwrap();
-        let pairs = frequencies(&nominal, 6)
+        let more = nominal.clamp_differences(6, MESH).unwrap();
+        let pairs = frequencies(&nominal, 6, MESH)
             .into_iter()
-            .zip(frequencies(&free, 6));
+            .zip(frequencies(&free, 6, MESH));
         for ((own, free), more) in pairs.zip(more) {
             let case = format!("{assembly:?} {joint:?}: {own} {free} {more}");
             assert!(own >= free * (1.0 - 1e-9), "{case}");
@@ -351,7 +336,7 @@ fn val_the_middle_line_moves_by_the_curling_of_the_section() {
             &JointStiffness::two_parameter(0.0, 0.0),
         )
     };
-    let modes = free.modes(1, Mesh::SIMULATION).unwrap();
+    let modes = free.modes(1, MESH).unwrap();
     let (beam, step) = (strip(), 1e-3 * strip().length);
     let middle = 0.5 * beam.length;
     let bend = (modes.slope(0, middle + step) - modes.slope(0, middle - step)) / (2.0 * step);
@@ -363,7 +348,7 @@ fn val_the_middle_line_moves_by_the_curling_of_the_section() {
         width_stiffening: WidthStiffening::Ignored,
         ..free
     };
-    let modes = euler.modes(1, Mesh::SIMULATION).unwrap();
+    let modes = euler.modes(1, MESH).unwrap();
     assert_eq!(
         modes.middle_displacement(0, middle),
         modes.displacement(0, middle)

@@ -1,20 +1,20 @@
 //! The tested structure with everything fastened to it, against independent solutions.
 
-use crate::shared::steel_strip;
+use super::shared::{MESH, assert_close, frequencies, strip};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::{
     Base, Body, Hinge, Joint, LapLayout, LapOverlap, Mesh, PointInertia, PointMass, PointSpring,
     Specimen, SpecimenModes,
 };
-use tapjoint::structure::{
+use tapjoint_beam::{
     Assembly, Beam, BeamTheory, JointStiffness, StructureError, mode_shapes, natural_frequencies,
     natural_modes,
 };
 
 fn springs(kx: f64, ky: f64, coupling: f64) -> Option<Joint> {
-    let units = StiffnessUnits::of(&steel_strip());
+    let units = StiffnessUnits::of(&strip());
     Some(Joint {
         kt: kx * units.kt,
         kr: ky * units.kr,
@@ -23,11 +23,11 @@ fn springs(kx: f64, ky: f64, coupling: f64) -> Option<Joint> {
 }
 
 fn cantilever(kx: f64, ky: f64, coupling: f64) -> Specimen {
-    Specimen::new(Body::One(steel_strip()), springs(kx, ky, coupling))
+    Specimen::new(Body::One(strip()), springs(kx, ky, coupling))
 }
 
 fn lap(kx: f64, ky: f64) -> Specimen {
-    let beam = steel_strip();
+    let beam = strip();
     let half = Beam {
         length: 0.5 * beam.length,
         ..beam
@@ -36,24 +36,7 @@ fn lap(kx: f64, ky: f64) -> Specimen {
 }
 
 fn free() -> Specimen {
-    Specimen::new(Body::One(steel_strip()), None)
-}
-
-fn frequencies(specimen: &Specimen, count: usize, elements: usize) -> Vec<f64> {
-    let modes = specimen.modes(count, Mesh { elements }).unwrap();
-    modes.frequencies().to_vec()
-}
-
-fn assert_close(found: &[f64], expected: &[f64], tolerance: f64, case: &str) {
-    assert_eq!(found.len(), expected.len(), "{case}");
-    for (mode, (a, b)) in found.iter().zip(expected).enumerate() {
-        let error = (a / b - 1.0).abs();
-        assert!(
-            error < tolerance,
-            "{case}, mode {}: {a} for {b}, off by {error:e}",
-            mode + 1
-        );
-    }
+    Specimen::new(Body::One(strip()), None)
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -68,13 +51,13 @@ fn agrees_with_closed_form(specimen: &Specimen, assembly: Assembly, joint: &Join
             ..specimen.clone()
         };
         // Neither has the stiffening by the width.
-        let beam = steel_strip();
+        let beam = strip();
         let exact = natural_modes(assembly, joint, &beam.slenderness(theory), 7).unwrap();
         let exact: Vec<f64> = exact
             .iter()
             .map(|mode| beam.frequency_of(mode.lambda))
             .collect();
-        let found = frequencies(&specimen, 7, Mesh::DIAGNOSIS.elements);
+        let found = frequencies(&specimen, 7, Mesh::DIAGNOSIS);
         let case = format!("{theory:?} {assembly:?} {joint:?}");
         assert_close(&found, &exact, 1e-7, &case);
     }
@@ -131,14 +114,14 @@ fn limit_lap_joint_is_the_closed_form() {
 #[test]
 fn limit_two_separate_halves_have_every_frequency_twice() {
     let half = Beam {
-        length: 0.5 * steel_strip().length,
-        ..steel_strip()
+        length: 0.5 * strip().length,
+        ..strip()
     };
     let free = JointStiffness::FREE;
     let single = natural_frequencies(BeamTheory::Euler, &half, Assembly::Free, &free, 3).unwrap();
     let twice: Vec<f64> = single.iter().flat_map(|f| [*f, *f]).collect();
     assert_close(
-        &frequencies(&lap(0.0, 0.0), 6, 60),
+        &frequencies(&lap(0.0, 0.0), 6, Mesh::DIAGNOSIS),
         &twice,
         1e-7,
         "no joint",
@@ -148,7 +131,7 @@ fn limit_two_separate_halves_have_every_frequency_twice() {
 #[test]
 fn prop_shapes_are_those_of_the_closed_form_and_of_unit_modal_mass() {
     let joint = JointStiffness::two_parameter(1400.0, 1.2);
-    let beam = steel_strip();
+    let beam = strip();
     let exact = mode_shapes(&beam, Assembly::Cantilever, &joint, 5).unwrap();
     let modes = cantilever(1400.0, 1.2, 0.0)
         .modes(5, Mesh::DIAGNOSIS)
@@ -253,7 +236,7 @@ fn transfer_frequencies(joint: (f64, f64), stations: &[Station], count: usize) -
                     a = middle
                 }
             }
-            roots.push(steel_strip().frequency_of(0.5 * (a + b)));
+            roots.push(strip().frequency_of(0.5 * (a + b)));
         }
         low = high;
     }
@@ -264,7 +247,7 @@ const JOINT: (f64, f64) = (1400.0, 1.2);
 
 /// The specimen with the stations' parts.
 fn equipped(stations: &[Station]) -> Specimen {
-    let beam = steel_strip();
+    let beam = strip();
     let units = StiffnessUnits::of(&beam);
     let mut specimen = cantilever(JOINT.0, JOINT.1, 0.0);
     for station in stations {
@@ -290,8 +273,13 @@ fn equipped(stations: &[Station]) -> Specimen {
 fn agrees_with_transfer_matrices(stations: &[Station], case: &str) {
     let exact = transfer_frequencies(JOINT, stations, 7);
     let specimen = equipped(stations);
-    assert_close(&frequencies(&specimen, 7, 200), &exact, 2e-7, case);
-    assert_close(&frequencies(&specimen, 7, 60), &exact, 5e-6, case);
+    assert_close(&frequencies(&specimen, 7, MESH), &exact, 2e-7, case);
+    assert_close(
+        &frequencies(&specimen, 7, Mesh::DIAGNOSIS),
+        &exact,
+        5e-6,
+        case,
+    );
 }
 
 #[test]
@@ -315,7 +303,7 @@ fn limit_mass_agrees_with_the_frequency_equation() {
 #[test]
 fn val_clamped_beam_with_a_mass_at_its_end() {
     // 1 + cos cosh = mu lambda (sin cosh - cos sinh) for a clamped beam.
-    let beam = steel_strip();
+    let beam = strip();
     let mut specimen = cantilever(f64::INFINITY, f64::INFINITY, 0.0);
     for mu in [0.05, 1.0, 10.0] {
         specimen.masses = vec![PointMass {
@@ -323,7 +311,7 @@ fn val_clamped_beam_with_a_mass_at_its_end() {
             mass: mu * beam.mass(),
             inertia: 0.0,
         }];
-        for frequency in frequencies(&specimen, 5, 200) {
+        for frequency in frequencies(&specimen, 5, MESH) {
             let x = beam.lambda_of(frequency);
             let left = 1.0 / x.cosh() + x.cos();
             let right = mu * x * (x.sin() - x.cos() * x.tanh());
@@ -384,7 +372,7 @@ fn limit_spring_and_inertia_agree_with_transfer_matrices() {
 fn limit_a_crack_at_the_root_softens_the_joint() {
     let (kx, ky) = (1400.0, 3.0);
     let mut cracked = cantilever(kx, ky, 0.0);
-    let units = StiffnessUnits::of(&steel_strip());
+    let units = StiffnessUnits::of(&strip());
     cracked.hinges.push(Hinge {
         position: 0.0,
         compliance: 0.5 / units.kr,
@@ -393,8 +381,8 @@ fn limit_a_crack_at_the_root_softens_the_joint() {
     // Two ways to the same structure, but in an element with a hinge the second-order term is that
     // of one without.
     assert_close(
-        &frequencies(&cracked, 7, 60),
-        &frequencies(&softer, 7, 60),
+        &frequencies(&cracked, 7, Mesh::DIAGNOSIS),
+        &frequencies(&softer, 7, Mesh::DIAGNOSIS),
         1e-6,
         "root",
     );
@@ -402,7 +390,7 @@ fn limit_a_crack_at_the_root_softens_the_joint() {
 
 #[test]
 fn limit_masses_between_nodes_of_a_stocky_beam_are_right_to_one_in_ten_thousand() {
-    let strip = steel_strip();
+    let strip = strip();
     let stocky = Beam {
         thickness: 0.08 * strip.length,
         ..strip
@@ -421,8 +409,8 @@ fn limit_masses_between_nodes_of_a_stocky_beam_are_right_to_one_in_ten_thousand(
                 Specimen::jointed(theory, &stocky, Assembly::Cantilever, &layout, Some(joint));
             loaded.masses = vec![PointMass::new(place * stocky.length, share * stocky.mass())];
             // Of so many elements this one has a node at each of these places.
-            let exact = frequencies(&loaded, 7, 480);
-            let found = frequencies(&loaded, 7, Mesh::DIAGNOSIS.elements);
+            let exact = frequencies(&loaded, 7, Mesh { elements: 480 });
+            let found = frequencies(&loaded, 7, Mesh::DIAGNOSIS);
             assert_close(&found, &exact, 1e-4, &format!("{share} at {place}"));
         }
     }
@@ -430,9 +418,9 @@ fn limit_masses_between_nodes_of_a_stocky_beam_are_right_to_one_in_ten_thousand(
 
 #[test]
 fn prop_frequencies_are_smooth_where_a_part_crosses_a_node() {
-    let step = 1e-4 * steel_strip().length;
-    let node = steel_strip().length * 20.0 / 60.0;
-    let units = StiffnessUnits::of(&steel_strip());
+    let step = 1e-4 * strip().length;
+    let node = strip().length * 20.0 / 60.0;
+    let units = StiffnessUnits::of(&strip());
     let at = |position: f64| {
         let mut specimen = cantilever(1400.0, 1.2, 0.0);
         specimen.hinges.push(Hinge {
@@ -444,7 +432,7 @@ fn prop_frequencies_are_smooth_where_a_part_crosses_a_node() {
             mass: 0.03,
             inertia: 0.0,
         });
-        frequencies(&specimen, 7, 60)
+        frequencies(&specimen, 7, Mesh::DIAGNOSIS)
     };
     let places = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|steps| at(node + steps * step));
     for mode in 0..7 {
@@ -467,12 +455,12 @@ fn thick(ratio: f64) -> Beam {
     Beam {
         length: 1.0,
         thickness: ratio,
-        ..steel_strip()
+        ..strip()
     }
 }
 
 fn lambdas(specimen: &Specimen, beam: &Beam, count: usize) -> Vec<f64> {
-    let found = frequencies(specimen, count, 200);
+    let found = frequencies(specimen, count, MESH);
     found.iter().map(|f| beam.lambda_of(*f)).collect()
 }
 
@@ -587,7 +575,7 @@ fn limit_shear_and_rotary_inertia_scale_between_the_theories() {
     let mut specimen = cantilever(1400.0, 1.2, 0.0);
     let at = |specimen: &mut Specimen, share: f64| {
         specimen.shear_rotary = share;
-        frequencies(specimen, 5, 60)
+        frequencies(specimen, 5, Mesh::DIAGNOSIS)
     };
     let [none, half, full] = [0.0, 0.5, 1.0].map(|share| at(&mut specimen, share));
     for mode in 0..5 {
@@ -620,17 +608,17 @@ fn val_tension_of_a_supported_beam() {
             .collect();
         // The end's stiff springs leave 1e-7, near buckling ten times as much.
         let case = format!("{share} of Euler's force");
-        assert_close(&frequencies(&specimen, 5, 200), &expected, 2e-6, &case);
+        assert_close(&frequencies(&specimen, 5, MESH), &expected, 2e-6, &case);
     }
 }
 
 #[test]
 fn limit_beyond_eulers_force_the_beam_buckles() {
     let mut specimen = cantilever(f64::INFINITY, f64::INFINITY, 0.0);
-    let beam = steel_strip();
+    let beam = strip();
     let euler = 0.25 * PI * PI * beam.bending_stiffness() / beam.length.powi(2);
     specimen.axial_force = -0.9999 * euler;
-    assert!(frequencies(&specimen, 1, 60)[0] < 0.4);
+    assert!(frequencies(&specimen, 1, Mesh::DIAGNOSIS)[0] < 0.4);
     specimen.axial_force = -1.0001 * euler;
     let error = specimen.modes(1, Mesh::DIAGNOSIS).unwrap_err().to_string();
     assert!(error.contains("buckles"), "{error}");
@@ -653,8 +641,8 @@ fn limit_joint_mass_is_a_mass_at_the_root() {
         inertia: 1e-5,
     });
     let (a, b) = (
-        frequencies(&with_joint_mass, 5, 60),
-        frequencies(&with_mass, 5, 60),
+        frequencies(&with_joint_mass, 5, Mesh::DIAGNOSIS),
+        frequencies(&with_mass, 5, Mesh::DIAGNOSIS),
     );
     assert_close(&a, &b, 1e-12, "joint mass");
     // Of a lap joint with rigid springs both halves are one mass in the middle.
@@ -662,13 +650,13 @@ fn limit_joint_mass_is_a_mass_at_the_root() {
     joined.joint_mass.mass = 0.05;
     let mut whole = free();
     whole.masses.push(PointMass {
-        position: 0.5 * steel_strip().length,
+        position: 0.5 * strip().length,
         mass: 0.05,
         inertia: 0.0,
     });
     assert_close(
-        &frequencies(&joined, 5, 60),
-        &frequencies(&whole, 5, 60),
+        &frequencies(&joined, 5, Mesh::DIAGNOSIS),
+        &frequencies(&whole, 5, Mesh::DIAGNOSIS),
         1e-10,
         "lap",
     );
@@ -685,8 +673,8 @@ fn limit_a_short_overlap_is_a_joint_mass() {
     point.joint_mass.mass = 0.05;
     // The overlap's length is 2e-6 of the beam's.
     assert_close(
-        &frequencies(&spread, 5, 60),
-        &frequencies(&point, 5, 60),
+        &frequencies(&spread, 5, Mesh::DIAGNOSIS),
+        &frequencies(&point, 5, Mesh::DIAGNOSIS),
         1e-5,
         "overlap",
     );
@@ -697,7 +685,7 @@ fn limit_a_short_overlap_is_a_joint_mass() {
 fn val_fixture_has_the_frequencies_of_two_inertias() {
     let beam = Beam {
         modulus: 207e15,
-        ..steel_strip()
+        ..strip()
     };
     let kr = 300.0;
     let mut specimen = Specimen::new(
@@ -724,7 +712,12 @@ fn val_fixture_has_the_frequencies_of_two_inertias() {
         let expected = expected.map(|square| square.sqrt() / (2.0 * PI));
         // The bar bends 1e-6 of what the spring gives, and the matrix is as badly conditioned.
         let case = format!("base {frequency} Hz, ratio {ratio}");
-        assert_close(&frequencies(&specimen, 2, 6), &expected, 1e-5, &case);
+        assert_close(
+            &frequencies(&specimen, 2, Mesh { elements: 6 }),
+            &expected,
+            1e-5,
+            &case,
+        );
     }
 }
 
@@ -746,13 +739,18 @@ fn prop_base_adds_one_mode_that_is_its_own() {
     assert!((frequency / 300.0 - 1.0).abs() < 1e-3, "{frequency}");
     let mut others = modes.frequencies().to_vec();
     others.remove(own[0]);
-    assert_close(&others, &frequencies(&plain, 5, 60), 1e-3, "the others");
+    assert_close(
+        &others,
+        &frequencies(&plain, 5, Mesh::DIAGNOSIS),
+        1e-3,
+        "the others",
+    );
 }
 
 #[test]
 fn prop_suspension_is_listed_apart() {
     let mut specimen = free();
-    let (mass, length) = (steel_strip().mass(), steel_strip().length);
+    let (mass, length) = (strip().mass(), strip().length);
     for position in [0.25 * length, 0.75 * length] {
         specimen.springs.push(PointSpring {
             position,
@@ -775,7 +773,7 @@ fn prop_suspension_is_listed_apart() {
     );
     assert_close(
         modes.frequencies(),
-        &frequencies(&free(), 5, 60),
+        &frequencies(&free(), 5, Mesh::DIAGNOSIS),
         1e-3,
         "bending",
     );
@@ -800,12 +798,12 @@ fn prop_joint_energy_is_the_sensitivity_to_its_stiffness() {
     let stiffer = frequencies(
         &cantilever(1400.0 * (1.0 + step), 1.2 * (1.0 + step), 0.3),
         5,
-        60,
+        Mesh::DIAGNOSIS,
     );
     let softer = frequencies(
         &cantilever(1400.0 * (1.0 - step), 1.2 * (1.0 - step), 0.3),
         5,
-        60,
+        Mesh::DIAGNOSIS,
     );
     for mode in 0..5 {
         // d ln f/d ln k = half the share of the strain energy.
@@ -841,7 +839,7 @@ fn limit_a_base_from_nothing_has_the_right_derivative() {
         frequency: 5000.0,
         ratio: 1e-5,
     });
-    let exact = frequencies(&based, 4, 60);
+    let exact = frequencies(&based, 4, Mesh::DIAGNOSIS);
     let found = modes.rayleigh_frequencies(&based).unwrap();
     for mode in 0..4 {
         let [a, b] = [exact[mode], found[mode]].map(|f| f / modes.frequencies()[mode] - 1.0);
@@ -874,13 +872,13 @@ proptest! {
         (place, share, compliance) in (0.05..0.95, 0.0..0.3, 0.0..0.03),
         base in 30.0..900.0,
     ) {
-        let length = steel_strip().length;
+        let length = strip().length;
         let specimen = |more: f64| {
             let mut one = cantilever(kx * more, ky / more, coupling);
             one.base = Some(Base { frequency: base * more, ratio: 0.02 });
             one.masses.push(PointMass {
                 position: place * length,
-                mass: more * share * steel_strip().mass(),
+                mass: more * share * strip().mass(),
                 inertia: 0.0,
             });
             one.hinges.push(Hinge { position: (1.0 - place) * length * more, compliance });

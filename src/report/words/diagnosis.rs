@@ -367,6 +367,10 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
 fn scale_of(effects: &[EffectId], gap: &GapSection) -> String {
     let factor = gap.common_factor.as_ref();
     match factor.filter(|_| effects.iter().all(|one| one.group() == Group::Scale)) {
+        Some(factor) if factor.tolerance_percent == 0.0 => format!(
+            " All frequencies ask for {} %; the description says that it is exact.",
+            asked(factor)
+        ),
         Some(factor) => format!(
             " All frequencies ask for {} %; the description leaves \u{b1}{} % open.",
             asked(factor),

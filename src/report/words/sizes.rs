@@ -20,6 +20,8 @@ pub(crate) fn sizes(found: &HypothesisResult) -> String {
         ),
         Some(std) => parameter.name != "inertia" || std != 0.0,
     });
+    // An error that stays through the test belongs to no recording.
+    sorted.retain(|parameter| parameter.name != "recording" || parameter.value != 0.0);
     let of_effects = sorted.chunk_by(|one, next| one.effect == next.effect);
     let parts: Vec<String> = of_effects
         .map(|own| {
@@ -34,6 +36,14 @@ pub(crate) fn sizes(found: &HypothesisResult) -> String {
 }
 
 fn size(parameter: &ParameterValue) -> String {
+    // Numbers of things of the set-up; 0 is all of them.
+    if matches!(parameter.name, "sensor" | "other" | "recording") {
+        let what = parameter.name.replace("other", "and");
+        return match parameter.value {
+            0.0 => format!("all {what}s"),
+            number => format!("{what} {number:.0}"),
+        };
+    }
     let (unit, factor) = unit_of(parameter);
     let value = factor * parameter.value;
     let known = parameter.std.map(|std| factor * std);
@@ -140,6 +150,12 @@ mod tests {
         );
         let mass = parameter(EffectId::SensorMass, "mass", 0.024, None);
         assert_eq!(of(vec![mass.clone()]), "mass 24.0 g");
+        let whole = |name, value| parameter(EffectId::SensorScale, name, value, None);
+        let scale = parameter(EffectId::SensorScale, "relative", 0.1, Some(0.01));
+        let of_all = of(vec![scale, whole("sensor", 0.0), whole("recording", 0.0)]);
+        assert_eq!(of_all, "relative 10.0 \u{b1} 1.0 %, all sensors");
+        let of_one = of(vec![whole("sensor", 2.0), whole("recording", 1.0)]);
+        assert_eq!(of_one, "recording 1, sensor 2");
         let crack = parameter(EffectId::LocalCrack, "compliance", 0.01, None);
         let words = "local-crack: compliance 0.0100 L/EI; sensor-mass: mass 24.0 g";
         assert_eq!(of(vec![mass, crack]), words);

@@ -9,7 +9,7 @@
 //! which something is named. "Set-up errors" are positions off by 5 mm or more, polarity, swapped channels, and scales
 //! off by 10 % or more. "Visible" are the tests in which the model without the fault leaves a chi square of 14.9, without
 //! noise, drift and errors of the description: one in a hundred false alarms and one in ten misses, for an observer who
-//! knows what to look for. Of two effects each is visible alone.
+//! knows what to look for. Two effects are drawn until each is visible alone.
 //!
 //! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--list] [--json FILE]`
 //!

@@ -157,8 +157,8 @@ pub fn plan_needs(ids: &[EffectId]) -> PlanNeeds {
 
 /// Draws effects. `None` where a size is out of its range.
 ///
-/// Of two effects one that cannot be seen would leave a single one: each is the larger of two draws, and an error of
-/// the scale exceeds the tolerances.
+/// Of two effects each is the larger of two draws, and an error of the scale exceeds the tolerances: few tests are then
+/// drawn again because one of them cannot be seen.
 pub fn draw_effects(
     random: &mut ChaCha8Rng,
     ids: &[EffectId],

@@ -164,7 +164,7 @@ impl Measure {
     }
 }
 
-const MEASURES: [Measure; 22] = [
+const MEASURES: [Measure; 21] = [
     Measure {
         key: "first_class_right",
         title: "first class right",
@@ -239,11 +239,6 @@ const MEASURES: [Measure; 22] = [
         key: "pairs_found_or_refused",
         title: "pairs both found or refused",
         hit: pair_found_or_refused,
-    },
-    Measure {
-        key: "pairs_found_or_refused_visible",
-        title: "  visible",
-        hit: pair_found_or_refused_visible,
     },
     Measure {
         key: "pairs_found",
@@ -361,10 +356,6 @@ fn pair_found(trial: &Trial, answer: &Answer) -> Option<bool> {
 fn pair_found_or_refused(trial: &Trial, answer: &Answer) -> Option<bool> {
     let is_refused = matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData(_));
     pair_found(trial, answer).map(|is_found| is_found || is_refused)
-}
-
-fn pair_found_or_refused_visible(trial: &Trial, answer: &Answer) -> Option<bool> {
-    visible(trial, pair_found_or_refused(trial, answer))
 }
 
 /// Whether the list that holds 90 % holds what is true. Tests with two effects are scored for themselves.

@@ -4,7 +4,7 @@
 
 use crate::dataset::Dataset;
 use crate::fixture::unseen_frequencies;
-use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Size, Target};
+use crate::parameters::{CandidateEffect, Cause, LocationKind, LocationRange, Size, Target};
 use crate::result::LARGEST_STIFFNESS_CHANGE;
 use crate::structure::{COUPLING, Nominal, ROTATION};
 use tapjoint_beam::effects::{EffectId, Group};
@@ -13,7 +13,7 @@ impl CandidateEffect {
     /// Returns an error of the set-up.
     fn of_set_up(effect: EffectId, target: Target, size: Size) -> Self {
         CandidateEffect {
-            effect,
+            cause: Cause::Effect(effect),
             target,
             size,
             location: None,
@@ -93,7 +93,7 @@ pub fn candidate_effect(effect: EffectId, nominal: &Nominal, end: f64) -> Option
         _ => None,
     };
     Some(CandidateEffect {
-        effect,
+        cause: Cause::Effect(effect),
         target: Target::All,
         size,
         location: range.map(|(kind, low, high, nodes)| LocationRange {

@@ -6,16 +6,17 @@ use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
+use crate::foreign::{ForeignFit, fit_foreign};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::{Hypothesis, UnlocatedSensors};
-use crate::settings::{GapError, GapSettings};
+use crate::settings::{DETECTED, GapError, GapSettings};
 use crate::structure::Nominal;
 use crate::unknown::fit_unknown;
 use crate::validate::Residuals;
 use crate::verdict::{Candidate, set_probabilities};
 use rayon::prelude::*;
-use tapjoint_beam::effects::{EffectId, Group};
+use tapjoint_beam::effects::EffectId;
 use tapjoint_identify::observation::{Observations, ObservedSensor};
 
 /// Fits of all hypotheses.
@@ -197,7 +198,8 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add_any(one)).collect();
     let mut candidates: Vec<Candidate> = Vec::new();
     for (variants, fit) in effects.iter().zip(fits) {
-        candidates.extend(fit.map(|fit| single(variants[0].effect, fit)));
+        let effect = variants[0].effect();
+        candidates.extend(effect.zip(fit).map(|(effect, fit)| single(effect, fit)));
     }
     let one_stands = candidates.iter().any(|one| stands(&dataset, &one.fit));
     if !one_stands && !stands(&dataset, &none) {
@@ -233,7 +235,16 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         candidate.drift = drift;
         candidates.push(candidate);
     }
-    if let Some(fit) = fit_unknown(&dataset, &none) {
+    let most = candidates
+        .iter()
+        .map(|one| one.fit.log_evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut foreign: Vec<ForeignFit> = Vec::new();
+    // Where nothing is detected, no name is given that they could keep away.
+    if most - none.log_evidence >= DETECTED || !stands(&dataset, &none) {
+        foreign = fit_foreign(&dataset, &none, &candidates);
+    }
+    if let Some(fit) = fit_unknown(&dataset, &none, &foreign) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
     let baseline = fit_exact(&dataset, is_geometry).unwrap_or_else(|| none.clone());
@@ -268,26 +279,26 @@ fn add_large_effects(
 ) {
     // Errors of the set-up hardly move the frequencies, which are all that such a search looks at.
     let effects = effects.iter().flatten();
-    let effects: Vec<CandidateEffect> = effects
-        .filter(|one| one.effect.group() != Group::SetUp)
-        .copied()
-        .collect();
+    let effects: Vec<CandidateEffect> =
+        effects.filter(|one| !one.is_of_set_up()).copied().collect();
     let found: Vec<Option<Fit>> = effects
         .par_iter()
         .map(|effect| {
             let known = candidates
                 .iter()
-                .find(|one| one.effects() == [effect.effect]);
+                .find(|one| effect.effect().is_some_and(|id| one.effects() == [id]));
             add_by_multi_start(search, *effect, known.map(|one| &one.fit))
         })
         .collect();
     for (effect, fit) in effects.iter().zip(found) {
-        let Some(fit) = fit else { continue };
+        let Some((fit, id)) = fit.zip(effect.effect()) else {
+            continue;
+        };
         let mut known = candidates.iter_mut();
-        match known.find(|one| one.effects() == [effect.effect]) {
+        match known.find(|one| one.effects() == [id]) {
             Some(one) if fit.log_evidence > one.fit.log_evidence => one.fit = fit,
             Some(_) => {}
-            None => candidates.push(single(effect.effect, fit)),
+            None => candidates.push(single(id, fit)),
         }
     }
 }

@@ -192,7 +192,7 @@ impl<'a> PairSearch<'a> {
             fits.extend(search.add_from(second));
         }
         for start in &pair.starts {
-            let is_first = pair.first.effects() == [start.first()];
+            let is_first = effect_of(pair.first).cause == start.first();
             let search = self.beside(if is_first { first } else { second });
             fits.extend(settle(&search, std::slice::from_ref(start)));
         }
@@ -231,7 +231,11 @@ impl<'a> PairSearch<'a> {
         if !improves {
             return None;
         }
-        let effects = fit.effects.iter().map(|one| one.effect).collect();
+        let effects = fit
+            .effects
+            .iter()
+            .filter_map(CandidateEffect::effect)
+            .collect();
         Some(Candidate::new(Hypothesis::Effects(effects), fit))
     }
 }

@@ -405,7 +405,7 @@ fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{LocationKind, LocationRange, Target};
+    use crate::parameters::{Cause, LocationKind, LocationRange, Target};
     use tapjoint_beam::effects::EffectId;
 
     /// One stiffness and one size, with data that need not be linear in either.
@@ -438,7 +438,7 @@ mod tests {
             let layout = Layout {
                 joint: vec![0],
                 effects: vec![CandidateEffect {
-                    effect: EffectId::SensorMass,
+                    cause: Cause::Effect(EffectId::SensorMass),
                     target: Target::All,
                     size: self.size,
                     location: None,
@@ -581,7 +581,7 @@ mod tests {
         let layout = Layout {
             joint: vec![0],
             effects: vec![CandidateEffect {
-                effect: EffectId::AddedMass,
+                cause: Cause::Effect(EffectId::AddedMass),
                 target: Target::All,
                 size: size(0.0),
                 location: Some(LocationRange {

@@ -11,10 +11,9 @@ use crate::fixture::with_peaks;
 use crate::forward::Forward;
 use crate::modal_model::ModalModel;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
-use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
+use crate::parameters::{CandidateEffect, Cause, LocationKind, LocationRange, Prior};
 use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
 use crate::structure::COUPLING;
-use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits the nominal model with its joint free.
@@ -102,7 +101,7 @@ impl<'a> Search<'a> {
     /// probable.
     pub fn add_any(&self, variants: &[CandidateEffect]) -> Option<Fit> {
         match variants {
-            [one] if one.effect.group() != Group::SetUp => self.add(*one),
+            [one] if !one.is_of_set_up() => self.add(*one),
             _ => self.add_set_up_error(variants),
         }
     }
@@ -513,8 +512,8 @@ pub struct Start {
 
 impl Start {
     /// First of its effects.
-    pub fn first(&self) -> EffectId {
-        self.effects[0].effect
+    pub fn first(&self) -> Cause {
+        self.effects[0].cause
     }
 
     /// Returns whether another search for the same effects ended at the same optimum.

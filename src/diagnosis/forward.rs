@@ -264,6 +264,7 @@ impl<'a> Forward<'a> {
                 ..Circumstances::default()
             };
             let mut seen = apply(&effects, &nominal, &circumstances);
+            self.layout.add_foreign(parameters, &mut seen.specimen);
             keep_on_beam(&mut seen.specimen);
             let mut solved = all.iter();
             let (own, frequencies) = match solved.find(|one| one.seen.specimen == seen.specimen) {

@@ -44,6 +44,7 @@ mod effect_pairs;
 mod evidence;
 mod fit;
 mod fixture;
+mod foreign;
 mod forward;
 mod joint_motion;
 mod location_map;

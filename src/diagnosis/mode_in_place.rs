@@ -116,7 +116,7 @@ impl<'a> ModeInPlace<'a> {
                 .sum(),
             NuisanceParameter::AddedInertia => {
                 let effects = self.layout.effects.iter().enumerate();
-                let masses = effects.filter(|(_, one)| one.effect == EffectId::AddedMass);
+                let masses = effects.filter(|(_, one)| one.is(EffectId::AddedMass));
                 masses
                     .filter_map(|(k, one)| {
                         let mass = parameters[self.layout.size(k)];

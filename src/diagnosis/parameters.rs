@@ -10,8 +10,10 @@
 //! Sizes that belong to the structure are fractions of its own: masses of the beam's mass, compliances of L/(E I),
 //! axial forces of E I/L^2. Those of sensors, cables, rules and clocks are absolute.
 
+use crate::foreign::ForeignCause;
 use crate::structure::Nominal;
 use tapjoint_beam::effects::{Effect, EffectId, Group};
+use tapjoint_beam::specimen::Specimen;
 use tapjoint_identify::consistent::Parameter;
 
 /// Nuisance parameter: small, unknown, and shared by all hypotheses.
@@ -153,11 +155,20 @@ pub enum Target {
     Taps { tap: usize },
 }
 
+/// What a hypothesis adds to the described structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// An effect of the catalogue.
+    Effect(EffectId),
+    /// A cause outside the catalogue: a part of the hypothesis `unknown`.
+    Foreign(ForeignCause),
+}
+
 /// Effect with the priors of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateEffect {
-    /// The effect.
-    pub effect: EffectId,
+    /// The effect, or a cause outside the catalogue.
+    pub cause: Cause,
     /// What it acts on.
     pub target: Target,
     /// Parameter that is zero when there is no such effect.
@@ -209,6 +220,27 @@ pub enum LocationKind {
     Gyration,
     /// Translational compliance of a joint that is described as rigid (1), uniform in its logarithm.
     Translation,
+}
+
+impl CandidateEffect {
+    /// Returns the effect of the catalogue; `None` for a cause outside of it.
+    pub fn effect(&self) -> Option<EffectId> {
+        match self.cause {
+            Cause::Effect(effect) => Some(effect),
+            Cause::Foreign(_) => None,
+        }
+    }
+
+    /// Returns whether it is this effect.
+    pub fn is(&self, effect: EffectId) -> bool {
+        self.cause == Cause::Effect(effect)
+    }
+
+    /// Returns whether it is an error of the set-up.
+    pub fn is_of_set_up(&self) -> bool {
+        self.effect()
+            .is_some_and(|effect| effect.group() == Group::SetUp)
+    }
 }
 
 impl LocationRange {
@@ -379,37 +411,44 @@ impl Layout {
     /// Returns the sum of the sizes of all effects of a kind; 0 without any.
     pub fn size_of(&self, wanted: EffectId, parameters: &[f64]) -> f64 {
         let effects = self.effects.iter().enumerate();
-        let own = effects.filter(|(_, one)| one.effect == wanted);
+        let own = effects.filter(|(_, one)| one.is(wanted));
         own.map(|(k, _)| parameters[self.size(k)]).sum()
     }
 
     /// Returns whether one of its effects is an error of the set-up.
     pub fn has_set_up_error(&self) -> bool {
-        let mut effects = self.effects.iter();
-        effects.any(|one| one.effect.group() == Group::SetUp)
+        self.effects.iter().any(CandidateEffect::is_of_set_up)
     }
 
-    /// Returns the effects with the values that the parameters give them.
+    /// Adds the causes outside the catalogue to a specimen, with the sizes and places that the parameters give them.
+    pub fn add_foreign(&self, parameters: &[f64], specimen: &mut Specimen) {
+        for (index, candidate) in self.effects.iter().enumerate() {
+            if let Cause::Foreign(cause) = candidate.cause {
+                let place = self.location(index).map_or(0.0, |at| parameters[at]);
+                cause.add(parameters[self.size(index)], place, specimen);
+            }
+        }
+    }
+
+    /// Returns the effects of the catalogue with the values that the parameters give them.
     pub fn effects_at(&self, parameters: &[f64]) -> Option<Vec<Effect>> {
-        (0..self.effects.len())
-            .map(|index| {
-                let candidate = &self.effects[index];
+        let all = self.effects.iter().enumerate();
+        all.filter_map(|(index, candidate)| Some((index, candidate, candidate.effect()?)))
+            .map(|(index, candidate, effect)| {
                 let size = parameters[self.size(index)];
                 if candidate.size.is_fixed() {
-                    return Effect::from_pairs(candidate.effect, &[]).ok();
+                    return Effect::from_pairs(effect, &[]).ok();
                 }
                 let mut pairs = vec![(candidate.size.name, size)];
                 // A joint that is rigid in translation alone does not turn the more.
-                if candidate.effect == EffectId::JointCompliance
-                    && candidate.size.name != "rotation"
-                {
+                if effect == EffectId::JointCompliance && candidate.size.name != "rotation" {
                     pairs.push(("rotation", 0.0));
                 }
                 if let (Some(range), Some(location)) = (candidate.location, self.location(index)) {
                     let value = range.value_at(parameters[location]);
                     pairs.push((range.name(), range.own_value(value, size)));
                 }
-                Effect::from_pairs(candidate.effect, &pairs).ok()
+                Effect::from_pairs(effect, &pairs).ok()
             })
             .collect()
     }

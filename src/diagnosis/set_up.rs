@@ -48,7 +48,9 @@ impl SetUp {
         }
         for (k, one) in layout.effects.iter().enumerate() {
             let size = parameters[layout.size(k)];
-            set_up.add(one.effect, one.target, size, arrangement);
+            if let Some(effect) = one.effect() {
+                set_up.add(effect, one.target, size, arrangement);
+            }
         }
         let length = arrangement.specimen.body.length();
         let masses = set_up.sensors.iter_mut().chain(&mut set_up.fastened);

@@ -209,6 +209,7 @@ impl<'a> Reference<'a> {
         let (values, stds) = (candidate.fit.parameters(), candidate.stds());
         let mut parameters = Vec::new();
         for (k, effect) in candidate.fit.effects.iter().enumerate() {
+            let Some(id) = effect.effect() else { continue };
             let at = layout.size(k);
             let (size, size_std) = (values[at], stds[at]);
             let detectable = DETECTABLE.sqrt() * size_std;
@@ -217,11 +218,11 @@ impl<'a> Reference<'a> {
                     smallest_detectable: Some(detectable).filter(|size| size.is_finite()),
                     smallest_separable: self
                         .smallest_separable(candidate, size - effect.size.neutral),
-                    ..value_of(effect.effect, effect.size.name, size, Some(size_std))
+                    ..value_of(id, effect.size.name, size, Some(size_std))
                 });
             }
             for (name, number) in numbers_of(&self.comparison.dataset, effect) {
-                parameters.push(value_of(effect.effect, name, number as f64, None));
+                parameters.push(value_of(id, name, number as f64, None));
             }
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
                 let value = range.value_at(values[location]);
@@ -233,7 +234,7 @@ impl<'a> Reference<'a> {
                     _ => std,
                 };
                 parameters.push(value_of(
-                    effect.effect,
+                    id,
                     range.name(),
                     range.own_value(value, size),
                     is_known.then_some(own_std),
@@ -263,7 +264,7 @@ fn numbers_of(dataset: &Dataset, candidate: &CandidateEffect) -> Vec<(&'static s
     let inventory = &dataset.inventory;
     let mut arrangements = dataset.arrangements.iter();
     match candidate.target {
-        Target::All if candidate.effect == EffectId::SensorScale => vec![("sensor", 0)],
+        Target::All if candidate.is(EffectId::SensorScale) => vec![("sensor", 0)],
         Target::All => Vec::new(),
         Target::Sensor { name } => vec![("sensor", number_of(dataset, name))],
         Target::Pair { names } => vec![

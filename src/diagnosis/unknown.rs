@@ -10,14 +10,18 @@
 //! - springs along the beam hold it to the ground, or take a support away that the description has;
 //! - all frequencies of one set-up are off by a factor of its own.
 //!
+//! Beside these stand causes with one size and one place ([`foreign`](crate::foreign)), and two masses. They are sought only
+//! where something is detected.
+//!
 //! By Rayleigh's quotient a relative change e(x) of E I moves ln f by (1/2) int e E I w''^2 dx/omega^2, of the mass by
 //! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. All
-//! kinds are equally probable. So are all ways of a kind, and all spreads of a way. The fourth kind needs several
+//! kinds are equally probable. So are all ways of a kind, and all spreads of a way. The last kind needs several
 //! set-ups. Slopes miss a part of what large changes do. Either they miss nothing, or a tenth of the change of each
 //! frequency, and a share of shapes and damping in proportion to the spread. Both are equally probable.
 
 use crate::dataset::{Dataset, ObservableKind};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
+use crate::foreign::ForeignFit;
 use crate::forward::Forward;
 use crate::location_map::{PIECES, local_slopes};
 use crate::modal_model::ModalModel;
@@ -39,16 +43,28 @@ const OF_SET_UPS: [f64; 3] = [5e-4, 2e-3, 8e-3];
 const ORDERS: usize = 6;
 
 /// Kinds of ways, which are equally probable; so are all ways of a kind.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
     /// Each mode for itself.
     Modes,
     /// Stiffness, mass or thickness along the beam.
     AlongBeam,
     /// Springs along the beam.
     Springs,
+    /// Things on the beam.
+    Things,
     /// Each set-up for itself.
     SetUps,
+}
+
+impl Kind {
+    const ALL: [Self; 5] = [
+        Self::Modes,
+        Self::AlongBeam,
+        Self::Springs,
+        Self::Things,
+        Self::SetUps,
+    ];
 }
 
 /// One way in which a structure may differ from its description.
@@ -63,7 +79,7 @@ struct Way {
 }
 
 /// Returns the fit of something unknown. Its parameters are those of the best discrepancy of each mode.
-pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
+pub fn fit_unknown(dataset: &Dataset, nominal: &Fit, foreign: &[ForeignFit]) -> Option<Fit> {
     let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
     let mut all: Vec<(Kind, f64)> = Vec::new();
     let mut modes: Option<LocalOptimum> = None;
@@ -85,10 +101,17 @@ pub fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
         }
         all.push((way.kind, log_mean(&logs)));
     }
-    let kinds = all.chunk_by(|a, b| a.0 == b.0);
-    let kinds = kinds.map(|ways| log_mean(&ways.iter().map(|way| way.1).collect::<Vec<f64>>()));
+    all.extend(foreign.iter().map(|one| (one.kind, one.log_evidence)));
+    let mut kinds: Vec<f64> = Vec::new();
+    for kind in Kind::ALL {
+        let ways = all.iter().filter(|way| way.0 == kind);
+        let logs: Vec<f64> = ways.map(|way| way.1).collect();
+        if !logs.is_empty() {
+            kinds.push(log_mean(&logs));
+        }
+    }
     Some(Fit {
-        log_evidence: log_mean(&kinds.collect::<Vec<f64>>()),
+        log_evidence: log_mean(&kinds),
         ..Fit::of_variants(vec![modes?])?
     })
 }

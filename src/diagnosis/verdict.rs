@@ -61,7 +61,7 @@ impl DegreesOfFreedom {
     /// ratios count for the effects that make them.
     pub fn of(dataset: &Dataset, fit: &Fit) -> Self {
         let [slips, damps] = [EffectId::JointNonlinearity, EffectId::JointDamping]
-            .map(|wanted| fit.effects.iter().any(|one| one.effect == wanted));
+            .map(|wanted| fit.effects.iter().any(|one| one.is(wanted)));
         let mut seen: Vec<(usize, &Arrangement)> = Vec::new();
         let mut others = 0;
         for observable in &dataset.observables {
@@ -161,7 +161,7 @@ fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
         let at = layout.size(k);
         let away = (fit.parameters()[at] - effect.size.neutral).abs();
         effect.size.is_fixed()
-            || effect.effect == EffectId::JointCompliance && effect.location.is_some()
+            || effect.is(EffectId::JointCompliance) && effect.location.is_some()
             || away >= SIZED * covariance[(at, at)].max(0.0).sqrt()
     })
 }

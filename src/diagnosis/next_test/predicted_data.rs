@@ -128,7 +128,7 @@ impl Posterior {
     /// Index of the size of one of its effects.
     fn size(&self, dataset: &Dataset, wanted: EffectId) -> Option<usize> {
         let layout = dataset.layout(&self.effects);
-        let index = self.effects.iter().position(|one| one.effect == wanted)?;
+        let index = self.effects.iter().position(|one| one.is(wanted))?;
         Some(layout.size(index))
     }
 

@@ -42,7 +42,7 @@ impl TestedStructure {
     pub fn shows(self, effect: &CandidateEffect) -> bool {
         match self {
             TestedStructure::Whole => true,
-            TestedStructure::Unbiased => effect.effect != EffectId::Resolution,
+            TestedStructure::Unbiased => !effect.is(EffectId::Resolution),
             TestedStructure::Bare => {
                 use EffectId::{AddedMass, Length, LocalCrack, Modulus, ShearRotary, Timebase};
                 let shown = [
@@ -53,7 +53,7 @@ impl TestedStructure {
                     LocalCrack,
                     ShearRotary,
                 ];
-                shown.contains(&effect.effect)
+                effect.effect().is_some_and(|id| shown.contains(&id))
             }
         }
     }

@@ -80,7 +80,7 @@ pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
             candidate.fit.log_evidence = *log;
         }
     }
-    set_probabilities(&mut comparison.candidates, 0);
+    set_probabilities(&mut comparison.candidates, 0, &test.settings.thresholds);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
 }

@@ -3,7 +3,7 @@
 use super::trial::{Answer, Explained, Trial};
 use serde_json::{Map, Value, json};
 use tapjoint::effects::{Effect, EffectId, Group};
-use tapjoint::gap::{SET_PROBABILITY, Verdict};
+use tapjoint::gap::{Thresholds, Verdict};
 use tapjoint::study::blind_check::Rate;
 
 /// Least errors of the set-up that should be named: 5 mm of a position, 10 % of a scale.
@@ -77,7 +77,7 @@ impl Scores {
         let listed: Vec<f64> = answered
             .iter()
             .filter(|(trial, _)| trial.truth.effects.len() < 2)
-            .map(|(_, answer)| answer.list(SET_PROBABILITY).len() as f64)
+            .map(|(_, answer)| answer.list(Thresholds::DEFAULT.set_probability).len() as f64)
             .collect();
         let stated = answered
             .iter()
@@ -361,7 +361,7 @@ fn pair_found_or_refused(trial: &Trial, answer: &Answer) -> Option<bool> {
 /// Whether the list that holds 90 % holds what is true. Tests with two effects are scored for themselves.
 fn list_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
     let truth = trial.truth.explained();
-    let mut list = answer.list(SET_PROBABILITY).iter();
+    let mut list = answer.list(Thresholds::DEFAULT.set_probability).iter();
     let holds = list.any(|one| one.0 == truth);
     (trial.truth.effects.len() < 2).then_some(holds)
 }

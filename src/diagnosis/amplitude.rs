@@ -7,7 +7,6 @@ use crate::forward::{Forward, slope_along_decay};
 use crate::joint_motion::JointMotion;
 use crate::modal_model::{ModalModel, joint_amplitude};
 use crate::result::{AmplitudeDependence, FrequencyChange, LARGEST_STIFFNESS_CHANGE};
-use crate::settings::{CHANGE_BY_CHANCE, LAW_DETECTED};
 use crate::structure::ROTATION;
 use tapjoint_beam::effects::{JointLaw, JointLawKind};
 use tapjoint_identify::observation::Observations;
@@ -156,7 +155,8 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
         datum.gaussian_square(datum.value / datum.std)
     });
     let chance = chi_square_tail(still.sum(), count)?;
-    if chance > CHANGE_BY_CHANCE {
+    let thresholds = &dataset.settings.thresholds;
+    if chance > thresholds.change_by_chance {
         return None;
     }
     let found = best_law(dataset, nominal)?;
@@ -181,7 +181,7 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
     let goodness = chi_square_tail(chi_square, count - 2.0);
     let (law, std) = (found.law, found.std);
     Some(AmplitudeDependence::new(
-        law, std, chance, goodness, changes,
+        law, std, chance, goodness, changes, thresholds,
     ))
 }
 
@@ -254,7 +254,7 @@ fn inflate_changes(dataset: &mut Dataset, models: &[ModalModel]) {
         dataset.data[row] = datum;
     }
     if let Some(one) = found
-        && one.law.ratio.abs() > LAW_DETECTED * one.std
+        && one.law.ratio.abs() > dataset.settings.thresholds.law_detected * one.std
     {
         inflate_shared(dataset, models, &one.law);
     }

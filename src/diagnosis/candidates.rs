@@ -143,6 +143,9 @@ pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
             all.push(vec![candidate]);
         }
     }
+    for candidate in all.iter_mut().flatten() {
+        candidate.size.scale *= dataset.settings.thresholds.prior_scale;
+    }
     all.retain(|variants| !variants.is_empty());
     all
 }

@@ -10,7 +10,7 @@ use crate::foreign::{ForeignFit, fit_foreign};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::{Hypothesis, UnlocatedSensors};
-use crate::settings::{DETECTED, GapError, GapSettings};
+use crate::settings::{GapError, GapSettings};
 use crate::structure::Nominal;
 use crate::unknown::fit_unknown;
 use crate::validate::Residuals;
@@ -81,7 +81,7 @@ pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
             candidate.fit.log_evidence = *log;
         }
     }
-    set_probabilities(&mut comparison.candidates, 0);
+    set_probabilities(&mut comparison.candidates, 0, &test.settings.thresholds);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
 }
@@ -241,7 +241,8 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         .fold(f64::NEG_INFINITY, f64::max);
     let mut foreign: Vec<ForeignFit> = Vec::new();
     // Where nothing is detected, no name is given that they could keep away.
-    if most - none.log_evidence >= DETECTED || !stands(&dataset, &none) {
+    if most - none.log_evidence >= dataset.settings.thresholds.detected || !stands(&dataset, &none)
+    {
         foreign = fit_foreign(&dataset, &none, &candidates);
     }
     if let Some(fit) = fit_unknown(&dataset, &none, &foreign) {

@@ -12,7 +12,7 @@ use crate::observations::{
     UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
 };
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
-use crate::settings::{DISTINCT_AMPLITUDES, GapSettings};
+use crate::settings::GapSettings;
 use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -298,9 +298,6 @@ const SLOPE_FLOOR: f64 = 5e-6;
 /// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
 const AMPLITUDE_STD: f64 = 0.25;
 
-/// Number of the highest modes that are spared for the closure, where there are enough. One alone says little about a root
-/// mean square.
-const SPARED_MODES: usize = 2;
 /// Number of modes that a next test may add.
 pub const MORE_MODES: usize = 2;
 
@@ -316,21 +313,22 @@ impl Dataset {
     pub fn new(observations: &Observations, nominal: &Nominal, settings: &GapSettings) -> Self {
         let highest = highest_mode(observations).min(settings.highest_mode);
         let observations = &up_to(highest, observations);
-        let spared = if highest >= settings.spare_modes_from {
-            SPARED_MODES
+        let thresholds = &settings.thresholds;
+        let spared = if highest >= thresholds.spare_modes_from {
+            thresholds.spared_modes
         } else {
             0
         };
         let tested = highest.saturating_sub(spared);
-        let held_out = if tested >= settings.withhold_from {
-            settings.withheld_modes
+        let held_out = if tested >= thresholds.withhold_from {
+            thresholds.withheld_modes
         } else {
             0
         };
         let mut inventory = Inventory::default();
         let configurations = observations.configurations.iter().enumerate();
         let arrangements = configurations
-            .map(|(index, one)| Arrangement::new(index, one, nominal, &mut inventory))
+            .map(|(index, one)| Arrangement::new(index, one, nominal, &mut inventory, thresholds))
             .collect();
         let mut dataset = Dataset {
             nominal: nominal.clone(),
@@ -349,7 +347,7 @@ impl Dataset {
             section: SectionSlopes::default(),
             shape_slopes: None,
             tilts: BTreeMap::new(),
-            peaks: UnpairedPeaks::new(observations),
+            peaks: UnpairedPeaks::new(observations, thresholds),
         };
         dataset.add_frequencies(observations, tested);
         dataset.add_shapes(observations);
@@ -393,7 +391,8 @@ impl Dataset {
             // The common part of a recording is far below the floor: as good as independent.
             datum.inflate_std(self.settings.frequency_floor.hypot(one.common));
             // Anywhere between the poles of a decay that was split, on either side of this one.
-            let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
+            let split = split_pole(one, observed, &self.settings.thresholds);
+            let split = split.unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
             let observable = Observable::frequency(configuration, mode);
             if mode > tested {
@@ -417,7 +416,7 @@ impl Dataset {
                 else {
                     continue;
                 };
-                if split_pole(one, observed).is_some() {
+                if split_pole(one, observed, &self.settings.thresholds).is_some() {
                     continue;
                 }
                 if let (Some(constant), Some(_)) = (observed.constant, one.tap) {
@@ -485,8 +484,8 @@ impl Dataset {
                 let Some(decay) = decay else { continue };
                 // Between the ends of the followed decay, where their amplitudes are known.
                 let ends = decay.early.amplitude.zip(decay.late.amplitude);
-                let ends =
-                    ends.filter(|(early, late)| *early > DISTINCT_AMPLITUDES * late && *late > 0.0);
+                let ratio = self.settings.thresholds.distinct_amplitudes;
+                let ends = ends.filter(|(early, late)| *early > ratio * late && *late > 0.0);
                 let followed = decay.frequency_change.zip(ends);
                 let (seen, folds) = followed
                     .map_or((decay.frequency_slope, 1.0), |(change, (early, late))| {

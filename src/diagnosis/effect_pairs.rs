@@ -5,7 +5,6 @@ use crate::evidence::Fit;
 use crate::fit::{CoarseModel, Search, Start, settle, unexplained};
 use crate::parameters::CandidateEffect;
 use crate::result::Hypothesis;
-use crate::settings::{LEAST_DATA_FOR_PAIRS, PROMISED_BY_SECOND, SECOND_EFFECT};
 use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
 use crate::verdict::{Candidate, GoodnessOfFit, refutes_by_holdout, set_probabilities};
 use rayon::prelude::*;
@@ -28,7 +27,8 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     let is_seen = candidates
         .first()
         .is_some_and(|one| one.hypothesis != Hypothesis::None);
-    if dataset.observables.len() < LEAST_DATA_FOR_PAIRS || !is_seen {
+    let thresholds = &dataset.settings.thresholds;
+    if dataset.observables.len() < thresholds.least_data_for_pairs || !is_seen {
         return;
     }
     let suffices_one = candidates
@@ -40,7 +40,7 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
         .collect();
     let search = PairSearch { dataset, singles };
     let needed = if suffices_one {
-        PROMISED_BY_SECOND
+        thresholds.promised_by_second
     } else {
         f64::NEG_INFINITY
     };
@@ -53,7 +53,7 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     }
     let found: Vec<Option<Candidate>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
     candidates.extend(distinct(found.into_iter().flatten().collect()));
-    set_probabilities(candidates, tried);
+    set_probabilities(candidates, tried, thresholds);
 }
 
 /// Two single effects that are tried together, and points where a multi-start search ended, the most
@@ -207,9 +207,11 @@ impl<'a> PairSearch<'a> {
         } else {
             second
         };
+        let thresholds = &self.dataset.settings.thresholds;
         let [own, one, other] = [&fit, first, second].map(|fit| fit.best.optimum.objective);
         // A pair that explains less than one of its members has not reached its optimum.
-        if own > one.min(other) || fit.log_evidence < alone.log_evidence + SECOND_EFFECT {
+        if own > one.min(other) || fit.log_evidence < alone.log_evidence + thresholds.second_effect
+        {
             return None;
         }
         // The hold-out data are predicted better, or at least do not refute the fit: two effects leave more open than one
@@ -219,8 +221,8 @@ impl<'a> PairSearch<'a> {
         let improves = match before.zip(after) {
             Some((before, after)) => {
                 after.rms() < before.rms()
-                    || holdout_goodness(dataset, &fit, refutes_by_holdout)
-                        .is_some_and(|p| !refutes_by_holdout(p))
+                    || holdout_goodness(dataset, &fit, |p| refutes_by_holdout(p, thresholds))
+                        .is_some_and(|p| !refutes_by_holdout(p, thresholds))
             }
             None => {
                 let [before, after] =

@@ -8,7 +8,6 @@ use crate::optimum::{
     objective_at,
 };
 use crate::parameters::{CandidateEffect, Layout, Prior, Size};
-use crate::settings::POORLY_KNOWN_SIZE;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -335,7 +334,8 @@ pub fn profile_correction(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
     };
     let at = forward.layout.last_size();
     let variance = covariance[(at, at)];
-    if variance.sqrt() < POORLY_KNOWN_SIZE * effect.size.scale {
+    let share = forward.dataset.settings.thresholds.poorly_known_size;
+    if variance.sqrt() < share * effect.size.scale {
         return 0.0;
     }
     profile_gain(forward, found, &effect.size, variance).unwrap_or(0.0)

@@ -12,8 +12,8 @@ use crate::forward::Forward;
 use crate::modal_model::ModalModel;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
 use crate::parameters::{CandidateEffect, Cause, LocationKind, LocationRange, Prior};
-use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
 use crate::structure::COUPLING;
+use crate::thresholds::Thresholds;
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits the nominal model with its joint free.
@@ -340,7 +340,10 @@ impl<'a> Search<'a> {
     /// Frees the location from the best nodes. If the data fix it within the nodes' spacing, the
     /// maxima are summed; if they do not, the effect is so small that the linearised nodes hold.
     fn refine(&self, forward: &Forward<'_>, spacing: f64, nodes: &[LocalOptimum]) -> Option<Fit> {
-        let at = forward.layout.last_size();
+        let (at, thresholds) = (
+            forward.layout.last_size(),
+            &self.dataset.settings.thresholds,
+        );
         let evidence: Vec<f64> = nodes.iter().map(|node| node.log_evidence).collect();
         let mut starts: Vec<Vec<f64>> = local_maxima(&evidence)
             .into_iter()
@@ -364,7 +367,7 @@ impl<'a> Search<'a> {
         // A search along a bent valley may stop short of its end: search again from either side of it. Between
         // nodes that are far apart for the resolution of the data a deeper one may lie: search again from these.
         if let Some(best) = best_of(&found)
-            && is_located(best, at, spacing)
+            && is_located(best, at, spacing, thresholds)
         {
             let parameters = &best.optimum.parameters;
             let near = nodes.iter().map(|node| &node.optimum.parameters);
@@ -381,7 +384,7 @@ impl<'a> Search<'a> {
             descend(forward, &starts, &mut found);
         }
         let best = best_of(&found)?.clone();
-        let total = if is_located(&best, at, spacing) {
+        let total = if is_located(&best, at, spacing, thresholds) {
             log_sum(&evidences_of(&found))
         } else {
             log_mean(&evidence)
@@ -440,13 +443,13 @@ fn best_of(found: &[LocalOptimum]) -> Option<&LocalOptimum> {
 
 /// Returns whether the data fix an effect's location within the nodes' spacing, and its size so far from
 /// zero that size and location are Gaussian together.
-fn is_located(found: &LocalOptimum, size: usize, spacing: f64) -> bool {
+fn is_located(found: &LocalOptimum, size: usize, spacing: f64, thresholds: &Thresholds) -> bool {
     let Some(covariance) = found.covariance() else {
         return false;
     };
     let [size_std, location_std] = [size, size + 1].map(|k| covariance[(k, k)].max(0.0).sqrt());
     let away = (found.optimum.parameters[size] - found.priors[size].centre).abs();
-    location_std < LOCATED * spacing && away > SIZE_DETECTED * size_std
+    location_std < thresholds.located * spacing && away > thresholds.size_detected * size_std
 }
 
 /// Returns the nodes from which a search goes on: the local maxima, the best first, at most three.
@@ -651,11 +654,12 @@ pub fn add_by_multi_start(
             finer.objective(&forward, fit.parameters())
         })
         .unwrap_or(f64::INFINITY);
+    let share = search.dataset.settings.thresholds.followed_share;
     let near: Vec<Start> = starts
         .iter()
         .take(FOLLOWED)
         .filter_map(|start| finer.continued(start))
-        .filter(|start| start.objective < FOLLOWED_SHARE * so_far)
+        .filter(|start| start.objective < share * so_far)
         .collect();
     settle(search, &near)
 }

@@ -25,7 +25,6 @@ use crate::forward::Forward;
 use crate::modal_model::fixture_strength;
 use crate::observations::{DECIBEL, FIXTURE_FREQUENCY_STD, UnpairedPeak};
 use crate::parameters::{LocationKind, Prior};
-use crate::settings::{FIXTURE_LEVEL, SPLIT_POLE};
 use std::f64::consts::TAU;
 use tapjoint_numerics::stats::median;
 
@@ -67,6 +66,7 @@ impl FixtureMode {
     fn new(forward: &Forward<'_>, parameters: &[f64]) -> Option<Self> {
         let models = forward.solve(parameters)?;
         let (dataset, peaks) = (forward.dataset, &forward.dataset.peaks);
+        let thresholds = &dataset.settings.thresholds;
         let mut own = FixtureMode {
             log: 0.0,
             share: 0.0,
@@ -85,16 +85,17 @@ impl FixtureMode {
             let strength = fixture_strength(one.modes(), fixture, &numbers, &sensors, tap);
             own.constants.push(strength.map(|strength| strength.own));
             if let (Some(strength), Some(read)) = (strength, peaks.searched.get(&index)) {
-                let half = strength.median + FIXTURE_LEVEL / DECIBEL;
+                let half = strength.median + thresholds.fixture_level / DECIBEL;
                 let least = read.map_or(half, |least| half.min(least));
                 over.push(DECIBEL * (strength.own - least));
             }
         }
-        let is_determined = peaks.contains(own.log) && !peaks.is_doubtful(own.log);
+        let is_determined =
+            peaks.contains(own.log) && !peaks.is_doubtful(own.log, thresholds.near_fixture);
         // No mode of the beam is so near that both are read as one.
         let is_apart = models.iter().all(|one| {
             let mut frequencies = (1..).map_while(|mode| one.frequency(mode));
-            frequencies.all(|frequency| (frequency.ln() - own.log).abs() >= SPLIT_POLE)
+            frequencies.all(|frequency| (frequency.ln() - own.log).abs() >= thresholds.split_pole)
         });
         if !over.is_empty() && is_determined && is_apart {
             own.over = Some(median(&mut over));

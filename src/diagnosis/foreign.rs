@@ -79,7 +79,7 @@ impl ForeignCause {
         let length = nominal.length();
         let spring = nominal.bending_stiffness() / length.powi(3);
         let inertia = nominal.beam_mass() * length * length;
-        let size = match self {
+        let mut size = match self {
             // From a thread to a stop: the tip of a cantilever has 3.
             Self::Support | Self::Bed | Self::WholeBed => {
                 Size::positive("stiffness", spring, 1e3 * spring)
@@ -96,6 +96,7 @@ impl ForeignCause {
             // Rolled strip to ground and worn ones.
             Self::Taper => Size::signed("taper", 0.02, 0.8),
         };
+        size.scale *= dataset.settings.thresholds.prior_scale;
         let is_placed = !matches!(self, Self::WholeBed | Self::Taper);
         CandidateEffect {
             cause: Cause::Foreign(self),

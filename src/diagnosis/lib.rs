@@ -26,6 +26,7 @@
 //!                          location_map   changes along the beam
 //!                          summary        the result
 //! ```
+//! `settings` has what a caller may choose, and `thresholds` every number that decides something.
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
 //! Under each, the joint's stiffnesses and all nuisance parameters are fitted and integrated over. Nuisance
@@ -64,6 +65,7 @@ mod summary;
 mod synthetic;
 #[cfg(test)]
 mod tests;
+mod thresholds;
 mod unknown;
 mod validate;
 mod verdict;
@@ -74,9 +76,10 @@ pub use result::{
     LocationProbabilities, Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors,
     Verdict,
 };
-pub use settings::{DETECTABLE, DETECTED, GapError, GapSettings, MISFIT, SET_PROBABILITY};
+pub use settings::{DETECTABLE, GapError, GapSettings};
 pub use structure::{DescriptionUncertainty, Nominal, NominalSensor};
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
+pub use thresholds::{Scale, Stage, ThresholdError, Thresholds};
 
 use tapjoint_identify::observation::Observations;
 
@@ -132,7 +135,7 @@ fn checked<'a>(
     settings: &'a GapSettings,
 ) -> Result<compare::Test<'a>, GapError> {
     settings.check()?;
-    observations::check(observations, nominal)?;
+    observations::check(observations, nominal, &settings.thresholds)?;
     Ok(compare::Test {
         observations,
         nominal,

@@ -12,7 +12,6 @@ use crate::modal_model::ModalModel;
 use crate::optimum::{LinearModel, Optimum, maximise};
 use crate::parameters::Prior;
 use crate::result::LocationMap;
-use crate::settings::LEAST_MAP_DATA;
 use nalgebra::DMatrix;
 use tapjoint_beam::specimen::Body;
 
@@ -27,7 +26,7 @@ const SINGLE_CHANGE_STD: f64 = 3.0;
 
 /// Returns the map of the nominal fit's residual; `None` with fewer than four frequencies.
 pub fn location_map(dataset: &Dataset, nominal: &Fit) -> Option<LocationMap> {
-    if dataset.frequencies().count() < LEAST_MAP_DATA {
+    if dataset.frequencies().count() < dataset.settings.thresholds.least_map_data {
         return None;
     }
     let length = dataset.nominal.length();

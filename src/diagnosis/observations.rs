@@ -1,11 +1,9 @@
 //! Facts that the observations of a test show before any model is fitted: up to which mode, which peaks belong to no
 //! mode, and whether they show one structure at all.
 
-use crate::settings::{
-    CHANGED_FREQUENCY, GapError, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
-    NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
-};
+use crate::settings::GapError;
 use crate::structure::Nominal;
+use crate::thresholds::Thresholds;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use tapjoint_identify::observation::{
@@ -49,12 +47,16 @@ pub fn up_to(highest: usize, observations: &Observations) -> Observations {
 /// Returns the relative distance of the farthest peak that belongs to no mode and is so near that the fit has split
 /// one decay between the two: what is then measured of the mode alone is unreliable. A joint whose
 /// stiffness changes with the amplitude makes such pairs.
-pub fn split_pole(configuration: &Configuration, mode: &ObservedMode) -> Option<f64> {
+pub fn split_pole(
+    configuration: &Configuration,
+    mode: &ObservedMode,
+    thresholds: &Thresholds,
+) -> Option<f64> {
     let peaks = configuration.extra_peaks.iter();
     peaks
         .filter(|peak| peak.label == UNPAIRED)
         .map(|peak| (peak.frequency / mode.frequency - 1.0).abs())
-        .filter(|distance| *distance < SPLIT_POLE)
+        .filter(|distance| *distance < thresholds.split_pole)
         .max_by(f64::total_cmp)
 }
 
@@ -88,7 +90,11 @@ fn change_along_decay(mode: &ObservedMode) -> Option<f64> {
 }
 
 /// Refuses observations that cannot be diagnosed.
-pub fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+pub fn check(
+    observations: &Observations,
+    nominal: &Nominal,
+    thresholds: &Thresholds,
+) -> Result<(), GapError> {
     nominal.specimen.check()?;
     let tested = up_to(highest_mode(observations), observations);
     let mut tested = tested.configurations.iter().flat_map(|one| &one.modes);
@@ -106,9 +112,9 @@ pub fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapEr
     if !tested.any(|mode| mode.std.is_some_and(|std| std > 0.0)) {
         return Err(GapError::NoUncertainty);
     }
-    check_same_modes(observations)?;
-    check_same_peaks(observations)?;
-    check_sensors(observations, nominal)
+    check_same_modes(observations, thresholds.same_mode_ratio)?;
+    check_same_peaks(observations, thresholds)?;
+    check_sensors(observations, nominal, thresholds.node_displacement)
 }
 
 /// Returns the name of a configuration.
@@ -118,14 +124,14 @@ fn name_of(observations: &Observations, k: usize) -> String {
 }
 
 /// Refuses configurations with the same added masses that have a mode at very different frequencies.
-fn check_same_modes(observations: &Observations) -> Result<(), GapError> {
+fn check_same_modes(observations: &Observations, largest_ratio: f64) -> Result<(), GapError> {
     let all = &observations.configurations;
     for (second, configuration) in all.iter().enumerate() {
         for mode in &configuration.modes {
             for (first, other) in all[..second].iter().enumerate() {
                 if let Some(known) = other.mode(mode.mode)
                     && other.masses == configuration.masses
-                    && !(1.0 / SAME_MODE_RATIO..SAME_MODE_RATIO)
+                    && !(1.0 / largest_ratio..largest_ratio)
                         .contains(&(mode.frequency / known.frequency))
                 {
                     return Err(GapError::Contradictory {
@@ -147,19 +153,20 @@ fn check_same_modes(observations: &Observations) -> Result<(), GapError> {
 /// found. If the peaks follow each other in order, though farther apart, one structure was changed. If
 /// most modes are the same, the other peaks (harmonics of a contact that rattles, say) belong to the structure. Both
 /// are left to the diagnosis.
-fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
+fn check_same_peaks(observations: &Observations, thresholds: &Thresholds) -> Result<(), GapError> {
+    let moved = thresholds.moved_frequency;
     let all = &observations.configurations;
     for second in 0..all.len() {
         for first in (0..second).filter(|&first| all[first].masses == all[second].masses) {
             // The frequencies that both bands reach, less the shift of a peak across an end.
             let [(a, b), (c, d)] =
                 [second, first].map(|k| all[k].band.unwrap_or((0.0, f64::INFINITY)));
-            let band = a.max(c) * (1.0 + MOVED_FREQUENCY)..=b.min(d) * (1.0 - MOVED_FREQUENCY);
+            let band = a.max(c) * (1.0 + moved)..=b.min(d) * (1.0 - moved);
             let one = resonances(&all[second], &band);
             let other = resonances(&all[first], &band);
             // Most frequencies of both lie in pairs beside each other.
             let pairs = other.iter().zip(&one);
-            let near = pairs.filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED_FREQUENCY);
+            let near = pairs.filter(|(a, b)| are_near(**a, **b, thresholds.changed_frequency));
             let are_in_order = 2 * near.count() > one.len().min(other.len());
             // Most modes with a number of either lie where the other has them.
             let counts = [first, second].map(|k| {
@@ -168,23 +175,27 @@ fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
             });
             let alike = all[first].modes.iter().filter(|mode| {
                 let known = all[second].mode(mode.mode);
-                let is_alike = known.is_some_and(|known| is_near(mode.frequency, known.frequency));
+                let is_alike =
+                    known.is_some_and(|known| are_near(mode.frequency, known.frequency, moved));
                 band.contains(&mode.frequency) && is_alike
             });
             let alike = alike.count();
-            let share_modes = alike >= LEAST_SHARED_MODES && 2 * alike > counts[0].max(counts[1]);
+            let share_modes =
+                alike >= thresholds.least_shared_modes && 2 * alike > counts[0].max(counts[1]);
             let known = are_in_order || share_modes;
-            let strangers = count_new(&one, &all[first]);
+            let least = thresholds.least_peaks;
+            let strangers = count_new(&one, &all[first], moved);
             if !known
-                && are_most(strangers, one.len())
-                && are_most(count_new(&other, &all[second]), other.len())
+                && one.len().min(other.len()) >= least
+                && 2 * strangers > one.len()
+                && 2 * count_new(&other, &all[second], moved) > other.len()
             {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
                     second: name_of(observations, second),
                     strangers,
                     peaks: one.len(),
-                    percent: 100.0 * MOVED_FREQUENCY,
+                    percent: 100.0 * moved,
                 });
             }
         }
@@ -195,23 +206,18 @@ fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
 /// Band of frequencies (Hz).
 type Band = RangeInclusive<f64>;
 
-/// Returns whether a frequency may be another one that has moved (both in Hz).
-fn is_near(frequency: f64, other: f64) -> bool {
-    (frequency / other - 1.0).abs() <= MOVED_FREQUENCY
+/// Returns whether two frequencies (Hz) differ by no more than a relative change.
+fn are_near(frequency: f64, other: f64, change: f64) -> bool {
+    (frequency / other - 1.0).abs() <= change
 }
 
-/// Counts the resonances (Hz) that a configuration does not have.
-fn count_new(frequencies: &[f64], other: &Configuration) -> usize {
+/// Counts the resonances (Hz) that a configuration does not have, not even `moved` by this relative change.
+fn count_new(frequencies: &[f64], other: &Configuration, moved: f64) -> usize {
     let known = resonances(other, &(f64::NEG_INFINITY..=f64::INFINITY));
     let new = frequencies
         .iter()
-        .filter(|own| known.iter().all(|other| !is_near(**own, *other)));
+        .filter(|own| known.iter().all(|other| !are_near(**own, *other, moved)));
     new.count()
-}
-
-/// Returns whether most of these many peaks are new.
-fn are_most(new: usize, peaks: usize) -> bool {
-    peaks >= LEAST_PEAKS && 2 * new > peaks
 }
 
 /// Returns the frequencies of all resonances in a band (Hz), with a mode number or without, ascending.
@@ -225,8 +231,12 @@ fn resonances(configuration: &Configuration, band: &Band) -> Vec<f64> {
     all
 }
 
-/// Refuses sensors that all sit at nodes of all modes.
-fn check_sensors(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+/// Refuses sensors that all sit at nodes of all modes: where the displacement is `least` of the largest or less.
+fn check_sensors(
+    observations: &Observations,
+    nominal: &Nominal,
+    least: f64,
+) -> Result<(), GapError> {
     let configurations = observations.configurations.iter();
     let numbers = configurations.flat_map(|one| one.modes.iter().map(|mode| mode.mode));
     let highest = numbers.max().unwrap_or(1);
@@ -246,9 +256,9 @@ fn check_sensors(observations: &Observations, nominal: &Nominal) -> Result<(), G
             }
         }
     }
-    if largest.is_some_and(|largest| largest < NODE_DISPLACEMENT) {
+    if largest.is_some_and(|largest| largest < least) {
         return Err(GapError::SensorsAtNodes {
-            percent: 100.0 * NODE_DISPLACEMENT,
+            percent: 100.0 * least,
             distance: 0.1 * length,
         });
     }
@@ -290,7 +300,7 @@ pub const DECIBEL: f64 = 8.685_889_638_065_036;
 
 impl UnpairedPeaks {
     /// Collects the peaks of all recordings; the first of several levels of one recording stands for it.
-    pub fn new(observations: &Observations) -> Self {
+    pub fn new(observations: &Observations, thresholds: &Thresholds) -> Self {
         let mut searched: Vec<(usize, &Configuration)> = Vec::new();
         for (index, one) in observations.configurations.iter().enumerate() {
             let mut known = searched.iter();
@@ -303,18 +313,19 @@ impl UnpairedPeaks {
         for log in modes.map(|mode| mode.frequency.ln()) {
             (low, high) = (low.min(log), high.max(log));
         }
-        let all = common_peaks(&searched);
+        let all = common_peaks(&searched, thresholds);
         // Peaks of single recordings beside their modes and the common peaks, without mains and the like.
         let peaks = searched.iter().flat_map(|(_, one)| &one.extra_peaks);
         let peaks = peaks.filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()));
-        let doubtful = peaks
-            .map(|peak| peak.frequency.ln())
-            .filter(|log| all.iter().all(|one| (one.log - log).abs() >= SAME_PEAK));
+        let doubtful = peaks.map(|peak| peak.frequency.ln()).filter(|log| {
+            let mut common = all.iter();
+            common.all(|one| (one.log - log).abs() >= thresholds.same_peak)
+        });
         // A peak far over the noise would still be read if it were weaker by its distance to the readable level.
         let least = searched.iter().map(|(index, one)| {
             let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
             let logs = peaks.filter_map(|peak| {
-                let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
+                let spare = (peak.level_db? - thresholds.readable_level).max(0.0);
                 Some(peak.constant?.abs().ln() - spare / DECIBEL)
             });
             let logs = logs.filter(|log| log.is_finite());
@@ -334,11 +345,12 @@ impl UnpairedPeaks {
         }
     }
 
-    /// Returns whether some recording shows a peak that may be that of a fixture at this logarithm of the frequency.
-    pub fn is_doubtful(&self, log: f64) -> bool {
+    /// Returns whether some recording shows a peak that may be that of a fixture at this logarithm of the frequency: one
+    /// at a relative `distance` below this.
+    pub fn is_doubtful(&self, log: f64, distance: f64) -> bool {
         self.doubtful
             .iter()
-            .any(|peak| (peak - log).abs() < NEAR_FIXTURE)
+            .any(|peak| (peak - log).abs() < distance)
     }
 
     /// Returns whether this logarithm of a frequency lies between the lowest and the highest mode.
@@ -349,19 +361,23 @@ impl UnpairedPeaks {
 
 /// Returns the peaks that at least half of the recordings show whose band reaches them. They belong to no mode and are
 /// no halves of a split decay.
-fn common_peaks(searched: &[(usize, &Configuration)]) -> Vec<UnpairedPeak> {
+fn common_peaks(
+    searched: &[(usize, &Configuration)],
+    thresholds: &Thresholds,
+) -> Vec<UnpairedPeak> {
+    let (split, same) = (thresholds.split_pole, thresholds.same_peak);
     let mut all: Vec<(f64, usize, &ExtraPeak)> = Vec::new();
     for (index, one) in searched {
         for peak in one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED) {
             let mut modes = one.modes.iter();
-            if modes.all(|mode| (peak.frequency / mode.frequency - 1.0).abs() > SPLIT_POLE) {
+            if modes.all(|mode| (peak.frequency / mode.frequency - 1.0).abs() > split) {
                 all.push((peak.frequency.ln(), *index, peak));
             }
         }
     }
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut means = Vec::new();
-    for group in all.chunk_by(|a, b| b.0 - a.0 < SAME_PEAK) {
+    for group in all.chunk_by(|a, b| b.0 - a.0 < same) {
         let shows = searched
             .iter()
             .map(|one| group.iter().any(|peak| peak.1 == one.0));
@@ -432,13 +448,15 @@ mod tests {
             // Two of one recording are one sighting.
             recording(2, &[(900.0, lone), (901.0, lone), (1390.0, lone)]),
         ];
-        let peaks = UnpairedPeaks::new(&Observations { configurations });
+        let peaks = UnpairedPeaks::new(&Observations { configurations }, &Thresholds::DEFAULT);
         assert_eq!(peaks.all.len(), 1);
         assert!((peaks.all[0].log - 183.35_f64.ln()).abs() < 1e-6);
         assert_eq!(peaks.all[0].constants.len(), 2);
         assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
         // A peak of one recording may still be a fixture's; a peak of most recordings states its frequency.
-        let doubtful = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln()));
+        let near = Thresholds::DEFAULT.near_fixture;
+        let doubtful =
+            [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln(), near));
         assert_eq!(doubtful, [true, true, false, false, false]);
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
         let weakest = peaks.searched[&0].unwrap();
@@ -450,7 +468,7 @@ mod tests {
         let mut one = recording(0, &[]);
         one.recording = None;
         let configurations = vec![one];
-        let peaks = UnpairedPeaks::new(&Observations { configurations });
+        let peaks = UnpairedPeaks::new(&Observations { configurations }, &Thresholds::DEFAULT);
         assert!(peaks.all.is_empty() && !peaks.contains(100.0_f64.ln()));
     }
 }

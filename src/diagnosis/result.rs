@@ -1,5 +1,6 @@
 //! The result of a diagnosis, as plain data.
 
+use crate::thresholds::Thresholds;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -439,13 +440,6 @@ pub enum DecidedBy {
 
 /// Largest relative change of the joint's stiffness with the amplitude that is searched (1).
 pub const LARGEST_STIFFNESS_CHANGE: f64 = 0.7;
-/// Goodness of fit below which a law of the joint does not explain the changes.
-const LAW_MISFIT: f64 = 0.001;
-/// Standard uncertainties beyond which a change has a direction, 95 % two-sided: it is certain before that there are
-/// changes at all.
-const DIRECTED_CHANGE: f64 = 2.0;
-/// Number of directed changes of one sign that belong to the joint: a single one always has one sign.
-const LEAST_DIRECTED: usize = 2;
 
 /// Joint law that explains how frequencies change along the decays.
 ///
@@ -504,13 +498,16 @@ impl AmplitudeDependence {
         chance: f64,
         goodness_of_fit: Option<f64>,
         changes: Vec<FrequencyChange>,
+        thresholds: &Thresholds,
     ) -> Self {
         let directed: Vec<&FrequencyChange> = changes
             .iter()
-            .filter(|change| change.percent_per_fold.abs() > DIRECTED_CHANGE * change.std)
+            .filter(|change| {
+                change.percent_per_fold.abs() > thresholds.directed_change * change.std
+            })
             .collect();
-        let lawful = goodness_of_fit.is_some_and(|p| p >= LAW_MISFIT);
-        let enough = directed.len() >= LEAST_DIRECTED;
+        let lawful = goodness_of_fit.is_some_and(|p| p >= thresholds.law_misfit);
+        let enough = directed.len() >= thresholds.least_directed;
         let same_way = directed
             .iter()
             .all(|change| change.percent_per_fold * law.ratio > 0.0);

@@ -3,7 +3,7 @@
 //! This chapter and [`forward`](crate::forward) alone know that the structure is a beam on a joint.
 
 use crate::joint_motion::{JointMotion, initial_amplitude, log_stiffness};
-use crate::settings::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
+use crate::thresholds::Thresholds;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use tapjoint_beam::StructureError;
@@ -232,6 +232,7 @@ impl Arrangement {
         configuration: &Configuration,
         nominal: &Nominal,
         inventory: &mut Inventory,
+        thresholds: &Thresholds,
     ) -> Self {
         let mut sensors: Vec<PointMass> = Vec::new();
         let (mut carried, mut names, mut positions) = (Vec::new(), Vec::new(), Vec::new());
@@ -248,6 +249,8 @@ impl Arrangement {
             positions.push(index_in(&mut inventory.positions, (name, placed.position)));
         }
         let masses = configuration.masses.iter();
+        let spans = configuration.modes.iter();
+        let spans = spans.filter_map(|mode| span(mode, thresholds.distinct_amplitudes));
         let file = configuration.file.clone();
         Arrangement {
             fastened: masses
@@ -265,11 +268,11 @@ impl Arrangement {
                 .map(|tap| index_in(&mut inventory.taps, tap)),
             level: configuration.level.unwrap_or(1.0),
             known_level: configuration.level,
-            spans: configuration.modes.iter().filter_map(span).collect(),
+            spans: spans.collect(),
             joint_motion: None,
             setup: configuration.recording.unwrap_or(index),
             is_recorded: configuration.recording.is_some(),
-            scatter: common_scatter(configuration),
+            scatter: common_scatter(configuration, thresholds.common_scatter),
         }
     }
 
@@ -338,19 +341,20 @@ impl Arrangement {
     }
 }
 
-/// Returns the mode and its amplitudes at both ends of the followed decay, over the first one.
-fn span(mode: &ObservedMode) -> Option<(usize, [f64; 2])> {
+/// Returns the mode and its amplitudes at both ends of the followed decay, over the first one; `None` below this
+/// `ratio` of the two.
+fn span(mode: &ObservedMode, ratio: f64) -> Option<(usize, [f64; 2])> {
     let decay = mode.decay?;
     let first = initial_amplitude(mode)?.0;
     let early = decay.early.amplitude? / first;
     let late = decay.late.amplitude? / first;
-    (late > 0.0 && early > DISTINCT_AMPLITUDES * late).then_some((mode.mode, [early, late]))
+    (late > 0.0 && early > ratio * late).then_some((mode.mode, [early, late]))
 }
 
 /// Returns the one factor that explains most of the correlation of the taps' scatter. With the largest eigenvalue l
 /// of the correlation matrix and its vector v, the shares sqrt(l - 1) v leave the diagonal as it is and
-/// explain most of the rest (all of it where all correlations are equal and many).
-fn common_scatter(configuration: &Configuration) -> BTreeMap<usize, f64> {
+/// explain most of the rest (all of it where all correlations are equal and many). Below `least` there is none.
+fn common_scatter(configuration: &Configuration, least: f64) -> BTreeMap<usize, f64> {
     let Some(covariance) = &configuration.covariance else {
         return BTreeMap::new();
     };
@@ -363,7 +367,7 @@ fn common_scatter(configuration: &Configuration) -> BTreeMap<usize, f64> {
     }
     let eigen = correlation.symmetric_eigen();
     let (at, largest) = eigen.eigenvalues.argmax();
-    if largest < COMMON_SCATTER {
+    if largest < least {
         return BTreeMap::new();
     }
     let vector = eigen.eigenvectors.column(at);

@@ -13,7 +13,7 @@ use crate::result::{
     CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
     ParameterValue, UnlocatedSensors, Verdict,
 };
-use crate::settings::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
+use crate::settings::DETECTABLE;
 use crate::structure::COUPLING;
 use crate::validate::{
     HoldoutErrors, LeftOutErrors, Residuals, closure, frequency_residuals, noise_floor,
@@ -29,6 +29,7 @@ use tapjoint_numerics::stats::NORMAL_95;
 /// Returns the result of a comparison.
 pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensors>) -> Diagnosis {
     let (dataset, candidates) = (&comparison.dataset, &comparison.candidates);
+    let thresholds = &dataset.settings.thresholds;
     let reference = Reference::new(comparison);
     let hypotheses: Vec<HypothesisResult> = (0..candidates.len())
         .map(|k| reference.hypothesis_result(k))
@@ -41,12 +42,15 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         tested.freedom = Some(DegreesOfFreedom::of(dataset, fit));
         tested.closure = hypotheses[best].withheld_closure;
         let errors = HoldoutErrors::new(dataset, fit).zip(reference.holdout_before.as_ref());
-        tested.is_decisive = errors.is_some_and(|(after, before)| after.are_decisive(before));
+        tested.is_decisive = errors.is_some_and(|(after, before)| {
+            after.are_decisive(before, thresholds.gap_over_prediction)
+        });
     }
     let none = none_of(candidates).and_then(|none| GoodnessOfFit::new(dataset, &none.fit));
-    let mut verdict = verdict(candidates, tested.as_ref(), none.as_ref());
+    let mut verdict = verdict(candidates, tested.as_ref(), none.as_ref(), thresholds);
     // Masses at locations of their choice explain much that has other causes.
-    let misses = (unlocated.as_ref()).is_some_and(|without| without.goodness_of_fit < MISFIT);
+    let misses =
+        (unlocated.as_ref()).is_some_and(|without| without.goodness_of_fit < thresholds.misfit);
     if verdict == Verdict::NoGap && misses {
         verdict = Verdict::NotEnoughData(
             "sensors of unknown position explain them, and so would other causes; state their positions"
@@ -78,7 +82,7 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
         spare_modes_from: dataset
             .spare
             .is_empty()
-            .then_some(dataset.settings.spare_modes_from),
+            .then_some(thresholds.spare_modes_from),
         unlocated,
     }
 }
@@ -92,7 +96,7 @@ fn decided_by(dataset: &Dataset, candidates: &[Candidate]) -> DecidedBy {
     };
     let [first, rival] =
         [first, rival].map(|one| log_likelihood(&dataset.data, &one.fit.best.optimum));
-    if first - rival < DECISIVE_RATIO.ln() {
+    if first - rival < dataset.settings.thresholds.decisive_ratio.ln() {
         DecidedBy::Priors
     } else {
         DecidedBy::Data
@@ -147,11 +151,11 @@ impl<'a> Reference<'a> {
             holdout_after: holdout.as_ref().map(HoldoutErrors::rms),
             holdout_floor: holdout.as_ref().map(HoldoutErrors::floor),
             withheld_closure: (self.holdout_before.as_ref().zip(holdout.as_ref()))
-                .and_then(|(before, after)| closure(before, after, dataset.settings.seed)),
+                .and_then(|(before, after)| closure(before, after, &dataset.settings)),
             spare_before: self.spare_before.as_ref().map(HoldoutErrors::rms),
             spare_after: spare.as_ref().map(HoldoutErrors::rms),
             closure: (self.spare_before.as_ref().zip(spare.as_ref()))
-                .and_then(|(before, after)| closure(before, after, dataset.settings.seed)),
+                .and_then(|(before, after)| closure(before, after, &dataset.settings)),
             cross_validation: self.cross_validation(candidate),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             misfit: residuals.as_ref().map(Residuals::misfit),
@@ -168,13 +172,13 @@ impl<'a> Reference<'a> {
 
     /// Predicts each recording from the others, for probable hypotheses and for `none`.
     fn cross_validation(&self, candidate: &Candidate) -> Option<CrossValidation> {
-        let is_probable = candidate.probability > CROSS_VALIDATED;
+        let dataset = &self.comparison.dataset;
+        let is_probable = candidate.probability > dataset.settings.thresholds.cross_validated;
         if candidate.is_unknown() || !is_probable && candidate.hypothesis != Hypothesis::None {
             return None;
         }
-        let dataset = &self.comparison.dataset;
         let after = LeftOutErrors::new(dataset, &candidate.fit)?;
-        after.against(self.left_out_before.as_ref()?, dataset.settings.seed)
+        after.against(self.left_out_before.as_ref()?, &dataset.settings)
     }
 
     /// Adds what the fit of a candidate makes of the joint's stiffnesses, whose logarithms are fitted: their values
@@ -254,7 +258,8 @@ impl<'a> Reference<'a> {
         let nearest = rivals
             .map(|rival| delta_chi_square(&own.fit, &rival.fit))
             .fold(f64::INFINITY, f64::min);
-        (nearest > 0.0 && nearest.is_finite()).then(|| size.abs() * (SEPARATE / nearest).sqrt())
+        let separate = self.comparison.dataset.settings.thresholds.separate;
+        (nearest > 0.0 && nearest.is_finite()).then(|| size.abs() * (separate / nearest).sqrt())
     }
 }
 

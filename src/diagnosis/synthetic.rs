@@ -8,8 +8,9 @@
 
 use crate::modal_model::{fixture_strength, joint_amplitude};
 use crate::observations::DECIBEL;
-use crate::settings::{FIXTURE_LEVEL, GapError};
+use crate::settings::GapError;
 use crate::structure::Nominal;
+use crate::thresholds::Thresholds;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -245,7 +246,7 @@ impl VirtualTest<'_> {
         let fixture = own.fixture?;
         let (sensors, tap) = (&actual.sensors, Some(actual.tap));
         let strength = fixture_strength(&own.modes, fixture, &own.numbers, sensors, tap)?;
-        if strength.own <= strength.median + FIXTURE_LEVEL / DECIBEL {
+        if strength.own <= strength.median + Thresholds::DEFAULT.fixture_level / DECIBEL {
             return None;
         }
         let frequency = modes.seen.read(own.modes.frequencies()[fixture]);

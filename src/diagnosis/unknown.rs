@@ -83,19 +83,20 @@ pub fn fit_unknown(dataset: &Dataset, nominal: &Fit, foreign: &[ForeignFit]) -> 
     let models = Forward::new(dataset, &[]).solve(nominal.parameters())?;
     let mut all: Vec<(Kind, f64)> = Vec::new();
     let mut modes: Option<LocalOptimum> = None;
+    let factor = dataset.settings.thresholds.unknown_spread;
     for way in ways(dataset, &models) {
         // With and without the error of linear slopes, so that small changes keep their full evidence.
         let mut logs: Vec<f64> = Vec::new();
         for share in [0.0, 1.0] {
             for &spread in way.spreads {
-                logs.push(log_evidence(dataset, nominal, &way, spread, share));
+                logs.push(log_evidence(dataset, nominal, &way, factor * spread, share));
             }
         }
         if way.kind == Kind::Modes {
             // The model solved anew in the place of the linearised one, at the most probable spread.
             let (exact, _) = logs.split_at(way.spreads.len());
             let best = (0..exact.len()).max_by(|&a, &b| exact[a].total_cmp(&exact[b]))?;
-            let fitted = discrepancies(dataset, nominal, way.spreads[best])?;
+            let fitted = discrepancies(dataset, nominal, factor * way.spreads[best])?;
             logs[best] = fitted.log_evidence;
             modes = Some(fitted);
         }

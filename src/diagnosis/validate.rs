@@ -8,7 +8,7 @@ use crate::forward::Forward;
 use crate::optimum::{Model, maximise};
 use crate::parameters::NuisanceParameter;
 use crate::result::{Block, Closure, CrossValidation, LeftOutRecording, Misfit, Residual};
-use crate::settings::{GAP_OVER_FLOOR, GAP_OVER_PREDICTION, LEAST_BLOCK_FREEDOM, LEAST_RECORDINGS};
+use crate::settings::GapSettings;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -119,7 +119,7 @@ impl Residuals {
         for (name, rows) in named {
             let spread = self.spread.select_rows(&rows).select_columns(&rows);
             let (mean, square) = (spread.trace(), (&spread * &spread).trace());
-            if mean < LEAST_BLOCK_FREEDOM {
+            if mean < dataset.settings.thresholds.least_block_freedom {
                 continue;
             }
             let sum: f64 = rows.iter().map(|&row| self.unit[row].powi(2)).sum();
@@ -296,9 +296,10 @@ impl HoldoutErrors {
         (self.spread.trace() / self.errors.len() as f64).sqrt()
     }
 
-    /// Returns whether these data could show that another hypothesis, with the errors `before`, is worse.
-    pub fn are_decisive(&self, before: &Self) -> bool {
-        before.rms() > GAP_OVER_PREDICTION * self.expected()
+    /// Returns whether these data could show that another hypothesis, with the errors `before`, is worse: `ratio` times
+    /// what the prediction leaves open.
+    pub fn are_decisive(&self, before: &Self, ratio: f64) -> bool {
+        before.rms() > ratio * self.expected()
     }
 }
 
@@ -365,15 +366,19 @@ const DRAWS: usize = 400;
 
 /// Returns how far a hypothesis closes the gap that the nominal model leaves, with an interval from draws of
 /// the uncertainties of data and fit.
-pub fn closure(before: &HoldoutErrors, after: &HoldoutErrors, seed: u64) -> Option<Closure> {
+pub fn closure(
+    before: &HoldoutErrors,
+    after: &HoldoutErrors,
+    settings: &GapSettings,
+) -> Option<Closure> {
     let (gap, rest, floor) = (before.rms(), after.rms(), after.floor());
-    if gap < GAP_OVER_FLOOR * floor {
+    if gap < settings.thresholds.gap_over_floor * floor {
         return None;
     }
     let value = (gap * gap - rest * rest) / (gap * gap - floor * floor);
     let (expected, root) = (after.expected(), square_root(&after.spread)?);
     let count = after.errors.len();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
     let mut draws = Vec::new();
     for _ in 0..DRAWS {
         let unit = DVector::from_fn(count, |_, _| random.sample::<f64, _>(StandardNormal));
@@ -429,7 +434,7 @@ impl LeftOutErrors {
     /// `None` with fewer than three recordings.
     pub fn new(dataset: &Dataset, fit: &Fit) -> Option<Self> {
         let setups = dataset.setups();
-        if setups.len() < LEAST_RECORDINGS {
+        if setups.len() < dataset.settings.thresholds.least_recordings {
             return None;
         }
         let residuals = Residuals::new(dataset, fit)?;
@@ -470,7 +475,7 @@ impl LeftOutErrors {
 
     /// Returns the errors of a hypothesis on recordings outside its fit, beside those of the nominal model; `None` where
     /// a recording that alone fixes a parameter cannot be left out of one of them.
-    pub fn against(&self, before: &Self, seed: u64) -> Option<CrossValidation> {
+    pub fn against(&self, before: &Self, settings: &GapSettings) -> Option<CrossValidation> {
         let labels = self.recordings.iter().map(|one| &one.0);
         if !labels.eq(before.recordings.iter().map(|one| &one.0)) {
             return None;
@@ -488,7 +493,7 @@ impl LeftOutErrors {
             before: before.together.rms(),
             after: self.together.rms(),
             floor: self.together.floor(),
-            closure: closure(&before.together, &self.together, seed),
+            closure: closure(&before.together, &self.together, settings),
         })
     }
 }
@@ -510,10 +515,12 @@ mod tests {
     /// (0.2^2 - 0.05^2)/(0.2^2 - 0.02^2), and none where the gap is below two floors.
     #[test]
     fn val_closure_by_hand() {
-        let found = closure(&errors(0.2, 0.02), &errors(0.05, 0.02), 1).unwrap();
+        let settings = GapSettings::default();
+        let found = closure(&errors(0.2, 0.02), &errors(0.05, 0.02), &settings).unwrap();
         assert!((found.value - 0.0375 / 0.0396).abs() < 1e-12, "{found:?}");
         assert!(found.low <= found.value && found.value <= found.high);
-        assert_eq!(closure(&errors(0.039, 0.02), &errors(0.01, 0.02), 1), None);
+        let small = closure(&errors(0.039, 0.02), &errors(0.01, 0.02), &settings);
+        assert_eq!(small, None);
     }
 
     /// Within what data of 0.005 % leave open the structure is as good as linear: both probabilities are then the

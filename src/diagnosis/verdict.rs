@@ -4,12 +4,9 @@ use crate::dataset::Dataset;
 use crate::evidence::{Fit, log_sum};
 use crate::fixture;
 use crate::result::{Block, Closure, Hypothesis, LocationProbabilities, Verdict};
-use crate::settings::{
-    ANOTHER_LEVEL, BLOCK_MISFIT, CLOSED_SHARE, DETECTED, DOUBLED_ERRORS, LISTED_SHARE, LONGEST_SET,
-    MISFIT, NAMED_PROBABILITY, NO_GAP_PRIOR, PREDICTED, RIGID_PRIOR, SEPARATE, SET_PROBABILITY,
-    SIZED, SMALLEST_P_VALUE, SPARE_DATA, UNKNOWN_PRIOR,
-};
+use crate::settings::SMALLEST_P_VALUE;
 use crate::structure::Arrangement;
+use crate::thresholds::Thresholds;
 use crate::validate::{Residuals, holdout_goodness};
 use std::f64::consts::E;
 use tapjoint_beam::effects::{EffectId, Group, Place};
@@ -19,8 +16,8 @@ use tapjoint_beam::effects::{EffectId, Group, Place};
 
 /// Returns whether a misfit of hold-out data, of probability `p`, refutes an explanation. They are few, and linearised
 /// about the fit: the limit is that of one block among many.
-pub fn refutes_by_holdout(p: f64) -> bool {
-    p < BLOCK_MISFIT
+pub fn refutes_by_holdout(p: f64, thresholds: &Thresholds) -> bool {
+    p < thresholds.block_misfit
 }
 
 /// Tests of one explanation.
@@ -43,6 +40,8 @@ pub struct GoodnessOfFit {
     is_sized: bool,
     /// The gap on hold-out data exceeds what the prediction leaves open, so that the closure can be certain.
     pub is_decisive: bool,
+    /// Thresholds of the tests.
+    thresholds: Thresholds,
 }
 
 /// Numbers of data and parameters of a hypothesis.
@@ -60,6 +59,7 @@ impl DegreesOfFreedom {
     /// masses, since these see other shapes and load other positions; slopes along decays, other levels and damping
     /// ratios count for the effects that make them.
     pub fn of(dataset: &Dataset, fit: &Fit) -> Self {
+        let another_level = dataset.settings.thresholds.another_level;
         let [slips, damps] = [EffectId::JointNonlinearity, EffectId::JointDamping]
             .map(|wanted| fit.effects.iter().any(|one| one.is(wanted)));
         let mut seen: Vec<(usize, &Arrangement)> = Vec::new();
@@ -68,7 +68,7 @@ impl DegreesOfFreedom {
             if observable.is_frequency() {
                 let one = &dataset.arrangements[observable.configuration];
                 let mut known = seen.iter().filter(|old| old.0 == observable.mode);
-                if known.all(|old| differ(old.1, one, slips)) {
+                if known.all(|old| differ(old.1, one, slips.then_some(another_level))) {
                     seen.push((observable.mode, one));
                 }
             }
@@ -82,48 +82,57 @@ impl DegreesOfFreedom {
     }
 
     /// Returns whether too few data are left to test a name with.
-    fn are_too_few(self) -> bool {
-        self.data < self.parameters + SPARE_DATA
+    fn are_too_few(self, thresholds: &Thresholds) -> bool {
+        self.data < self.parameters + thresholds.spare_data
     }
 }
 
-/// Returns whether two arrangements have different sensor positions or added masses, or tap levels if these count.
-fn differ(one: &Arrangement, other: &Arrangement, levels_count: bool) -> bool {
+/// Returns whether two arrangements have different sensor positions or added masses, or tap levels of this ratio if
+/// these count.
+fn differ(one: &Arrangement, other: &Arrangement, level_ratio: Option<f64>) -> bool {
     let sensors = one.sensors.iter().map(|sensor| sensor.position);
     let fastened = one.fastened.iter().map(|fastened| fastened.0);
     let levels = one.known_level.zip(other.known_level);
     let ratio = levels.map_or(0.0, |(a, b)| (a / b).ln().abs());
     sensors.ne(other.sensors.iter().map(|sensor| sensor.position))
         || fastened.ne(other.fastened.iter().map(|fastened| fastened.0))
-        || levels_count && ratio >= ANOTHER_LEVEL.ln()
+        || level_ratio.is_some_and(|least| ratio >= least.ln())
 }
 
 impl GoodnessOfFit {
     /// Tests a fit by its own data and by the hold-out data; `None` where the fit has no covariance.
     pub fn new(dataset: &Dataset, fit: &Fit) -> Option<Self> {
         let residuals = Residuals::new(dataset, fit)?;
+        let thresholds = &dataset.settings.thresholds;
         Some(GoodnessOfFit {
             overall: residuals.goodness(),
             blocks: residuals.blocks(dataset),
-            holdout: holdout_goodness(dataset, fit, refutes_by_holdout),
+            holdout: holdout_goodness(dataset, fit, |p| refutes_by_holdout(p, thresholds)),
             peak: fixture::goodness(dataset, fit),
             freedom: None,
             closure: None,
             is_sized: is_sized(dataset, fit),
             is_decisive: false,
+            thresholds: thresholds.clone(),
         })
     }
 
     /// Returns the p-value of the misfit that refutes the hypothesis, the smallest where several do; for one
     /// block among many that of any.
     pub fn refuting_p_value(&self) -> Option<f64> {
+        let Thresholds {
+            misfit,
+            block_misfit,
+            ..
+        } = self.thresholds;
         let worst = self.blocks.first().map(|block| block.goodness_of_fit);
-        let worst = worst.filter(|p| *p < BLOCK_MISFIT);
+        let worst = worst.filter(|p| *p < block_misfit);
         let all = [
-            self.overall.filter(|p| *p < MISFIT),
-            self.holdout.filter(|p| refutes_by_holdout(*p)),
-            worst.map(|p| (p * self.blocks.len() as f64).min(MISFIT)),
-            self.peak.filter(|p| *p < MISFIT),
+            self.overall.filter(|p| *p < misfit),
+            self.holdout
+                .filter(|p| refutes_by_holdout(*p, &self.thresholds)),
+            worst.map(|p| (p * self.blocks.len() as f64).min(misfit)),
+            self.peak.filter(|p| *p < misfit),
         ];
         all.into_iter().flatten().min_by(f64::total_cmp)
     }
@@ -141,11 +150,11 @@ impl GoodnessOfFit {
         let Some(closure) = self.closure else {
             return true;
         };
-        let predicts = self.holdout.is_some_and(|p| p > PREDICTED);
+        let predicts = self.holdout.is_some_and(|p| p > self.thresholds.predicted);
         if self.is_decisive {
-            closure.value >= CLOSED_SHARE && (closure.low > 0.0 || predicts)
+            closure.value >= self.thresholds.closed_share && (closure.low > 0.0 || predicts)
         } else {
-            closure.value > 0.0 || predicts && closure.value > DOUBLED_ERRORS
+            closure.value > 0.0 || predicts && closure.value > self.thresholds.doubled_errors
         }
     }
 }
@@ -153,7 +162,10 @@ impl GoodnessOfFit {
 /// Returns whether the size of each effect of a fit differs from zero by two standard deviations. An effect that is there or not has no size, and a
 /// joint that gives may do so in either direction.
 fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
-    let layout = dataset.layout(&fit.effects);
+    let (layout, sized) = (
+        dataset.layout(&fit.effects),
+        dataset.settings.thresholds.sized,
+    );
     let Some(covariance) = fit.best.covariance() else {
         return false;
     };
@@ -162,7 +174,7 @@ fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
         let away = (fit.parameters()[at] - effect.size.neutral).abs();
         effect.size.is_fixed()
             || effect.is(EffectId::JointCompliance) && effect.location.is_some()
-            || away >= SIZED * covariance[(at, at)].max(0.0).sqrt()
+            || away >= sized * covariance[(at, at)].max(0.0).sqrt()
     })
 }
 
@@ -235,10 +247,10 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
     all.find(|one| one.hypothesis == Hypothesis::None)
 }
 
-/// Sets the prior of each group to 1, split evenly inside. Exceptions are `none` ([`NO_GAP_PRIOR`]), `unknown`
-/// ([`UNKNOWN_PRIOR`]) and a rigid joint that gives ([`RIGID_PRIOR`]). All `tried` pairs share 1. Sorts the most
+/// Sets the prior of each group to 1, split evenly inside. Exceptions are `none` (`no_gap_prior`), `unknown`
+/// (`unknown_prior`) and a rigid joint that gives (`rigid_prior`). All `tried` pairs share 1. Sorts the most
 /// probable first.
-pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
+pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds: &Thresholds) {
     for k in 0..candidates.len() {
         let one = &candidates[k];
         candidates[k].prior = if one.effects().len() > 1 {
@@ -249,9 +261,9 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
                 is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
             });
             let weight = match one.effects() {
-                _ if one.hypothesis == Hypothesis::None => NO_GAP_PRIOR,
-                _ if one.is_unknown() => UNKNOWN_PRIOR,
-                [EffectId::JointCompliance] => RIGID_PRIOR,
+                _ if one.hypothesis == Hypothesis::None => thresholds.no_gap_prior,
+                _ if one.is_unknown() => thresholds.unknown_prior,
+                [EffectId::JointCompliance] => thresholds.rigid_prior,
                 _ => 1.0,
             };
             weight / same.count() as f64
@@ -361,7 +373,7 @@ pub fn delta_chi_square(best: &Fit, rival: &Fit) -> f64 {
 
 /// Returns the effects whose best fit predicts the same as that of a candidate.
 pub fn confounded(dataset: &Dataset, candidates: &[Candidate], index: usize) -> Vec<EffectId> {
-    let own = &candidates[index];
+    let (own, separate) = (&candidates[index], dataset.settings.thresholds.separate);
     if own.is_unknown() {
         return Vec::new();
     }
@@ -369,8 +381,8 @@ pub fn confounded(dataset: &Dataset, candidates: &[Candidate], index: usize) -> 
     for (k, other) in candidates.iter().enumerate() {
         if let [effect] = other.effects()
             && k != index
-            && separation(dataset, &own.fit, &other.fit) < SEPARATE
-            && delta_chi_square(&own.fit, &other.fit).abs() < SEPARATE
+            && separation(dataset, &own.fit, &other.fit) < separate
+            && delta_chi_square(&own.fit, &other.fit).abs() < separate
             && !own.effects().contains(effect)
         {
             all.push(*effect);
@@ -386,13 +398,15 @@ pub fn verdict(
     candidates: &[Candidate],
     tested: Option<&GoodnessOfFit>,
     none: Option<&GoodnessOfFit>,
+    thresholds: &Thresholds,
 ) -> Verdict {
+    let (detected, named) = (thresholds.detected, thresholds.named_probability);
     // Many weak hypotheses share out the probability; together they are no effect either.
     // Neither is a misfit that speaks less against the nominal model than an effect has to speak for itself.
     let p_value = none.and_then(GoodnessOfFit::refuting_p_value);
-    let is_refuted = p_value.map_or(1.0, odds_by_p_value) >= DETECTED.exp();
+    let is_refuted = p_value.map_or(1.0, odds_by_p_value) >= detected.exp();
     let mut all = candidates.iter();
-    let is_seen = all.any(|one| evidence_over_none(candidates, one) >= DETECTED);
+    let is_seen = all.any(|one| evidence_over_none(candidates, one) >= detected);
     if !is_refuted && !is_seen {
         return Verdict::NoGap;
     }
@@ -408,7 +422,7 @@ pub fn verdict(
     }
     // An effect needs evidence of its own, even where the nominal model is refuted. Many weak effects of one group may
     // hold the probability together.
-    if evidence_over_none(candidates, first) < DETECTED {
+    if evidence_over_none(candidates, first) < detected {
         return if is_refuted {
             Verdict::Unknown
         } else {
@@ -423,7 +437,10 @@ pub fn verdict(
                 .to_owned(),
         );
     };
-    if let Some(freedom) = tested.freedom.filter(|freedom| freedom.are_too_few()) {
+    if let Some(freedom) = tested
+        .freedom
+        .filter(|freedom| freedom.are_too_few(thresholds))
+    {
         return Verdict::NotEnoughData(format!(
             "{} has with the joint {} parameters for {} readings of different kind, which other causes would \
              explain as well; observe more modes, or move a sensor",
@@ -441,19 +458,19 @@ pub fn verdict(
         };
     }
     let holds = tested.passes_holdout() && (first.effects().len() < 2 || tested.improves_holdout());
-    if groups[0].probability >= NAMED_PROBABILITY && holds {
-        let members = inseparable(candidates, &groups[0].members);
+    if groups[0].probability >= named && holds {
+        let members = inseparable(candidates, &groups[0].members, thresholds);
         return match members[..] {
             [one] => Verdict::Named(candidates[one].effects().to_vec()),
             _ => Verdict::Group(effects_of(candidates, &members)),
         };
     }
-    let aliases = aliases_of_first(candidates);
+    let aliases = aliases_of_first(candidates, thresholds);
     let together: f64 = aliases.iter().map(|&k| candidates[k].probability).sum();
-    if aliases.len() > 1 && together >= NAMED_PROBABILITY && holds {
+    if aliases.len() > 1 && together >= named && holds {
         return Verdict::Group(effects_of(candidates, &aliases));
     }
-    set_of(candidates, &groups)
+    set_of(candidates, &groups, thresholds)
 }
 
 /// Returns the logarithm of the Bayes factor of one hypothesis against the nominal model.
@@ -464,11 +481,11 @@ fn evidence_over_none(candidates: &[Candidate], candidate: &Candidate) -> f64 {
 }
 
 /// Returns the members of a group that the data do not separate from its most probable one. Priors do not count.
-fn inseparable(candidates: &[Candidate], members: &[usize]) -> Vec<usize> {
+fn inseparable(candidates: &[Candidate], members: &[usize], thresholds: &Thresholds) -> Vec<usize> {
     let first = &candidates[members[0]].fit;
     let members = members.iter().copied();
     members
-        .filter(|&k| delta_chi_square(first, &candidates[k].fit) < SEPARATE)
+        .filter(|&k| delta_chi_square(first, &candidates[k].fit) < thresholds.separate)
         .collect()
 }
 
@@ -479,50 +496,51 @@ fn effects_of(candidates: &[Candidate], members: &[usize]) -> Vec<EffectId> {
         .collect()
 }
 
-/// Returns the members with a share of the probability of all.
-fn likely(candidates: &[Candidate], members: &[usize], all: f64) -> Vec<usize> {
+/// Returns the members that are more probable than this.
+fn likely(candidates: &[Candidate], members: &[usize], least: f64) -> Vec<usize> {
     let members = members.iter().copied();
     members
-        .filter(|&k| candidates[k].probability > LISTED_SHARE * all)
+        .filter(|&k| candidates[k].probability > least)
         .collect()
 }
 
 /// Returns the first single effect and those after it that fit as well.
-fn aliases_of_first(candidates: &[Candidate]) -> Vec<usize> {
+fn aliases_of_first(candidates: &[Candidate], thresholds: &Thresholds) -> Vec<usize> {
     let singles = (0..candidates.len()).filter(|&k| candidates[k].effects().len() == 1);
     let singles: Vec<usize> = singles.collect();
-    let mut aliases = likely(candidates, &singles, 1.0);
+    let mut aliases = likely(candidates, &singles, thresholds.listed_share);
     aliases.retain(|&k| {
         let first = &candidates[singles[0]].fit;
-        delta_chi_square(first, &candidates[k].fit).abs() < SEPARATE
+        delta_chi_square(first, &candidates[k].fit).abs() < thresholds.separate
     });
     aliases
 }
 
 /// Returns the shortest list of groups that holds 90 %, each with its likely members.
-fn set_of(candidates: &[Candidate], groups: &[CandidateGroup]) -> Verdict {
+fn set_of(candidates: &[Candidate], groups: &[CandidateGroup], thresholds: &Thresholds) -> Verdict {
     let (mut held, mut counted) = (0.0, 0);
     let mut set = Vec::new();
     for group in groups {
         // A group is one of its members, and the data need not decide which one.
-        let members = likely(candidates, &group.members, group.probability);
+        let least = thresholds.listed_share * group.probability;
+        let members = likely(candidates, &group.members, least);
         set.extend(members.iter().map(|&k| candidates[k].hypothesis.clone()));
         held += group.probability;
         counted += 1;
-        if held >= SET_PROBABILITY {
+        if held >= thresholds.set_probability {
             break;
         }
     }
     if set.len() == 1 {
         // The only explanation fails on data that took no part in its fit.
         Verdict::Unknown
-    } else if counted <= LONGEST_SET {
+    } else if counted <= thresholds.longest_set {
         Verdict::Set(set)
     } else {
         Verdict::NotEnoughData(format!(
             "{counted} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
              would separate them",
-            100.0 * SET_PROBABILITY
+            100.0 * thresholds.set_probability
         ))
     }
 }
@@ -547,6 +565,7 @@ mod tests {
             closure: Some(closure),
             is_sized: true,
             is_decisive,
+            thresholds: Thresholds::DEFAULT,
         }
     }
 
@@ -624,7 +643,12 @@ mod tests {
             let stands = GoodnessOfFit::new(&dataset, &fit).unwrap();
             let mut refuted = stands.clone();
             refuted.overall = Some(misfit);
-            verdict(&candidates, Some(&stands), Some(&refuted))
+            verdict(
+                &candidates,
+                Some(&stands),
+                Some(&refuted),
+                &Thresholds::DEFAULT,
+            )
         };
         let answer = |misfit, evidence| answer_beside(misfit, evidence, -5.0);
         assert_eq!(answer(1e-6, -3.6), Verdict::Unknown);

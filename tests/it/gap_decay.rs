@@ -8,7 +8,7 @@ use std::path::Path;
 use tapjoint::description::TestDescription;
 use tapjoint::effects::{Effect, EffectId, JointLaw, ModeMotion};
 use tapjoint::gap::{
-    AmplitudeDependence, Diagnosis, FrequencyChange, GapSettings, Hypothesis, Verdict,
+    AmplitudeDependence, Diagnosis, FrequencyChange, GapSettings, Hypothesis, Thresholds, Verdict,
 };
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::WavFormat;
@@ -181,7 +181,7 @@ fn judged(changes: Vec<FrequencyChange>) -> AmplitudeDependence {
         ratio: -0.1,
         exponent: 1.0,
     };
-    AmplitudeDependence::new(law, 0.01, 1e-9, None, changes)
+    AmplitudeDependence::new(law, 0.01, 1e-9, None, changes, &Thresholds::DEFAULT)
 }
 
 #[test]

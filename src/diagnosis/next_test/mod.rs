@@ -10,10 +10,7 @@ mod proposals;
 
 use crate::compare::ModelComparison;
 use crate::result::{NextTest, Proposal, Verdict};
-use crate::settings::{
-    LEAST_COMPARED, LEAST_INFORMATION, LISTED_INFORMATION, MOST_COMPARED, MOST_LISTED,
-    MOST_PROPOSED,
-};
+use crate::thresholds::Thresholds;
 use crate::verdict::Candidate;
 use nalgebra::DMatrix;
 use predicted_data::{Posterior, PredictedData, distances, expected_information};
@@ -27,7 +24,8 @@ use tapjoint_numerics::quantity::STANDARD_GRAVITY;
 pub fn next_tests(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
     let mut tests = deciding(comparison, verdict);
     if let Verdict::Named(effects) = verdict {
-        tests.truncate(MOST_PROPOSED - effects.len());
+        let most = comparison.dataset.settings.thresholds.most_proposed;
+        tests.truncate(most.saturating_sub(effects.len()));
         for &effect in effects {
             // It brings no information about the existing hypotheses.
             let proposal = Proposal::Confirm { effect };
@@ -50,7 +48,8 @@ pub fn next_tests(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTe
 /// Returns the tests that separate hypotheses, those with most information per cost first.
 fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
     let dataset = &comparison.dataset;
-    let compared = Compared::new(&comparison.candidates, verdict);
+    let thresholds = &dataset.settings.thresholds;
+    let compared = Compared::new(&comparison.candidates, verdict, thresholds);
     if compared.candidates.len() < 2 {
         return Vec::new();
     }
@@ -74,12 +73,12 @@ fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
         });
         tests.extend(compared.judge(&test.proposal, of_test.collect()));
     }
-    tests.retain(|test| test.expected_information >= LEAST_INFORMATION);
+    tests.retain(|test| test.expected_information >= thresholds.least_information);
     tests.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     // The best test of each kind.
     let mut kinds = BTreeSet::new();
     tests.retain(|test| kinds.insert(test.proposal.id()));
-    tests.truncate(MOST_PROPOSED);
+    tests.truncate(thresholds.most_proposed);
     tests
 }
 
@@ -89,15 +88,17 @@ struct Compared<'a> {
     names: Vec<String>,
     /// Probabilities, which sum to 1.
     probabilities: Vec<f64>,
+    thresholds: &'a Thresholds,
 }
 
 impl<'a> Compared<'a> {
     /// Takes the probable hypotheses. If none explains the data, their ranking means little: all count alike.
-    fn new(all: &'a [Candidate], verdict: &Verdict) -> Self {
-        let mut candidates: Vec<&Candidate> = all.iter().take(MOST_COMPARED).collect();
+    fn new(all: &'a [Candidate], verdict: &Verdict, thresholds: &'a Thresholds) -> Self {
+        let most = thresholds.most_compared;
+        let mut candidates: Vec<&Candidate> = all.iter().take(most).collect();
         let mut probabilities = vec![1.0; candidates.len()];
         if *verdict != Verdict::Unknown {
-            candidates.retain(|one| one.probability > LEAST_COMPARED);
+            candidates.retain(|one| one.probability > thresholds.least_compared);
             probabilities = candidates.iter().map(|one| one.probability).collect();
         }
         let total: f64 = probabilities.iter().sum();
@@ -108,6 +109,7 @@ impl<'a> Compared<'a> {
             names: candidates.iter().map(|one| one.hypothesis.name()).collect(),
             probabilities,
             candidates,
+            thresholds,
         }
     }
 
@@ -145,7 +147,7 @@ impl<'a> Compared<'a> {
             proposal: proposal.clone(),
             effort: proposal.effort(),
             action: sentence(proposal),
-            separates: separated(&probabilities, &names, &apart),
+            separates: separated(&probabilities, &names, &apart, self.thresholds),
             unpredicted,
             expected_information: share * expected_information(&probabilities, &apart),
         })
@@ -153,7 +155,13 @@ impl<'a> Compared<'a> {
 }
 
 /// Returns the hypotheses that a test separates: members of the pairs that contribute most.
-fn separated(probabilities: &[f64], names: &[String], apart: &DMatrix<f64>) -> Vec<String> {
+fn separated(
+    probabilities: &[f64],
+    names: &[String],
+    apart: &DMatrix<f64>,
+    thresholds: &Thresholds,
+) -> Vec<String> {
+    let (share, most) = (thresholds.listed_information, thresholds.most_listed);
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for i in 0..names.len() {
         for j in 0..i {
@@ -166,12 +174,12 @@ fn separated(probabilities: &[f64], names: &[String], apart: &DMatrix<f64>) -> V
     let mut held = 0.0;
     let mut separated: Vec<String> = Vec::new();
     for (gain, i, j) in pairs {
-        if held >= LISTED_INFORMATION * total || separated.len() >= MOST_LISTED {
+        if held >= share * total || separated.len() >= most {
             break;
         }
         held += gain;
         for name in [&names[i], &names[j]] {
-            if !separated.contains(name) && separated.len() < MOST_LISTED {
+            if !separated.contains(name) && separated.len() < most {
                 separated.push(name.clone());
             }
         }
@@ -225,6 +233,7 @@ mod tests {
 
     fn judged(predictions: [Option<PredictedData>; 3]) -> Option<NextTest> {
         let compared = Compared {
+            thresholds: &Thresholds::DEFAULT,
             candidates: Vec::new(),
             names: ["none", "sensor-mass", "modulus"]
                 .map(str::to_owned)

@@ -4,7 +4,6 @@ use crate::dataset::{Dataset, MORE_MODES, Observable};
 use crate::description::SectionSlopes;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
-use crate::settings::MOVED_SENSOR;
 use crate::structure::{Arrangement, ROTATION};
 use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
@@ -201,6 +200,7 @@ impl PlannedTests {
     /// Plans to move a sensor to positions where none was.
     fn move_sensor(&mut self, dataset: &Dataset) {
         let length = dataset.nominal.length();
+        let moved = dataset.settings.thresholds.moved_sensor * length;
         if dataset.arrangements[0].carried.is_empty() {
             return;
         }
@@ -210,7 +210,7 @@ impl PlannedTests {
         };
         for position in SENSOR_POSITIONS.map(|share| share * length) {
             let mut sensors = dataset.arrangements.iter().flat_map(|one| &one.carried);
-            if sensors.any(|sensor| (sensor.position - position).abs() < MOVED_SENSOR * length) {
+            if sensors.any(|sensor| (sensor.position - position).abs() < moved) {
                 continue;
             }
             // Its new position is another parameter.

@@ -7,8 +7,8 @@ use crate::document::{Document, GapSection};
 use crate::format::{probability, rounded, signed_percent, significant, trimmed};
 use tapjoint_beam::effects::{EffectId, Group, Place};
 use tapjoint_diagnosis::{
-    Closure, CommonFactor, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest, Proposal,
-    Residual, UnlocatedSensors, Verdict,
+    Closure, CommonFactor, Hypothesis, HypothesisResult, NextTest, Proposal, Residual, Thresholds,
+    UnlocatedSensors, Verdict,
 };
 use tapjoint_numerics::stats::times;
 
@@ -414,7 +414,9 @@ fn unknown(gap: &GapSection, has_joint: bool) -> String {
             .iter()
             .any(|pair| found.hypothesis == Hypothesis::Effects(pair.to_vec()));
         is_pair
-            && found.goodness_of_fit.is_some_and(|p| p >= MISFIT)
+            && found
+                .goodness_of_fit
+                .is_some_and(|p| p >= Thresholds::DEFAULT.misfit)
             && found.probability >= LEAST_PROBABILITY
     });
     let likeness = found.map_or_else(String::new, |found| {
@@ -440,12 +442,15 @@ fn no_gap(gap: &GapSection) -> String {
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
             " No effect is established: that needs odds of at least {:.0} to 1 against none.",
-            DETECTED.exp()
+            Thresholds::DEFAULT.detected.exp()
         ),
         None => String::new(),
     };
     let of_none = gap.result(&Hypothesis::None);
-    let misfit = of_none.and_then(|none| none.goodness_of_fit.filter(|p| *p < MISFIT));
+    let misfit = of_none.and_then(|none| {
+        none.goodness_of_fit
+            .filter(|p| *p < Thresholds::DEFAULT.misfit)
+    });
     match misfit {
         Some(p) => format!(
             "No gap is established. The described model misses the frequencies by more than their uncertainty, as \
@@ -486,7 +491,7 @@ pub(crate) fn shows_gap(gap: &GapSection) -> bool {
 /// Returns the misfit without sensors of unknown position, where the model misses the frequencies without them.
 fn misfit_unplaced(gap: &GapSection) -> Option<&UnlocatedSensors> {
     let unplaced = gap.unplaced.as_ref();
-    unplaced.filter(|one| one.goodness_of_fit < MISFIT)
+    unplaced.filter(|one| one.goodness_of_fit < Thresholds::DEFAULT.misfit)
 }
 
 /// Tells that there is no answer, and what is known all the same.

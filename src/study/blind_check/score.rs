@@ -9,7 +9,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{Beta, ContinuousCDF};
 use tapjoint_beam::effects::{EffectId, Group};
-use tapjoint_diagnosis::{SET_PROBABILITY, Verdict};
+use tapjoint_diagnosis::{Thresholds, Verdict};
 
 /// All rates of a blind check.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,7 +101,7 @@ pub fn score(cases: &[Case]) -> Scores {
     let sizes = sorted(singles.iter().filter_map(|(t, a)| size_error(t, a)));
     let classed = cases.iter().filter_map(|(truth, answer)| {
         let class = truth.class()?;
-        Some((class, answer.set(SET_PROBABILITY)))
+        Some((class, answer.set(Thresholds::DEFAULT.set_probability)))
     });
     let sets: Vec<(Class, Vec<Class>)> = classed.collect();
     let failed = cases.iter().filter(|(_, answer)| answer.verdict.is_none());
@@ -145,7 +145,9 @@ pub fn score(cases: &[Case]) -> Scores {
         null_called_effect: Rate::of(&nulls, |(_, a)| {
             Some(match &a.verdict {
                 Some(Verdict::Named(_) | Verdict::Group(_)) => true,
-                Some(Verdict::Set(_)) => !a.set(SET_PROBABILITY).contains(&Class::None),
+                Some(Verdict::Set(_)) => !a
+                    .set(Thresholds::DEFAULT.set_probability)
+                    .contains(&Class::None),
                 Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
             })
         }),

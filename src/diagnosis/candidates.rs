@@ -143,8 +143,12 @@ pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
             all.push(vec![candidate]);
         }
     }
+    let settings = &dataset.settings;
     for candidate in all.iter_mut().flatten() {
-        candidate.size.scale *= dataset.settings.thresholds.prior_scale;
+        candidate.size.scale *= settings.thresholds.prior_scale;
+        let mut known = settings.known_sizes.iter();
+        let known = known.find(|(effect, _)| candidate.is(*effect));
+        candidate.size.known = known.map(|(_, sizes)| *sizes);
     }
     all.retain(|variants| !variants.is_empty());
     all
@@ -231,6 +235,7 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parameters::LogNormal;
 
     /// Over all sizes the density integrates to 1, and half of it lies below the scale where there is no bound.
     #[test]
@@ -256,6 +261,32 @@ mod tests {
             // Bounds at 5 to 25 scales and more cut off up to a twelfth of the tail.
             assert!((0.5..0.56).contains(&below), "{}: {below}", size.name);
         }
+    }
+
+    /// A known distribution is shared by both signs, and has its median in the middle.
+    #[test]
+    fn val_a_known_distribution_of_sizes_is_normalised() {
+        const STEPS: usize = 400_000;
+        let size = Size {
+            known: Some(LogNormal {
+                median: 0.01,
+                spread: 0.8,
+            }),
+            ..Size::signed("relative", 0.02, 0.5)
+        };
+        let step = (size.high - size.low) / STEPS as f64;
+        let (mut all, mut below) = (0.0, 0.0);
+        for k in 0..STEPS {
+            let at = size.low + step * (k as f64 + 0.5);
+            let share = step * size.log_density(at).exp();
+            all += share;
+            if at.abs() < 0.01 {
+                below += share;
+            }
+        }
+        // The bound cuts off five standard deviations; midpoints over a peak of a hundredth of the range.
+        assert!((all - 1.0).abs() < 1e-5, "{all}");
+        assert!((below - 0.5).abs() < 1e-3, "{below}");
     }
 
     #[test]

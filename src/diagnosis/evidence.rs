@@ -501,6 +501,7 @@ mod tests {
             neutral: 0.0,
             low,
             high: 8.0,
+            known: None,
         }
     }
 

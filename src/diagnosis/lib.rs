@@ -70,6 +70,7 @@ mod unknown;
 mod validate;
 mod verdict;
 
+pub use parameters::LogNormal;
 pub use result::{
     AmplitudeDependence, Block, Closure, CommonFactor, CrossValidation, DecidedBy, Diagnosis,
     FrequencyChange, Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap,

@@ -12,6 +12,7 @@
 
 use crate::foreign::ForeignCause;
 use crate::structure::Nominal;
+use std::f64::consts::TAU;
 use tapjoint_beam::effects::{Effect, EffectId, Group};
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_identify::consistent::Parameter;
@@ -192,6 +193,25 @@ pub struct Size {
     pub low: f64,
     /// Highest value.
     pub high: f64,
+    /// Distribution of the magnitude where it is known better than Cauchy's distribution says.
+    pub known: Option<LogNormal>,
+}
+
+/// Distribution of a magnitude whose logarithm is normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogNormal {
+    /// Median (unit of the magnitude).
+    pub median: f64,
+    /// Standard deviation of the natural logarithm.
+    pub spread: f64,
+}
+
+impl LogNormal {
+    /// Returns the logarithm of the density at a magnitude above 0 (1 over its unit).
+    fn log_density(&self, value: f64) -> f64 {
+        let away = (value / self.median).ln() / self.spread;
+        -0.5 * away * away - (value * self.spread * TAU.sqrt()).ln()
+    }
 }
 
 /// Prior of an effect's second parameter: uniform, or uniform in its logarithm.
@@ -304,6 +324,19 @@ impl Size {
         if value < self.low || value > self.high {
             return f64::NEG_INFINITY;
         }
+        if let Some(known) = self.known {
+            let away = (value - self.neutral).abs();
+            // Of two signs each has half.
+            let sides = if self.low < self.neutral {
+                2.0_f64
+            } else {
+                1.0
+            };
+            return match away > 0.0 {
+                true => known.log_density(away) - sides.ln(),
+                false => f64::NEG_INFINITY,
+            };
+        }
         // Cauchy's distribution between the bounds.
         let [low, high, away] =
             [self.low, self.high, value].map(|x| (x - self.neutral) / self.scale);
@@ -356,6 +389,7 @@ impl Size {
             neutral: 0.0,
             low: -reach,
             high: reach,
+            known: None,
         }
     }
 }

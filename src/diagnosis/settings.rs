@@ -1,6 +1,8 @@
 //! Settings of the diagnosis, and its errors.
 
+use crate::parameters::LogNormal;
 use crate::thresholds::Thresholds;
+use tapjoint_beam::effects::EffectId;
 use tapjoint_identify::FREQUENCY_FLOOR;
 use tapjoint_identify::consistent::LEAST_DISCREPANCY;
 
@@ -121,6 +123,9 @@ pub struct GapSettings {
     pub highest_mode: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
+    /// Effects whose sizes have a known distribution, as in a study that drew them. All others have the priors of the
+    /// catalogue.
+    pub known_sizes: Vec<(EffectId, LogNormal)>,
     /// Seed of random draws.
     pub seed: u64,
     /// Thresholds of all decisions.
@@ -176,6 +181,7 @@ impl Default for GapSettings {
             joint_std: 1.5,
             highest_mode: 10,
             unknown_positions: 12,
+            known_sizes: Vec::new(),
             seed: 0,
             thresholds: Thresholds::DEFAULT,
         }

@@ -183,7 +183,7 @@ pub fn draw_effects(
 }
 
 /// Returns the magnitude of the first parameter that measures the size (SI).
-fn size_of(effect: &Effect) -> f64 {
+pub fn size_of(effect: &Effect) -> f64 {
     let name = effect.id.size_parameters().first();
     name.and_then(|name| effect.value(name))
         .map_or(0.0, f64::abs)
@@ -199,7 +199,7 @@ pub fn is_within_tolerance(effects: &[Effect], structure: &Structure) -> bool {
 }
 
 /// Draws an effect. `None` where a size is out of its range.
-fn draw_effect(
+pub fn draw_effect(
     random: &mut ChaCha8Rng,
     id: EffectId,
     structure: &Structure,

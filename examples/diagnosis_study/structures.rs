@@ -36,7 +36,7 @@ impl Support {
     }
 
     /// Share of the tests: 70 % cantilevers, of which 15 % are rigid.
-    fn share(self) -> f64 {
+    pub fn share(self) -> f64 {
         match self {
             Self::Cantilever => 0.7 * 0.85,
             Self::RigidCantilever => 0.7 * 0.15,

@@ -11,11 +11,14 @@
 //! noise, drift and errors of the description: one in a hundred false alarms and one in ten misses, for an observer who
 //! knows what to look for. Two effects are drawn until each is visible alone.
 //!
-//! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--list] [--json FILE]`
+//! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE]
+//! [--sweep] [--list] [--json FILE]`
 //!
 //! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class.
 //! `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
+//! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
+//! threshold, with what half and twice of its value change.
 
 mod draws;
 mod outside;
@@ -23,6 +26,7 @@ mod plans;
 mod plants;
 mod score;
 mod structures;
+mod sweep;
 mod table;
 mod trial;
 
@@ -33,9 +37,11 @@ use rayon::prelude::*;
 use score::Scores;
 use serde_json::{Map, Value, json};
 use structures::{Support, Tolerances};
-use trial::Trial;
+use tapjoint::gap::{GapSettings, Thresholds};
+use trial::{DrawnTest, Trial};
 
-const USAGE: &str = "usage: diagnosis_study [--tests N] [--seed S] [--cell NAME] [--number K] [--list] [--json FILE]";
+const USAGE: &str = "usage: diagnosis_study [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE] \
+                     [--sweep] [--list] [--json FILE]";
 /// Structures drawn for one test until one of them can be.
 const ATTEMPTS: u64 = 100;
 
@@ -45,8 +51,17 @@ struct Request {
     seed: u64,
     cell: Option<String>,
     number: Option<usize>,
+    settings: GapSettings,
+    sweep: bool,
     list: bool,
     json: Option<String>,
+}
+
+/// One test to draw: its class, the class's index, and its number.
+struct Task {
+    class: Class,
+    cell: usize,
+    number: usize,
 }
 
 impl Request {
@@ -56,14 +71,23 @@ impl Request {
             seed: 1,
             cell: None,
             number: None,
+            settings: GapSettings::default(),
+            sweep: false,
             list: false,
             json: None,
         };
         let mut given = std::env::args().skip(1);
         while let Some(name) = given.next() {
-            if name == "--list" {
-                request.list = true;
-                continue;
+            match name.as_str() {
+                "--list" => {
+                    request.list = true;
+                    continue;
+                }
+                "--sweep" => {
+                    request.sweep = true;
+                    continue;
+                }
+                _ => {}
             }
             let value = given.next().ok_or(USAGE)?;
             match name.as_str() {
@@ -72,14 +96,23 @@ impl Request {
                 "--cell" => request.cell = Some(value),
                 "--number" => request.number = Some(value.parse().map_err(|_| USAGE)?),
                 "--json" => request.json = Some(value),
+                "--set" => request.set(&value)?,
                 _ => return Err(USAGE.to_owned()),
             }
         }
         Ok(request)
     }
 
-    /// Returns the class and number of every test.
-    fn tasks(&self) -> Result<Vec<(usize, Class, usize)>, String> {
+    /// Sets a threshold from `NAME=VALUE`.
+    fn set(&mut self, assignment: &str) -> Result<(), String> {
+        let (name, value) = assignment.split_once('=').ok_or(USAGE)?;
+        let value = value.parse().map_err(|_| USAGE)?;
+        let set = self.settings.thresholds.set(name, value);
+        set.map_err(|error| error.to_string())
+    }
+
+    /// Returns every test.
+    fn tasks(&self) -> Result<Vec<Task>, String> {
         let all = Class::all();
         let names: Vec<String> = all.iter().map(|class| class.name()).collect();
         if let Some(cell) = &self.cell
@@ -91,12 +124,16 @@ impl Request {
             ));
         }
         let mut tasks = Vec::new();
-        for (index, class) in all.into_iter().enumerate() {
-            let wanted = self.cell.as_ref().is_none_or(|cell| names[index] == *cell);
+        for (cell, class) in all.into_iter().enumerate() {
+            let wanted = self.cell.as_ref().is_none_or(|name| names[cell] == *name);
             let numbers = 0..self.tests * class.multiple();
             let numbers = numbers.filter(|number| self.number.is_none_or(|one| one == *number));
             if wanted {
-                tasks.extend(numbers.map(|number| (index, class, number)));
+                tasks.extend(numbers.map(|number| Task {
+                    class,
+                    cell,
+                    number,
+                }));
             }
         }
         Ok(tasks)
@@ -106,9 +143,14 @@ impl Request {
 fn main() -> Result<(), String> {
     let request = Request::read()?;
     let tasks = request.tasks()?;
+    let (seed, settings) = (request.seed, &request.settings);
+    if request.sweep {
+        sweep::print(&tasks, seed, &settings.thresholds)?;
+        return Ok(());
+    }
     let trials: Vec<Trial> = tasks
         .par_iter()
-        .filter_map(|(cell, class, number)| run(*class, *cell, *number, request.seed))
+        .filter_map(|task| Some(Trial::run(&task.draw(seed)?, task.number, settings)))
         .collect();
     if request.list {
         for trial in &trials {
@@ -138,12 +180,14 @@ fn main() -> Result<(), String> {
     Ok(())
 }
 
-/// Runs one test; structures that cannot be are drawn again.
-fn run(class: Class, cell: usize, number: usize, seed: u64) -> Option<Trial> {
-    (0..ATTEMPTS).find_map(|attempt| {
-        let place = (cell as u64) << 48 | attempt << 32 | number as u64;
-        Trial::run(class, number, mixed(seed ^ mixed(place)))
-    })
+impl Task {
+    /// Draws the test; structures that cannot be are drawn again.
+    fn draw(&self, seed: u64) -> Option<DrawnTest> {
+        (0..ATTEMPTS).find_map(|attempt| {
+            let place = (self.cell as u64) << 48 | attempt << 32 | self.number as u64;
+            DrawnTest::draw(self.class, mixed(seed ^ mixed(place)))
+        })
+    }
 }
 
 /// Spreads the bits of a number (splitmix64), so that neighbours have unrelated seeds.
@@ -200,8 +244,15 @@ fn document(
     let parts: Map<String, Value> = parts
         .map(|(name, scores)| (name.clone(), scores.json()))
         .collect();
+    let thresholds = &request.settings.thresholds;
+    let names = Thresholds::names().into_iter();
+    let set = names.filter(|name| thresholds.value(name) != Thresholds::DEFAULT.value(name));
+    let set: Map<String, Value> = set
+        .map(|name| (name.to_owned(), json!(thresholds.value(name))))
+        .collect();
     json!({
         "seed": request.seed,
+        "set": set,
         "tests_per_cell": request.tests,
         "total": total.json(),
         "cells": cells,

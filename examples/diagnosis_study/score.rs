@@ -105,6 +105,14 @@ impl Scores {
         }
     }
 
+    /// Returns the rate of this key; no cases where there is none.
+    pub fn rate(&self, key: &str) -> Rate {
+        let mut rates = self.rates.iter();
+        rates
+            .find(|one| one.key == key)
+            .map_or(Rate::default(), |one| one.rate)
+    }
+
     pub fn json(&self) -> Value {
         let mut rates = Map::new();
         for one in &self.rates {

@@ -99,8 +99,8 @@ pub fn print_classes(rows: &[(Class, Scores)]) {
         "Brier"
     );
     for (class, scores) in rows {
-        let named = rate_of(scores, "named");
-        let right = rate_of(scores, "names_right");
+        let named = scores.rate("named");
+        let right = scores.rate("names_right");
         let wrong = Rate {
             hits: right.of - right.hits,
             of: named.of,
@@ -113,14 +113,14 @@ pub fn print_classes(rows: &[(Class, Scores)]) {
             "{:26} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
             class.name(),
             scores.tests,
-            percent(&rate_of(scores, "first_class_right")),
-            percent(&rate_of(scores, "first_group_right")),
-            percent(&rate_of(scores, "place_right")),
+            percent(&scores.rate("first_class_right")),
+            percent(&scores.rate("first_group_right")),
+            percent(&scores.rate("place_right")),
             percent(&named),
             percent(&right),
             percent(&wrong),
-            percent(&rate_of(scores, "nulls_named")),
-            percent(&rate_of(scores, "list_holds")),
+            percent(&scores.rate("nulls_named")),
+            percent(&scores.rate("list_holds")),
             number(scores.list_size, 2),
             number(scores.brier, 3)
         );
@@ -181,7 +181,7 @@ pub fn print_parts(rows: &[(String, Scores)]) {
             "list_holds",
         ];
         let rates = rates.map(|key| {
-            let rate = rate_of(scores, key);
+            let rate = scores.rate(key);
             format!("{}/{} {}", rate.hits, rate.of, percent(&rate))
         });
         println!(
@@ -189,13 +189,6 @@ pub fn print_parts(rows: &[(String, Scores)]) {
             scores.tests, rates[0], rates[1], rates[2], rates[3]
         );
     }
-}
-
-fn rate_of(scores: &Scores, key: &str) -> Rate {
-    let mut rates = scores.rates.iter();
-    rates
-        .find(|one| one.key == key)
-        .map_or(Rate::default(), |one| one.rate)
 }
 
 fn percent(rate: &Rate) -> String {

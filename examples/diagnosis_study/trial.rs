@@ -7,11 +7,12 @@ use super::plants::{Class, draw_effects, is_within_tolerance, plan_needs, struct
 use super::structures::{Structure, Support, Tolerances};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 use tapjoint::effects::{Effect, EffectId, Group, Place};
 use tapjoint::gap::{
-    DETECTABLE, Diagnosis, GapSettings, Hypothesis, Nominal, ParameterValue, TestPlan, Verdict,
-    diagnose, nominal_chi_square, observe,
+    DETECTABLE, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, ParameterValue, TestPlan,
+    Verdict, diagnose, nominal_chi_square, observe,
 };
 use tapjoint::identify::observation::Observations;
 
@@ -128,7 +129,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    fn of(found: &Diagnosis) -> Self {
+    pub fn of(found: &Diagnosis) -> Self {
         let mut classes: Vec<(Explained, f64)> = Vec::new();
         for one in &found.hypotheses {
             let class = Explained::by(&one.hypothesis);
@@ -222,16 +223,17 @@ fn stream(seed: u64, of: Stream) -> ChaCha8Rng {
 }
 
 /// A test before its diagnosis.
-struct DrawnTest {
+pub struct DrawnTest {
     truth: Truth,
     structure: Structure,
     test: PlannedTest,
-    observed: Observations,
+    pub observed: Observations,
+    pub described: Nominal,
 }
 
 impl DrawnTest {
     /// Draws a test. `None` where the structure cannot be: it buckles.
-    fn draw(class: Class, seed: u64) -> Option<Self> {
+    pub fn draw(class: Class, seed: u64) -> Option<Self> {
         let ids = class.draw_ids(&mut stream(seed, Stream::Class));
         let structure =
             Structure::draw(&mut stream(seed, Stream::Structure), &structure_needs(&ids));
@@ -276,10 +278,37 @@ impl DrawnTest {
                 outside,
                 is_visible,
             },
+            described: test.nominal(&structure, true),
             structure,
             test,
             observed,
         })
+    }
+
+    /// Returns the test with an answer, which took some seconds.
+    pub fn answered(&self, number: usize, answer: Result<Answer, String>, seconds: f64) -> Trial {
+        Trial {
+            number,
+            truth: self.truth.clone(),
+            support: self.structure.support,
+            tolerances: self.structure.tolerances,
+            errors: self.structure.errors,
+            plan: self.test.kind,
+            recordings: self.test.stated.len(),
+            modes: self.test.plan.modes,
+            answer,
+            seconds,
+        }
+    }
+}
+
+/// Returns what a step of the diagnosis finds, or why it does not. A panic is a defect of the diagnosis, and no reason to
+/// lose all other tests.
+pub fn caught<T>(step: impl FnOnce() -> Result<T, GapError>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(step)) {
+        Ok(Ok(found)) => Ok(found),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(_) => Err("the diagnosis panicked".to_owned()),
     }
 }
 
@@ -293,44 +322,19 @@ fn is_visible(test: &PlannedTest, without: &Nominal, truth: &Nominal, effects: &
     let Ok(observed) = observe(&plan, truth, effects, 0) else {
         return false;
     };
-    let chi_square = std::panic::catch_unwind(|| {
-        nominal_chi_square(&observed, without, &GapSettings::default())
-    });
+    let settings = GapSettings::default();
+    let chi_square = caught(|| nominal_chi_square(&observed, without, &settings));
     // Without any fit the fault is plain.
-    !matches!(chi_square, Ok(Ok(chi_square)) if chi_square < DETECTABLE)
+    !chi_square.is_ok_and(|chi_square| chi_square < DETECTABLE)
 }
 
 impl Trial {
-    /// Draws and diagnoses a test. `None` where the structure cannot be.
-    pub fn run(class: Class, number: usize, seed: u64) -> Option<Self> {
-        let DrawnTest {
-            truth,
-            structure,
-            test,
-            observed,
-        } = DrawnTest::draw(class, seed)?;
-        let described = test.nominal(&structure, true);
+    /// Diagnoses a test.
+    pub fn run(drawn: &DrawnTest, number: usize, settings: &GapSettings) -> Self {
         let begin = Instant::now();
-        // A panic is a defect of the diagnosis, and no reason to lose all other tests.
-        let found =
-            std::panic::catch_unwind(|| diagnose(&observed, &described, &GapSettings::default()));
-        let answer = match found {
-            Ok(Ok(found)) => Ok(Answer::of(&found)),
-            Ok(Err(error)) => Err(error.to_string()),
-            Err(_) => Err("the diagnosis panicked".to_owned()),
-        };
-        Some(Self {
-            number,
-            truth,
-            support: structure.support,
-            tolerances: structure.tolerances,
-            errors: structure.errors,
-            plan: test.kind,
-            recordings: test.stated.len(),
-            modes: test.plan.modes,
-            answer,
-            seconds: begin.elapsed().as_secs_f64(),
-        })
+        let found = caught(|| diagnose(&drawn.observed, &drawn.described, settings));
+        let answer = found.map(|found| Answer::of(&found));
+        drawn.answered(number, answer, begin.elapsed().as_secs_f64())
     }
 
     /// Returns one line: what is true, the verdict, the first hypotheses.

@@ -19,7 +19,8 @@ use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_identify::observation::{Observations, ObservedSensor};
 
-/// Fits of all hypotheses.
+/// Fits of hypotheses.
+#[derive(Clone)]
 pub struct ModelComparison {
     /// The data.
     pub dataset: Dataset,
@@ -46,11 +47,11 @@ pub struct Test<'a> {
     pub settings: &'a GapSettings,
 }
 
-/// Fits all hypotheses.
+/// Fits the nominal model, single effects and something unknown. They have no probabilities yet.
 ///
 /// # Errors
 /// [`GapError::NoFit`] where the nominal model has no fit.
-pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
+pub fn compare_without_pairs(test: Test<'_>) -> Result<ModelComparison, GapError> {
     let all = at_locations(test, compare_singles);
     // The evidence is averaged over the locations of sensors; fits and residuals are those of the location that
     // explains most.
@@ -81,9 +82,16 @@ pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
             candidate.fit.log_evidence = *log;
         }
     }
-    set_probabilities(&mut comparison.candidates, 0, &test.settings.thresholds);
-    add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
+}
+
+impl ModelComparison {
+    /// Sets the probabilities, and adds pairs of effects.
+    pub fn add_pairs(&mut self) {
+        let thresholds = &self.dataset.settings.thresholds;
+        set_probabilities(&mut self.candidates, 0, thresholds);
+        add_pairs(&self.dataset, &mut self.candidates);
+    }
 }
 
 /// Returns the observations with the described sensors where they name none: given frequencies were

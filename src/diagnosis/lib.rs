@@ -108,10 +108,72 @@ pub fn diagnose(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
-    let test = checked(observations, nominal, settings)?;
-    let comparison = compare::compare(test)?;
-    let unlocated = compare::without_unlocated(test);
-    Ok(summary::diagnosis(&comparison, unlocated))
+    let fits = SingleFits::new(observations, nominal, settings)?;
+    let Comparison { fits, unlocated } = fits.with_pairs(&settings.thresholds);
+    Ok(summary::diagnosis(&fits, unlocated))
+}
+
+/// Refuses observations that cannot be diagnosed.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn check(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<(), GapError> {
+    checked(observations, nominal, settings).map(|_| ())
+}
+
+/// Fits of the nominal model, of single effects and of something unknown. Thresholds of [`Stage::Pairs`] act on what
+/// follows from them.
+#[derive(Clone)]
+pub struct SingleFits {
+    fits: compare::ModelComparison,
+    unlocated: Option<UnlocatedSensors>,
+}
+
+impl SingleFits {
+    /// Fits the observations of a test.
+    ///
+    /// # Errors
+    /// As [`diagnose`].
+    pub fn new(
+        observations: &Observations,
+        nominal: &Nominal,
+        settings: &GapSettings,
+    ) -> Result<Self, GapError> {
+        let test = checked(observations, nominal, settings)?;
+        Ok(SingleFits {
+            fits: compare::compare_without_pairs(test)?,
+            unlocated: compare::without_unlocated(test),
+        })
+    }
+
+    /// Adds pairs of effects and all probabilities.
+    pub fn with_pairs(mut self, thresholds: &Thresholds) -> Comparison {
+        self.fits.dataset.settings.thresholds = thresholds.clone();
+        self.fits.add_pairs();
+        Comparison {
+            fits: self.fits,
+            unlocated: self.unlocated,
+        }
+    }
+}
+
+/// Fits of all hypotheses with their probabilities. Thresholds of [`Stage::Verdict`] act on what follows from them.
+#[derive(Clone)]
+pub struct Comparison {
+    fits: compare::ModelComparison,
+    unlocated: Option<UnlocatedSensors>,
+}
+
+impl Comparison {
+    /// Returns the diagnosis without its next tests.
+    pub fn without_next_tests(mut self, thresholds: &Thresholds) -> Diagnosis {
+        self.fits.dataset.settings.thresholds = thresholds.clone();
+        summary::without_next_tests(&self.fits, self.unlocated)
+    }
 }
 
 /// Returns the evidence that the reading of one mode is off and nothing else is missing, over that of the nominal model

@@ -26,8 +26,18 @@ use tapjoint_beam::Beam;
 use tapjoint_beam::effects::{Effect, EffectId};
 use tapjoint_numerics::stats::NORMAL_95;
 
-/// Returns the result of a comparison.
+/// Returns the result of a comparison with its next tests.
 pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensors>) -> Diagnosis {
+    let mut found = without_next_tests(comparison, unlocated);
+    found.next_tests = next_tests(comparison, &found.verdict);
+    found
+}
+
+/// Returns the result of a comparison without its next tests.
+pub fn without_next_tests(
+    comparison: &ModelComparison,
+    unlocated: Option<UnlocatedSensors>,
+) -> Diagnosis {
     let (dataset, candidates) = (&comparison.dataset, &comparison.candidates);
     let thresholds = &dataset.settings.thresholds;
     let reference = Reference::new(comparison);
@@ -59,7 +69,7 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
     }
     let residuals = reference.before.as_ref().zip(after.as_ref());
     Diagnosis {
-        next_tests: next_tests(comparison, &verdict),
+        next_tests: Vec::new(),
         locations: location_probabilities(candidates),
         residuals: residuals.map_or_else(Vec::new, |(before, after)| {
             frequency_residuals(dataset, before, after)

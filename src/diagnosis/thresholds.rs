@@ -184,7 +184,8 @@ thresholds! {
 
     // The data.
 
-    /// Number of modes from which on the highest is held out.
+    /// Number of modes from which on the highest is held out: five are left to fit two stiffnesses and an effect with its
+    /// place.
     withhold_from: usize = 6, Value, Fits;
     /// Number of the highest modes that are held out.
     withheld_modes: usize = 1, Value, Fits;
@@ -285,7 +286,8 @@ thresholds! {
     /// Decrease of the objective that a second effect must promise where a single one suffices: the accepted
     /// Bayes factor (`second_effect`), and as much again for the location and size that it may choose.
     promised_by_second: f64 = 10.0, Value, Pairs;
-    /// Least number of data for which pairs of effects are tried.
+    /// Least number of data for which pairs of effects are tried: two stiffnesses and two effects with places have six
+    /// parameters.
     least_data_for_pairs: usize = 6, Value, Pairs;
 
     // Probabilities and the verdict.
@@ -336,4 +338,76 @@ thresholds! {
     most_listed: usize = 4, Value, Beside;
     /// Share of the length from which on a sensor counts as moved (1).
     moved_sensor: f64 = 0.08, Value, Beside;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Documents that state the thresholds must not fall behind: same names in the same order, values and stages.
+    #[test]
+    fn regress_the_table_of_decisions_has_every_threshold_and_nothing_else() {
+        let document = include_str!("../../docs/decisions.md");
+        let (_, section) = document
+            .split_once("## Thresholds of the diagnosis")
+            .expect("docs/decisions.md has this section");
+        let rows = section.lines().filter(|line| line.starts_with("| `"));
+        let stated: Vec<Vec<&str>> = rows
+            .map(|row| row.trim_matches('|').split(" | ").map(str::trim).collect())
+            .collect();
+        let expected: Vec<[String; 2]> = Thresholds::names()
+            .into_iter()
+            .map(|name| {
+                let stage = format!("{:?}", Thresholds::stage(name).unwrap()).to_lowercase();
+                let value = Thresholds::DEFAULT.value(name).unwrap();
+                [format!("`{name}` ({stage})"), value.to_string()]
+            })
+            .collect();
+        let found: Vec<[String; 2]> = stated
+            .iter()
+            .map(|cells| [0, 1].map(|k| cells[k].to_owned()))
+            .collect();
+        assert_eq!(found, expected);
+        for cells in &stated {
+            let is_whole = cells.len() == 6 && cells.iter().all(|cell| !cell.is_empty());
+            assert!(is_whole, "{cells:?}");
+        }
+    }
+
+    #[test]
+    fn limit_half_and_twice_keep_shares_below_one_and_ratios_above_it() {
+        for (name, half, twice) in [
+            ("misfit", 0.005, 0.02),
+            ("fixture_level", -25.0, -100.0),
+            ("named_probability", 0.9, 0.6),
+            ("closed_share", 0.75, 0.0),
+            ("same_mode_ratio", 1.15, 1.6),
+            // Counts are rounded, and 1 at least.
+            ("least_shared_modes", 2.0, 6.0),
+            ("withheld_modes", 1.0, 2.0),
+        ] {
+            for (factor, expected) in [(0.5, half), (2.0, twice)] {
+                let changed = Thresholds::DEFAULT.with_factor(name, factor).unwrap();
+                let value = changed.value(name).unwrap();
+                // Rounding of a sum of numbers near 1.
+                assert!((value - expected).abs() < 1e-15, "{name}: {value}");
+                let mut restored = changed;
+                let before = Thresholds::DEFAULT.value(name).unwrap();
+                restored.set(name, before).unwrap();
+                assert_eq!(restored, Thresholds::DEFAULT, "{name} changes another one");
+            }
+        }
+    }
+
+    #[test]
+    fn limit_no_other_name_and_no_infinite_value_can_be_set() {
+        let mut thresholds = Thresholds::DEFAULT;
+        let unknown = thresholds.set("misfits", 0.1).unwrap_err().to_string();
+        assert!(unknown.contains("`misfits`") && unknown.contains("block_misfit"));
+        for value in [f64::NAN, f64::INFINITY] {
+            assert!(thresholds.set("misfit", value).is_err());
+        }
+        thresholds.set("longest_set", -3.0).unwrap();
+        assert_eq!(thresholds.longest_set, 1);
+    }
 }

@@ -12,15 +12,17 @@
 //! knows what to look for. Two effects are drawn until each is visible alone.
 //!
 //! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE]
-//! [--sweep] [--list] [--json FILE]`
+//! [--sweep] [--ideal] [--list] [--json FILE]`
 //!
 //! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class.
 //! `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
 //! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
-//! threshold, with what half and twice of its value change.
+//! threshold, with what half and twice of its value change. `--ideal`: beside each rate that of an observer who knows the
+//! study's distributions of sizes and the shares of all classes; it takes twice the time.
 
 mod draws;
+mod ideal;
 mod outside;
 mod plans;
 mod plants;
@@ -41,7 +43,7 @@ use tapjoint::gap::{GapSettings, Thresholds};
 use trial::{DrawnTest, Trial};
 
 const USAGE: &str = "usage: diagnosis_study [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE] \
-                     [--sweep] [--list] [--json FILE]";
+                     [--sweep] [--ideal] [--list] [--json FILE]";
 /// Structures drawn for one test until one of them can be.
 const ATTEMPTS: u64 = 100;
 
@@ -53,6 +55,7 @@ struct Request {
     number: Option<usize>,
     settings: GapSettings,
     sweep: bool,
+    ideal: bool,
     list: bool,
     json: Option<String>,
 }
@@ -73,6 +76,7 @@ impl Request {
             number: None,
             settings: GapSettings::default(),
             sweep: false,
+            ideal: false,
             list: false,
             json: None,
         };
@@ -85,6 +89,10 @@ impl Request {
                 }
                 "--sweep" => {
                     request.sweep = true;
+                    continue;
+                }
+                "--ideal" => {
+                    request.ideal = true;
                     continue;
                 }
                 _ => {}
@@ -150,7 +158,10 @@ fn main() -> Result<(), String> {
     }
     let trials: Vec<Trial> = tasks
         .par_iter()
-        .filter_map(|task| Some(Trial::run(&task.draw(seed)?, task.number, settings)))
+        .filter_map(|task| {
+            let drawn = task.draw(seed)?;
+            Some(Trial::run(&drawn, task.number, settings, request.ideal))
+        })
         .collect();
     if request.list {
         for trial in &trials {

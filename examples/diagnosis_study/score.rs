@@ -24,7 +24,7 @@ pub struct NamedRate {
     /// As the table has it.
     pub title: &'static str,
     pub rate: Rate,
-    /// What an observer reaches who knows all distributions; not computed yet.
+    /// What an observer reaches who knows the study's distributions; `None` where it was not asked for.
     pub ideal: Option<f64>,
 }
 
@@ -162,12 +162,20 @@ struct Measure {
 }
 
 impl Measure {
+    /// Returns the rate of the ideal observer, where it was asked for.
+    fn ideal(&self, answered: &[Answered]) -> Option<f64> {
+        let ideal = answered.iter();
+        let ideal = ideal.filter_map(|(trial, _)| Some((*trial, trial.ideal.as_ref()?)));
+        let ideal: Vec<Answered> = ideal.collect();
+        Rate::of(&ideal, |(trial, answer)| (self.hit)(trial, answer)).value()
+    }
+
     fn rate(&self, answered: &[Answered]) -> NamedRate {
         NamedRate {
             key: self.key,
             title: self.title,
             rate: Rate::of(answered, |(trial, answer)| (self.hit)(trial, answer)),
-            ideal: None,
+            ideal: self.ideal(answered),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One test: drawn, observed, diagnosed.
 
 use super::draws::ErrorShape;
+use super::ideal;
 use super::outside::OutsideKind;
 use super::plans::{PlanKind, PlannedTest};
 use super::plants::{Class, draw_effects, is_within_tolerance, plan_needs, structure_needs};
@@ -202,6 +203,8 @@ pub struct Trial {
     pub modes: usize,
     /// The answer, or the reason why there is none.
     pub answer: Result<Answer, String>,
+    /// That of the ideal observer, where it was asked for.
+    pub ideal: Option<Answer>,
     /// Time of the diagnosis (s).
     pub seconds: f64,
 }
@@ -214,6 +217,7 @@ enum Stream {
     Plan,
     Plant,
     Observation,
+    Ideal,
 }
 
 fn stream(seed: u64, of: Stream) -> ChaCha8Rng {
@@ -224,6 +228,7 @@ fn stream(seed: u64, of: Stream) -> ChaCha8Rng {
 
 /// A test before its diagnosis.
 pub struct DrawnTest {
+    seed: u64,
     truth: Truth,
     structure: Structure,
     test: PlannedTest,
@@ -271,6 +276,7 @@ impl DrawnTest {
             return None;
         }
         Some(Self {
+            seed,
             truth: Truth {
                 class,
                 within_tolerance: is_within_tolerance(&effects, &structure),
@@ -285,6 +291,14 @@ impl DrawnTest {
         })
     }
 
+    /// Returns the answer of an observer who knows the study's distributions. `None` without a diagnosis.
+    fn ideal(&self) -> Option<Answer> {
+        let mut random = stream(self.seed, Stream::Ideal);
+        let settings = ideal::settings(&mut random, &self.structure, &self.test);
+        let found = caught(|| diagnose(&self.observed, &self.described, &settings));
+        found.ok().map(|found| Answer::of(&found))
+    }
+
     /// Returns the test with an answer, which took some seconds.
     pub fn answered(&self, number: usize, answer: Result<Answer, String>, seconds: f64) -> Trial {
         Trial {
@@ -297,6 +311,7 @@ impl DrawnTest {
             recordings: self.test.stated.len(),
             modes: self.test.plan.modes,
             answer,
+            ideal: None,
             seconds,
         }
     }
@@ -329,12 +344,16 @@ fn is_visible(test: &PlannedTest, without: &Nominal, truth: &Nominal, effects: &
 }
 
 impl Trial {
-    /// Diagnoses a test.
-    pub fn run(drawn: &DrawnTest, number: usize, settings: &GapSettings) -> Self {
+    /// Diagnoses a test, also as the ideal observer would if asked to.
+    pub fn run(drawn: &DrawnTest, number: usize, settings: &GapSettings, ideal: bool) -> Self {
         let begin = Instant::now();
         let found = caught(|| diagnose(&drawn.observed, &drawn.described, settings));
         let answer = found.map(|found| Answer::of(&found));
-        drawn.answered(number, answer, begin.elapsed().as_secs_f64())
+        let seconds = begin.elapsed().as_secs_f64();
+        Self {
+            ideal: if ideal { drawn.ideal() } else { None },
+            ..drawn.answered(number, answer, seconds)
+        }
     }
 
     /// Returns one line: what is true, the verdict, the first hypotheses.

@@ -299,9 +299,9 @@ thresholds! {
     /// Prior probability that a joint described as rigid gives, over that of one group of effects. All clamps give a
     /// little.
     rigid_prior: f64 = 4.0, Value, Pairs;
-    /// Prior probability of something unknown over that of one group of effects. A real rig has many more causes than the
-    /// catalogue. Real beams miss their models by 0.1 to 1 %.
-    unknown_prior: f64 = 4.0, Value, Pairs;
+    /// Prior probability of something unknown over that of one group of effects. A real rig has at least as many causes
+    /// outside the catalogue as the dozen groups in it. Real beams miss their models by 0.1 to 1 %.
+    unknown_prior: f64 = 10.0, Value, Pairs;
     /// Standard deviations of an effect's size from zero from which on it is a name: a size within two may be zero.
     sized: f64 = 2.0, Value, Verdict;
     /// Chi square below which two hypotheses count as one on these data: three standard deviations.

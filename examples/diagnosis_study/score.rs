@@ -3,7 +3,7 @@
 use super::trial::{Answer, Explained, Trial};
 use serde_json::{Map, Value, json};
 use tapjoint::effects::{Effect, EffectId, Group};
-use tapjoint::gap::{Thresholds, Verdict};
+use tapjoint::gap::{Hypothesis, Thresholds, Verdict};
 use tapjoint::study::blind_check::Rate;
 
 /// Least errors of the set-up that should be named: 5 mm of a position, 10 % of a scale.
@@ -253,7 +253,7 @@ const MEASURES: [Measure; 21] = [
     },
     Measure {
         key: "pairs_found_or_refused",
-        title: "pairs both found or refused",
+        title: "pairs found, listed or refused",
         hit: pair_found_or_refused,
     },
     Measure {
@@ -370,8 +370,16 @@ fn pair_found(trial: &Trial, answer: &Answer) -> Option<bool> {
 }
 
 fn pair_found_or_refused(trial: &Trial, answer: &Answer) -> Option<bool> {
-    let is_refused = matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData(_));
-    pair_found(trial, answer).map(|is_found| is_found || is_refused)
+    let truth = trial.truth.explained();
+    let is_fair = match &answer.verdict {
+        Verdict::Unknown | Verdict::NotEnoughData(_) => true,
+        // A short list is no name, and fair if it has both or something unknown.
+        Verdict::Set(list) => list
+            .iter()
+            .any(|one| *one == Hypothesis::Unknown || Explained::by(one) == truth),
+        _ => false,
+    };
+    pair_found(trial, answer).map(|is_found| is_found || is_fair)
 }
 
 /// Whether the list that holds 90 % holds what is true. Tests with two effects are scored for themselves.

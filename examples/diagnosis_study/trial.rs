@@ -93,7 +93,7 @@ impl Explained {
         Self::Groups(groups)
     }
 
-    fn by(hypothesis: &Hypothesis) -> Self {
+    pub fn by(hypothesis: &Hypothesis) -> Self {
         match hypothesis {
             Hypothesis::None => Self::Nothing,
             Hypothesis::Unknown => Self::Unknown,

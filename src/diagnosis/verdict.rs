@@ -412,9 +412,12 @@ pub fn verdict(
     }
     let groups = by_group(candidates);
     let first = &candidates[groups[0].members[0]];
-    if first.is_unknown() || tested.is_some_and(|one| one.refuting_p_value().is_some()) {
+    let is_unknown = first.is_unknown() && groups[0].probability >= thresholds.named_probability;
+    if is_unknown || tested.is_some_and(|one| one.refuting_p_value().is_some()) {
         return Verdict::Unknown;
     }
+    // The tests below are those of the best explanation that has a model.
+    let shown = best_known(candidates).map_or(first, |index| &candidates[index]);
     // An effect too small to matter always competes with its absence; if no effect explains the
     // data better than the nominal model, there is no gap.
     if first.hypothesis == Hypothesis::None {
@@ -422,7 +425,8 @@ pub fn verdict(
     }
     // An effect needs evidence of its own, even where the nominal model is refuted. Many weak effects of one group may
     // hold the probability together.
-    if evidence_over_none(candidates, first) < detected {
+    let evidence = [first, shown].map(|one| evidence_over_none(candidates, one));
+    if evidence.iter().all(|one| *one < detected) {
         return if is_refuted {
             Verdict::Unknown
         } else {
@@ -444,10 +448,14 @@ pub fn verdict(
         return Verdict::NotEnoughData(format!(
             "{} has with the joint {} parameters for {} readings of different kind, which other causes would \
              explain as well; observe more modes, or move a sensor",
-            first.hypothesis.name(),
+            shown.hypothesis.name(),
             freedom.parameters,
             freedom.data
         ));
+    }
+    // Something unknown comes first, and is not established.
+    if first.is_unknown() {
+        return set_of(candidates, &groups, thresholds);
     }
     // A size that may be zero is no name.
     if !tested.is_sized {
@@ -661,5 +669,31 @@ mod tests {
             let named = Verdict::Named(vec![EffectId::Fixture]);
             assert_eq!(answer(misfit, 20.0), named);
         }
+    }
+
+    /// Something unknown is an answer only where it is as probable as a name has to be.
+    #[test]
+    fn limit_something_unknown_that_is_not_established_is_listed() {
+        let (dataset, fit) = fitted();
+        let tested = GoodnessOfFit::new(&dataset, &fit).unwrap();
+        let answer = |unknown: f64| {
+            let candidate = |hypothesis, probability| {
+                let mut candidate = Candidate::new(hypothesis, fit.clone());
+                candidate.fit.log_evidence = 20.0;
+                candidate.probability = probability;
+                candidate
+            };
+            let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+            let mut candidates = [
+                candidate(Hypothesis::Unknown, unknown),
+                candidate(mass, 1.0 - unknown),
+                candidate(Hypothesis::None, 0.0),
+            ];
+            candidates[2].fit.log_evidence = 0.0;
+            verdict(&candidates, Some(&tested), None, &Thresholds::DEFAULT)
+        };
+        assert_eq!(answer(0.9), Verdict::Unknown);
+        let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+        assert_eq!(answer(0.6), Verdict::Set(vec![Hypothesis::Unknown, mass]));
     }
 }

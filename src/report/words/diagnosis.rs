@@ -350,6 +350,7 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
         Verdict::Set(list) => {
             let words = list.iter().map(|one| match one {
                 Hypothesis::None => "nothing".to_owned(),
+                Hypothesis::Unknown => "something unknown".to_owned(),
                 _ => one.name(),
             });
             let effects: Vec<String> = words.collect();

@@ -1,9 +1,9 @@
 //! The ideal observer: the same fits, by one who knows from which distributions the study draws.
 //!
-//! Sizes have the log-normal distribution with median and spread of the study's own draws for this structure and test.
-//! Nothing, one effect and faults outside the catalogue are as probable as the study makes them. Everything else is as in the
-//! diagnosis. What the ideal observer misses, the readings do not show; what it finds and the diagnosis does not is
-//! the price of priors that are wide.
+//! Sizes of effects have a log-normal distribution, with median and spread of the study's own draws for this structure and
+//! test. Nothing, one effect and faults outside the catalogue are as probable as the study makes them. Everything else is
+//! that of the diagnosis: the share of pairs, and the sizes of faults outside. What this observer finds and the diagnosis
+//! does not is the price of wide priors.
 
 use super::outside::OutsideKind;
 use super::plans::PlannedTest;
@@ -16,13 +16,18 @@ use tapjoint::gap::{GapSettings, LogNormal};
 /// Draws from which median and spread of a size are taken: the spread is then known to 4 %.
 const DRAWS: usize = 300;
 
-/// Returns the settings of the ideal observer for a test.
-pub fn settings(random: &mut ChaCha8Rng, structure: &Structure, test: &PlannedTest) -> GapSettings {
-    let mut settings = GapSettings::default();
+/// Returns the settings of the ideal observer for a test, beside those of the diagnosis.
+pub fn settings(
+    random: &mut ChaCha8Rng,
+    structure: &Structure,
+    test: &PlannedTest,
+    diagnosis: &GapSettings,
+) -> GapSettings {
+    let mut settings = diagnosis.clone();
     let thresholds = &mut settings.thresholds;
     thresholds.no_gap_prior = Class::Nothing.multiple() as f64;
     thresholds.unknown_prior = OutsideKind::ALL.len() as f64;
-    // A rigid joint that gives is drawn as often as any other cause, which seldom has such a joint.
+    // The study draws this effect as often as any other group, but only on rigid joints, which few other tests have.
     thresholds.rigid_prior = Support::RigidCantilever.share().recip();
     for id in GROUPS.iter().flat_map(|members| members.iter()) {
         if let Some(sizes) = sizes_of(random, *id, structure, test) {
@@ -39,12 +44,8 @@ fn sizes_of(
     structure: &Structure,
     test: &PlannedTest,
 ) -> Option<LogNormal> {
-    // An effect with one size has no spread, and swapped channels need two sensors.
-    let is_fixed = matches!(
-        id,
-        EffectId::SensorPolarity | EffectId::SensorSwap | EffectId::ShearRotary
-    );
-    if is_fixed {
+    // These have no size.
+    if matches!(id, EffectId::SensorPolarity | EffectId::SensorSwap) {
         return None;
     }
     let drawn = (0..DRAWS).filter_map(|_| draw_effect(random, id, structure, test));

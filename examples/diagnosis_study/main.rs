@@ -19,7 +19,7 @@
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
 //! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
 //! threshold, with what half and twice of its value change. `--ideal`: beside each rate that of an observer who knows the
-//! study's distributions of sizes and the shares of all classes; it takes twice the time.
+//! study's distributions of sizes; it takes twice the time.
 
 mod draws;
 mod ideal;
@@ -153,6 +153,9 @@ fn main() -> Result<(), String> {
     let tasks = request.tasks()?;
     let (seed, settings) = (request.seed, &request.settings);
     if request.sweep {
+        if request.ideal || request.list || request.json.is_some() {
+            return Err("--sweep has no --ideal, --list or --json".to_owned());
+        }
         sweep::print(&tasks, seed, &settings.thresholds)?;
         return Ok(());
     }

@@ -292,9 +292,9 @@ impl DrawnTest {
     }
 
     /// Returns the answer of an observer who knows the study's distributions. `None` without a diagnosis.
-    fn ideal(&self) -> Option<Answer> {
+    fn ideal(&self, diagnosis: &GapSettings) -> Option<Answer> {
         let mut random = stream(self.seed, Stream::Ideal);
-        let settings = ideal::settings(&mut random, &self.structure, &self.test);
+        let settings = ideal::settings(&mut random, &self.structure, &self.test, diagnosis);
         let found = caught(|| diagnose(&self.observed, &self.described, &settings));
         found.ok().map(|found| Answer::of(&found))
     }
@@ -351,7 +351,7 @@ impl Trial {
         let answer = found.map(|found| Answer::of(&found));
         let seconds = begin.elapsed().as_secs_f64();
         Self {
-            ideal: if ideal { drawn.ideal() } else { None },
+            ideal: if ideal { drawn.ideal(settings) } else { None },
             ..drawn.answered(number, answer, seconds)
         }
     }

@@ -237,6 +237,22 @@ mod tests {
     use super::*;
     use crate::parameters::LogNormal;
 
+    /// Returns the prior probabilities of all sizes of an effect, and of those smaller than `middle`.
+    fn integrals(size: &Size, middle: f64) -> [f64; 2] {
+        const STEPS: usize = 400_000;
+        let step = (size.high - size.low) / STEPS as f64;
+        let (mut all, mut below) = (0.0, 0.0);
+        for k in 0..STEPS {
+            let at = size.low + step * (k as f64 + 0.5);
+            let share = step * size.log_density(at).exp();
+            all += share;
+            if at.abs() < middle {
+                below += share;
+            }
+        }
+        [all, below]
+    }
+
     /// Over all sizes the density integrates to 1, and half of it lies below the scale where there is no bound.
     #[test]
     fn val_the_prior_of_a_size_is_normalised_and_has_its_scale_in_the_middle() {
@@ -245,17 +261,7 @@ mod tests {
             Size::signed("relative", 0.02, 0.3),
             Size::offset(0.338, 0.423),
         ] {
-            const STEPS: usize = 400_000;
-            let step = (size.high - size.low) / STEPS as f64;
-            let (mut all, mut below) = (0.0, 0.0);
-            for k in 0..STEPS {
-                let at = size.low + step * (k as f64 + 0.5);
-                let share = step * size.log_density(at).exp();
-                all += share;
-                if at.abs() < size.scale {
-                    below += share;
-                }
-            }
+            let [all, below] = integrals(&size, size.scale);
             // The midpoint rule over a peak as wide as a thousandth of the range.
             assert!((all - 1.0).abs() < 1e-6, "{}: {all}", size.name);
             // Bounds at 5 to 25 scales and more cut off up to a twelfth of the tail.
@@ -266,7 +272,6 @@ mod tests {
     /// A known distribution is shared by both signs, and has its median in the middle.
     #[test]
     fn val_a_known_distribution_of_sizes_is_normalised() {
-        const STEPS: usize = 400_000;
         let size = Size {
             known: Some(LogNormal {
                 median: 0.01,
@@ -274,18 +279,19 @@ mod tests {
             }),
             ..Size::signed("relative", 0.02, 0.5)
         };
-        let step = (size.high - size.low) / STEPS as f64;
-        let (mut all, mut below) = (0.0, 0.0);
-        for k in 0..STEPS {
-            let at = size.low + step * (k as f64 + 0.5);
-            let share = step * size.log_density(at).exp();
-            all += share;
-            if at.abs() < 0.01 {
-                below += share;
-            }
+        // A sensor at the tip can only be nearer, and one beside it hardly farther.
+        for stated in [0.423, 0.419] {
+            let beside = Size {
+                known: size.known,
+                ..Size::offset(stated, 0.423)
+            };
+            let [all, _] = integrals(&beside, 0.01);
+            assert!((all - 1.0).abs() < 1e-5, "{stated}: {all}");
         }
-        // The bound cuts off five standard deviations; midpoints over a peak of a hundredth of the range.
+        let [all, below] = integrals(&size, 0.01);
+        // The bound cuts off what lies beyond 4.9 standard deviations: 5e-7. The rest is the midpoint rule's.
         assert!((all - 1.0).abs() < 1e-5, "{all}");
+        // A step of 2.5e-6 at the median, where the density is 0.5/(0.01 x 0.8): 1e-4 at most.
         assert!((below - 0.5).abs() < 1e-3, "{below}");
     }
 

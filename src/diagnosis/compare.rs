@@ -6,7 +6,7 @@ use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
-use crate::foreign::{ForeignFit, fit_foreign};
+use crate::foreign_fits::{ForeignFit, fit_foreign};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::{Hypothesis, UnlocatedSensors};
@@ -214,10 +214,7 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         add_large_effects(&search, &effects, &mut candidates);
     }
     // A better fit with an effect may lead to a better one without it.
-    let singles = candidates
-        .iter()
-        .filter(|one| one.drift.is_none() && !one.is_unknown());
-    let mut better: Vec<&Fit> = singles.map(|one| &one.fit).collect();
+    let mut better: Vec<&Fit> = candidates.iter().map(|one| &one.fit).collect();
     better.retain(|fit| fit.best.optimum.objective < none.best.optimum.objective);
     better.sort_by(|a, b| {
         a.best
@@ -248,10 +245,12 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         .map(|one| one.fit.log_evidence)
         .fold(f64::NEG_INFINITY, f64::max);
     let mut foreign: Vec<ForeignFit> = Vec::new();
-    // Where nothing is detected, no name is given that they could keep away.
+    // They only keep wrong names away. Without a detection there is no name.
     if most - none.log_evidence >= dataset.settings.thresholds.detected || !stands(&dataset, &none)
     {
-        foreign = fit_foreign(&dataset, &none, &candidates);
+        let mut singles = candidates.iter();
+        let one_mass = singles.find(|one| one.effects() == [EffectId::AddedMass]);
+        foreign = fit_foreign(&dataset, &none, one_mass.map(|one| &one.fit));
     }
     if let Some(fit) = fit_unknown(&dataset, &none, &foreign) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));

@@ -17,6 +17,7 @@
 //!                          amplitude      joints whose stiffness depends on the amplitude (with joint_motion)
 //!                          fixture        the fixture's own resonance
 //!                          fit            local optima of one hypothesis
+//!                          foreign        causes outside the catalogue (with foreign_fits)
 //!                          unknown        evidence of something outside the catalogue
 //!                          validate       residuals, hold-out data, leave-one-recording-out
 //!                          verdict        tests of one explanation, probabilities of all, an answer
@@ -26,7 +27,7 @@
 //!                          location_map   changes along the beam
 //!                          summary        the result
 //! ```
-//! `settings` has what a caller may choose, and `thresholds` every number that decides something.
+//! `settings` has what a caller may choose, and `thresholds` the limits of its decisions.
 //!
 //! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
 //! Under each, the joint's stiffnesses and all nuisance parameters are fitted and integrated over. Nuisance
@@ -46,6 +47,7 @@ mod evidence;
 mod fit;
 mod fixture;
 mod foreign;
+mod foreign_fits;
 mod forward;
 mod joint_motion;
 mod location_map;

@@ -345,8 +345,8 @@ impl UnpairedPeaks {
         }
     }
 
-    /// Returns whether some recording shows a peak that may be that of a fixture at this logarithm of the frequency: one
-    /// at a relative `distance` below this.
+    /// Returns whether a recording shows a peak within `distance` (1, relative) of this logarithm of a frequency. It may be
+    /// the fixture's.
     pub fn is_doubtful(&self, log: f64, distance: f64) -> bool {
         self.doubtful
             .iter()

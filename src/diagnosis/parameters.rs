@@ -12,7 +12,8 @@
 
 use crate::foreign::ForeignCause;
 use crate::structure::Nominal;
-use std::f64::consts::TAU;
+use statrs::function::erf::erfc;
+use std::f64::consts::{SQRT_2, TAU};
 use tapjoint_beam::effects::{Effect, EffectId, Group};
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_identify::consistent::Parameter;
@@ -193,14 +194,14 @@ pub struct Size {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// Distribution of the magnitude where it is known better than Cauchy's distribution says.
+    /// Distribution of the distance from `neutral`, in the unit of the size: it replaces Cauchy's. `None` for the catalogue's prior.
     pub known: Option<LogNormal>,
 }
 
 /// Distribution of a magnitude whose logarithm is normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogNormal {
-    /// Median (unit of the magnitude).
+    /// Median of the size's magnitude (SI).
     pub median: f64,
     /// Standard deviation of the natural logarithm.
     pub spread: f64,
@@ -211,6 +212,15 @@ impl LogNormal {
     fn log_density(&self, value: f64) -> f64 {
         let away = (value / self.median).ln() / self.spread;
         -0.5 * away * away - (value * self.spread * TAU.sqrt()).ln()
+    }
+
+    /// Returns the probability of a magnitude up to a bound (1).
+    fn share_below(&self, bound: f64) -> f64 {
+        if bound <= 0.0 {
+            return 0.0;
+        }
+        let away = (bound / self.median).ln() / self.spread;
+        0.5 * erfc(-away / SQRT_2)
     }
 }
 
@@ -326,14 +336,11 @@ impl Size {
         }
         if let Some(known) = self.known {
             let away = (value - self.neutral).abs();
-            // Of two signs each has half.
-            let sides = if self.low < self.neutral {
-                2.0_f64
-            } else {
-                1.0
-            };
-            return match away > 0.0 {
-                true => known.log_density(away) - sides.ln(),
+            // Both signs are equally probable, as far as the bounds allow.
+            let sides = [self.neutral - self.low, self.high - self.neutral];
+            let within: f64 = sides.iter().map(|bound| known.share_below(*bound)).sum();
+            return match away > 0.0 && within > 0.0 {
+                true => known.log_density(away) - within.ln(),
                 false => f64::NEG_INFINITY,
             };
         }

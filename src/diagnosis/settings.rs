@@ -123,12 +123,12 @@ pub struct GapSettings {
     pub highest_mode: usize,
     /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
-    /// Effects whose sizes have a known distribution, as in a study that drew them. All others have the priors of the
-    /// catalogue.
+    /// Distributions of the sizes of some effects (SI), if they are known, as in a study. All other effects have the
+    /// catalogue's priors.
     pub known_sizes: Vec<(EffectId, LogNormal)>,
     /// Seed of random draws.
     pub seed: u64,
-    /// Thresholds of all decisions.
+    /// Thresholds of all decisions. The words of reports state the default ones.
     pub thresholds: Thresholds,
 }
 
@@ -145,6 +145,14 @@ impl GapSettings {
             "drift_stds must hold at least one standard deviation above 0"
         } else if self.thresholds.withheld_modes >= self.thresholds.withhold_from {
             "withheld_modes must be less than withhold_from"
+        } else if self.thresholds.spared_modes >= self.thresholds.spare_modes_from {
+            "spared_modes must be less than spare_modes_from"
+        } else if !self
+            .known_sizes
+            .iter()
+            .all(|(_, known)| are_positive(&[known.median, known.spread]))
+        {
+            "medians and spreads of known_sizes must be finite and above 0"
         } else if !are_positive(&stds) {
             "discrepancy, shear_std, temperature_std and damping_tilt must be finite and above 0"
         } else if !(0.0..f64::INFINITY).contains(&self.frequency_floor) {

@@ -10,18 +10,21 @@
 //! - springs along the beam hold it to the ground, or take a support away that the description has;
 //! - all frequencies of one set-up are off by a factor of its own.
 //!
-//! Beside these stand causes with one size and one place ([`foreign`](crate::foreign)), and two masses. They are sought only
-//! where something is detected.
+//! Beside these stand causes with one size and one place ([`foreign_fits`](crate::foreign_fits)), and two masses. They are sought only
+//! where an effect has odds of 20 to 1, or the readings refute the nominal model.
 //!
 //! By Rayleigh's quotient a relative change e(x) of E I moves ln f by (1/2) int e E I w''^2 dx/omega^2, of the mass by
-//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass. All
-//! kinds are equally probable. So are all ways of a kind, and all spreads of a way. The last kind needs several
-//! set-ups. Slopes miss a part of what large changes do. Either they miss nothing, or a tenth of the change of each
-//! frequency, and a share of shapes and damping in proportion to the spread. Both are equally probable.
+//! -(1/2) int e rho A w^2 dx, and springs k(x) by (1/2) int k w^2 dx/omega^2, for a shape w of unit modal mass.
+//!
+//! Changes are grouped into kinds ([`Kind`]). All kinds are equally probable, all ways of a kind, and all spreads of a way.
+//! Factors of set-ups need several set-ups. Slopes are exact for small changes only. Two assumptions about their error are
+//! equally probable. In one there is no error. In the other each frequency is uncertain by a tenth of its change, and
+//! shapes and damping in proportion to the spread.
 
 use crate::dataset::{Dataset, ObservableKind};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
-use crate::foreign::ForeignFit;
+use crate::foreign::Kind;
+use crate::foreign_fits::ForeignFit;
 use crate::forward::Forward;
 use crate::location_map::{PIECES, local_slopes};
 use crate::modal_model::ModalModel;
@@ -41,31 +44,6 @@ const OF_SPRINGS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 const OF_SET_UPS: [f64; 3] = [5e-4, 2e-3, 8e-3];
 /// Changes along the beam, up to three waves of it: as fine as six modes resolve.
 const ORDERS: usize = 6;
-
-/// Kinds of ways, which are equally probable; so are all ways of a kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Each mode for itself.
-    Modes,
-    /// Stiffness, mass or thickness along the beam.
-    AlongBeam,
-    /// Springs along the beam.
-    Springs,
-    /// Things on the beam.
-    Things,
-    /// Each set-up for itself.
-    SetUps,
-}
-
-impl Kind {
-    const ALL: [Self; 5] = [
-        Self::Modes,
-        Self::AlongBeam,
-        Self::Springs,
-        Self::Things,
-        Self::SetUps,
-    ];
-}
 
 /// One way in which a structure may differ from its description.
 struct Way {
@@ -168,7 +146,7 @@ fn ways(dataset: &Dataset, models: &[ModalModel]) -> Vec<Way> {
             });
         }
     }
-    // Uniform springs, then springs that vary along the beam.
+    // Uniform springs, then springs that vary along the beam. The first stand beside a whole bed: foam is the commonest support.
     for orders in [1, ORDERS + 1] {
         all.push(Way {
             kind: Kind::Springs,

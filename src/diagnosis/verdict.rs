@@ -412,17 +412,20 @@ pub fn verdict(
     }
     let groups = by_group(candidates);
     let first = &candidates[groups[0].members[0]];
-    let is_unknown = first.is_unknown() && groups[0].probability >= thresholds.named_probability;
+    // No explanation is more probable than the nominal model.
+    if first.hypothesis == Hypothesis::None {
+        return if is_refuted {
+            Verdict::Unknown
+        } else {
+            Verdict::NoGap
+        };
+    }
+    let is_unknown = first.is_unknown() && groups[0].probability >= named;
     if is_unknown || tested.is_some_and(|one| one.refuting_p_value().is_some()) {
         return Verdict::Unknown;
     }
     // The tests below are those of the best explanation that has a model.
     let shown = best_known(candidates).map_or(first, |index| &candidates[index]);
-    // An effect too small to matter always competes with its absence; if no effect explains the
-    // data better than the nominal model, there is no gap.
-    if first.hypothesis == Hypothesis::None {
-        return Verdict::NoGap;
-    }
     // An effect needs evidence of its own, even where the nominal model is refuted. Many weak effects of one group may
     // hold the probability together.
     let evidence = [first, shown].map(|one| evidence_over_none(candidates, one));
@@ -453,11 +456,11 @@ pub fn verdict(
             freedom.data
         ));
     }
-    // Something unknown comes first, and is not established.
+    // Something unknown leads, but holds less than an answer needs.
     if first.is_unknown() {
         return set_of(candidates, &groups, thresholds);
     }
-    // A size that may be zero is no name.
+    // An effect whose size may be zero is not named.
     if !tested.is_sized {
         return if is_refuted {
             Verdict::Unknown
@@ -668,6 +671,35 @@ mod tests {
         for misfit in [1e-6, 0.009] {
             let named = Verdict::Named(vec![EffectId::Fixture]);
             assert_eq!(answer(misfit, 20.0), named);
+        }
+    }
+
+    /// A misfit of one in 200 does not refute the nominal model where nothing is more probable.
+    #[test]
+    fn limit_the_nominal_model_is_given_up_from_twenty_to_one() {
+        let (dataset, fit) = fitted();
+        let stands = GoodnessOfFit::new(&dataset, &fit).unwrap();
+        let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+        let candidate = |hypothesis, evidence: f64, probability| {
+            let mut candidate = Candidate::new(hypothesis, fit.clone());
+            candidate.fit.log_evidence = evidence;
+            candidate.probability = probability;
+            candidate
+        };
+        let candidates = [
+            candidate(Hypothesis::None, 0.0, 0.9),
+            candidate(mass, 5.2, 0.1),
+        ];
+        for (misfit, expected) in [(5e-3, Verdict::NoGap), (1e-6, Verdict::Unknown)] {
+            let mut tested = stands.clone();
+            tested.overall = Some(misfit);
+            let answer = verdict(
+                &candidates,
+                Some(&tested),
+                Some(&tested),
+                &Thresholds::DEFAULT,
+            );
+            assert_eq!(answer, expected, "{misfit}");
         }
     }
 

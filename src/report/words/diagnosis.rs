@@ -442,7 +442,7 @@ fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
-            " No effect is established: that needs odds of at least {:.0} to 1 against none.",
+            " No effect is established: that needs odds of at least {:.0} to 1 against none, and a size that is not zero.",
             Thresholds::DEFAULT.detected.exp()
         ),
         None => String::new(),

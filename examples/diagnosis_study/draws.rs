@@ -59,12 +59,16 @@ pub fn weighted(random: &mut ChaCha8Rng, weights: &[f64]) -> usize {
     weights.len() - 1
 }
 
+/// Largest error with heavy tails, in standard deviations.
+const MOST_STDS: f64 = 3.0;
+
 /// Shape of a distribution of errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorShape {
     Normal,
     Uniform,
-    /// Student's t with three degrees of freedom: one error in fifty is beyond three standard deviations.
+    /// Student's t with three degrees of freedom up to three standard deviations. What is farther off is a fault by itself, and
+    /// no tolerance.
     HeavyTailed,
 }
 
@@ -79,15 +83,20 @@ impl ErrorShape {
         }
     }
 
-    /// Returns an error of unit standard deviation.
+    /// Returns an error of unit standard deviation; of 0.78 where the tails are cut off.
     pub fn draw(self, random: &mut ChaCha8Rng) -> f64 {
         match self {
             Self::Normal => normal(random),
             Self::Uniform => 3f64.sqrt() * (2.0 * random.random::<f64>() - 1.0),
             Self::HeavyTailed => {
                 let distribution = StudentT::new(3.0).expect("three degrees of freedom");
-                // Its variance is 3.
-                distribution.sample(random) / 3f64.sqrt()
+                loop {
+                    // Its variance is 3.
+                    let error = distribution.sample(random) / 3f64.sqrt();
+                    if error.abs() < MOST_STDS {
+                        break error;
+                    }
+                }
             }
         }
     }

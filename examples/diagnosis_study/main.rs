@@ -12,20 +12,22 @@
 //! knows what to look for. Two effects are drawn until each is visible alone.
 //!
 //! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE]
-//! [--sweep] [--ideal] [--list] [--json FILE]`
+//! [--sweep] [--ideal] [--list] [--from FILE] [--json FILE]`
 //!
-//! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class.
-//! `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
+//! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class,
+//! or each of several. `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
 //! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
 //! threshold, with what half and twice of its value change. `--ideal`: beside each rate that of an observer who knows the
-//! study's distributions of sizes; it takes twice the time.
+//! study's distributions of sizes; it takes twice the time. `--from`: no test is run; those of such a file are scored, or of
+//! several files together, as `--json` wrote them.
 
 mod draws;
 mod ideal;
 mod outside;
 mod plans;
 mod plants;
+mod record;
 mod score;
 mod structures;
 mod sweep;
@@ -36,6 +38,7 @@ use draws::ErrorShape;
 use plans::PlanKind;
 use plants::Class;
 use rayon::prelude::*;
+use record::Record;
 use score::Scores;
 use serde_json::{Map, Value, json};
 use structures::{Support, Tolerances};
@@ -43,7 +46,7 @@ use tapjoint::gap::{GapSettings, Thresholds};
 use trial::{DrawnTest, Trial};
 
 const USAGE: &str = "usage: diagnosis_study [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE] \
-                     [--sweep] [--ideal] [--list] [--json FILE]";
+                     [--sweep] [--ideal] [--list] [--from FILE] [--json FILE]";
 /// Structures drawn for one test until one of them can be.
 const ATTEMPTS: u64 = 100;
 
@@ -51,12 +54,13 @@ const ATTEMPTS: u64 = 100;
 struct Request {
     tests: usize,
     seed: u64,
-    cell: Option<String>,
+    cells: Vec<String>,
     number: Option<usize>,
     settings: GapSettings,
     sweep: bool,
     ideal: bool,
     list: bool,
+    from: Vec<String>,
     json: Option<String>,
 }
 
@@ -72,12 +76,13 @@ impl Request {
         let mut request = Self {
             tests: 20,
             seed: 1,
-            cell: None,
+            cells: Vec::new(),
             number: None,
             settings: GapSettings::default(),
             sweep: false,
             ideal: false,
             list: false,
+            from: Vec::new(),
             json: None,
         };
         let mut given = std::env::args().skip(1);
@@ -101,7 +106,8 @@ impl Request {
             match name.as_str() {
                 "--tests" => request.tests = value.parse().map_err(|_| USAGE)?,
                 "--seed" => request.seed = value.parse().map_err(|_| USAGE)?,
-                "--cell" => request.cell = Some(value),
+                "--cell" => request.cells.push(value),
+                "--from" => request.from.push(value),
                 "--number" => request.number = Some(value.parse().map_err(|_| USAGE)?),
                 "--json" => request.json = Some(value),
                 "--set" => request.set(&value)?,
@@ -123,9 +129,7 @@ impl Request {
     fn tasks(&self) -> Result<Vec<Task>, String> {
         let all = Class::all();
         let names: Vec<String> = all.iter().map(|class| class.name()).collect();
-        if let Some(cell) = &self.cell
-            && !names.contains(cell)
-        {
+        if let Some(cell) = self.cells.iter().find(|cell| !names.contains(cell)) {
             return Err(format!(
                 "there is no cell `{cell}`; cells are: {}",
                 names.join(", ")
@@ -133,7 +137,7 @@ impl Request {
         }
         let mut tasks = Vec::new();
         for (cell, class) in all.into_iter().enumerate() {
-            let wanted = self.cell.as_ref().is_none_or(|name| names[cell] == *name);
+            let wanted = self.cells.is_empty() || self.cells.contains(&names[cell]);
             let numbers = 0..self.tests * class.multiple();
             let numbers = numbers.filter(|number| self.number.is_none_or(|one| one == *number));
             if wanted {
@@ -159,35 +163,33 @@ fn main() -> Result<(), String> {
         sweep::print(&tasks, seed, &settings.thresholds)?;
         return Ok(());
     }
-    let trials: Vec<Trial> = tasks
-        .par_iter()
-        .filter_map(|task| {
-            let drawn = task.draw(seed)?;
-            Some(Trial::run(&drawn, task.number, settings, request.ideal))
-        })
-        .collect();
-    if request.list {
-        for trial in &trials {
-            println!("{}", trial.line());
+    let mut records = record::read(&request.from)?;
+    if request.from.is_empty() {
+        let trials: Vec<Trial> = tasks
+            .par_iter()
+            .filter_map(|task| {
+                let drawn = task.draw(seed)?;
+                Some(Trial::run(&drawn, task.number, settings, request.ideal))
+            })
+            .collect();
+        if request.list {
+            for trial in &trials {
+                println!("{}", trial.line());
+            }
+            println!();
         }
-        println!();
+        records.extend(trials.iter().map(|trial| Record::new(seed, trial)));
     }
-    let total = Scores::of(&trials.iter().collect::<Vec<_>>());
-    let mut classes = Vec::new();
-    for class in Class::all() {
-        let own = trials.iter().filter(|trial| trial.truth.class == class);
-        let own: Vec<&Trial> = own.collect();
-        if !own.is_empty() {
-            classes.push((class, Scores::of(&own)));
-        }
-    }
-    let parts = parts(&trials);
+    let total = Scores::of(&records.iter().collect::<Vec<_>>());
+    let classes = Class::all().into_iter().map(|class| class.name());
+    let classes = parts_of(&records, classes, |record| record.class.clone());
+    let parts = parts(&records);
     table::print_total(&total);
     table::print_classes(&classes);
-    table::print_verdicts(&classes, &trials);
+    table::print_verdicts(&classes, &records);
     table::print_parts(&parts);
     if let Some(file) = &request.json {
-        let document = document(&request, &total, &classes, &parts);
+        let document = document(&request, &total, [&classes, &parts], &records);
         let text = serde_json::to_string_pretty(&document).map_err(|error| error.to_string())?;
         std::fs::write(file, text + "\n").map_err(|error| format!("{file}: {error}"))?;
     }
@@ -213,51 +215,62 @@ fn mixed(number: u64) -> u64 {
 }
 
 /// Returns the scores of parts of the tests: by plan, support, tolerances and distribution of their errors.
-fn parts(trials: &[Trial]) -> Vec<(String, Scores)> {
+fn parts(records: &[Record]) -> Vec<(String, Scores)> {
+    let plans = PlanKind::ALL.map(|kind| format!("plan {}", kind.name()));
+    let supports = Support::ALL.map(|support| format!("support {}", support.name()));
+    let tolerances = Tolerances::ALL.map(|one| format!("tolerances {}", one.name()));
+    let recordings = ["one", "two or three", "four to six"].map(|one| format!("recordings {one}"));
+    let errors = ErrorShape::ALL.map(|errors| format!("errors {}", errors.name()));
+    let mut parts = parts_of(records, plans, |one| format!("plan {}", one.plan));
+    parts.extend(parts_of(records, supports, |one| {
+        format!("support {}", one.support)
+    }));
+    parts.extend(parts_of(records, tolerances, |one| {
+        format!("tolerances {}", one.tolerances)
+    }));
+    parts.extend(parts_of(records, recordings, |one| {
+        let number = match one.recordings {
+            1 => "one",
+            2 | 3 => "two or three",
+            _ => "four to six",
+        };
+        format!("recordings {number}")
+    }));
+    parts.extend(parts_of(records, errors, |one| {
+        format!("errors {}", one.errors)
+    }));
+    parts
+}
+
+/// Returns the scores of the tests of each name; names without a test are left out.
+fn parts_of(
+    records: &[Record],
+    names: impl IntoIterator<Item = String>,
+    name_of: impl Fn(&Record) -> String,
+) -> Vec<(String, Scores)> {
     let mut parts = Vec::new();
-    for kind in PlanKind::ALL {
-        let own = trials.iter().filter(|trial| trial.plan == kind);
-        parts.push((format!("plan {}", kind.name()), own.collect::<Vec<_>>()));
+    for name in names {
+        let own: Vec<&Record> = records.iter().filter(|one| name_of(one) == name).collect();
+        if !own.is_empty() {
+            parts.push((name, Scores::of(&own)));
+        }
     }
-    for support in Support::ALL {
-        let own = trials.iter().filter(|trial| trial.support == support);
-        parts.push((format!("support {}", support.name()), own.collect()));
-    }
-    for tolerances in Tolerances::ALL {
-        let own = trials.iter().filter(|trial| trial.tolerances == tolerances);
-        parts.push((format!("tolerances {}", tolerances.name()), own.collect()));
-    }
-    for (name, counts) in [
-        ("one", 1..=1),
-        ("two or three", 2..=3),
-        ("four to six", 4..=6),
-    ] {
-        let own = trials.iter();
-        let own = own.filter(|trial| counts.contains(&trial.recordings));
-        parts.push((format!("recordings {name}"), own.collect()));
-    }
-    for errors in ErrorShape::ALL {
-        let own = trials.iter().filter(|trial| trial.errors == errors);
-        parts.push((format!("errors {}", errors.name()), own.collect()));
-    }
-    let parts = parts.into_iter();
-    parts.map(|(name, own)| (name, Scores::of(&own))).collect()
+    parts
 }
 
 fn document(
     request: &Request,
     total: &Scores,
-    classes: &[(Class, Scores)],
-    parts: &[(String, Scores)],
+    [classes, parts]: [&[(String, Scores)]; 2],
+    records: &[Record],
 ) -> Value {
-    let cells = classes.iter();
-    let cells: Map<String, Value> = cells
-        .map(|(class, scores)| (class.name(), scores.json()))
-        .collect();
-    let parts = parts.iter().filter(|part| part.1.tests > 0);
-    let parts: Map<String, Value> = parts
-        .map(|(name, scores)| (name.clone(), scores.json()))
-        .collect();
+    let [cells, parts] = [classes, parts].map(|rows| {
+        let rows = rows.iter();
+        let rows: Map<String, Value> = rows
+            .map(|(name, scores)| (name.clone(), scores.json()))
+            .collect();
+        rows
+    });
     let thresholds = &request.settings.thresholds;
     let names = Thresholds::names().into_iter();
     let set = names.filter(|name| thresholds.value(name) != Thresholds::DEFAULT.value(name));
@@ -271,5 +284,6 @@ fn document(
         "total": total.json(),
         "cells": cells,
         "parts": parts,
+        "records": records,
     })
 }

@@ -1,10 +1,9 @@
 //! Plans of tests: which recordings are made, with what noise, and what is stated of them.
 
-use super::draws::{log_triangular, log_uniform, weighted};
+use super::draws::{ErrorShape, log_triangular, log_uniform, weighted};
 use super::structures::{Structure, Support};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StudentT};
 use tapjoint::gap::{Nominal, NominalSensor, PlannedConfiguration, TestPlan};
 use tapjoint::identify::observation::Observations;
 use tapjoint::structure::specimen::{Joint, Mesh, PointMass, Specimen};
@@ -191,12 +190,11 @@ impl PlannedTest {
         let Some(std) = self.heavy_drift else {
             return;
         };
-        let tails = StudentT::new(3.0).expect("three degrees of freedom");
         let Ok(own) = truth.beam_modes(self.plan.modes, Mesh::DIAGNOSIS) else {
             return;
         };
         for configuration in &mut observed.configurations {
-            let factors = [0, 1].map(|_| (std * tails.sample(random) / 3f64.sqrt()).exp());
+            let factors = [0, 1].map(|_| (std * ErrorShape::HeavyTailed.draw(random)).exp());
             let mut drifted = truth.clone();
             if let Some(Joint { kt, kr, .. }) = &mut drifted.joint {
                 *kt *= factors[0];

@@ -190,11 +190,15 @@ pub fn size_of(effect: &Effect) -> f64 {
 }
 
 /// Returns whether these effects move nothing but the common factor of all frequencies, and that by less than two
-/// standard uncertainties.
+/// standard uncertainties. A wrong length shows in other ways too. It must be within two of its own.
 pub fn is_within_tolerance(effects: &[Effect], structure: &Structure) -> bool {
     let mut effects_left = effects.iter();
     !effects.is_empty()
-        && effects_left.all(|effect| effect.id.group() == Group::Scale)
+        && effects_left.all(|effect| {
+            let length = structure.uncertainty.beam.length.unwrap_or(0.0);
+            effect.id.group() == Group::Scale
+                && (effect.id != EffectId::Length || size_of(effect) < 2.0 * length)
+        })
         && common_factor(effects).abs() < 2.0 * structure.scale_std()
 }
 

@@ -1,5 +1,6 @@
 //! Scores of a set of tests: rates with their intervals, calibration of the stated probabilities, closure.
 
+use super::record::{Outcome, Record};
 use super::trial::{Answer, Explained, Trial};
 use serde_json::{Map, Value, json};
 use tapjoint::effects::{Effect, EffectId, Group};
@@ -15,7 +16,7 @@ const HOLDS: f64 = 2.0;
 pub const BINS: usize = 10;
 
 /// A test with a diagnosis.
-type Answered<'a> = (&'a Trial, &'a Answer);
+type Answered<'a> = (&'a Record, &'a Outcome);
 
 /// A rate under its name.
 pub struct NamedRate {
@@ -24,8 +25,10 @@ pub struct NamedRate {
     /// As the table has it.
     pub title: &'static str,
     pub rate: Rate,
-    /// What an observer reaches who knows the study's distributions; `None` where it was not asked for.
-    pub ideal: Option<f64>,
+    /// That of an observer who knows the study's distributions; no cases where it was not asked for.
+    pub ideal: Rate,
+    /// That of the diagnosis on the tests that this observer saw.
+    pub beside_ideal: Rate,
 }
 
 /// All scores of a set of tests.
@@ -41,8 +44,11 @@ pub struct Scores {
     pub first: Calibration,
     /// Calibration of all stated probabilities.
     pub every: Calibration,
+    /// Calibration of the ideal observer's first class.
+    pub ideal_first: Calibration,
     /// Mean over tests of the sum over classes of (p - truth)^2.
     pub brier: Option<f64>,
+    pub ideal_brier: Option<f64>,
     /// Mean probability of what is true.
     pub truth_probability: Option<f64>,
     pub verdicts: Vec<(&'static str, usize)>,
@@ -69,39 +75,56 @@ const VERDICTS: [&str; 6] = [
 ];
 
 impl Scores {
-    pub fn of(trials: &[&Trial]) -> Self {
-        let answered = trials
+    pub fn of(records: &[&Record]) -> Self {
+        let answered = records
             .iter()
-            .filter_map(|trial| Some((*trial, trial.answer.as_ref().ok()?)));
+            .filter_map(|record| Some((*record, record.answer.as_ref()?)));
         let answered: Vec<Answered> = answered.collect();
+        let ideal = records
+            .iter()
+            .filter_map(|record| Some((*record, record.ideal.as_ref()?)));
+        let ideal: Vec<Answered> = ideal.collect();
         let listed: Vec<f64> = answered
             .iter()
-            .filter(|(trial, _)| trial.truth.effects.len() < 2)
-            .map(|(_, answer)| answer.list(Thresholds::DEFAULT.set_probability).len() as f64)
+            .filter(|(record, _)| !record.is_pair)
+            .map(|(_, outcome)| list(&outcome.classes).len() as f64)
             .collect();
         let stated = answered
             .iter()
-            .map(|(trial, answer)| probability_of(answer, &trial.truth.explained()));
+            .map(|(record, outcome)| outcome.probability_of(&record.truth));
         let stated: Vec<f64> = stated.collect();
         let verdicts = VERDICTS.map(|kind| {
             let same = answered.iter();
-            let count = same.filter(|(_, answer)| answer.verdict.kind() == kind);
-            (kind, count.count())
+            (kind, same.filter(|one| one.1.verdict == kind).count())
+        });
+        let rates = MEASURES.iter().map(|measure| NamedRate {
+            key: measure.key,
+            title: measure.title,
+            rate: Rate::of(&answered, |one| one.1.hit(measure.key)),
+            // On the tests that the ideal observer saw, which may be a part of them.
+            ideal: Rate::of(&ideal, |one| one.1.hit(measure.key)),
+            beside_ideal: Rate::of(answered.iter().filter(|one| one.0.ideal.is_some()), |one| {
+                one.1.hit(measure.key)
+            }),
         });
         Self {
-            tests: trials.len(),
-            failed: trials.len() - answered.len(),
-            rates: MEASURES.map(|measure| measure.rate(&answered)).into(),
+            tests: records.len(),
+            failed: records.len() - answered.len(),
+            rates: rates.collect(),
             list_size: mean(&listed),
             closure: closures(&answered),
-            first: Calibration::of(&answered, |answer| {
-                &answer.classes[..answer.classes.len().min(1)]
+            first: Calibration::of(&answered, |outcome| {
+                &outcome.classes[..outcome.classes.len().min(1)]
             }),
-            every: Calibration::of(&answered, |answer| &answer.classes),
+            every: Calibration::of(&answered, |outcome| &outcome.classes),
+            ideal_first: Calibration::of(&ideal, |outcome| {
+                &outcome.classes[..outcome.classes.len().min(1)]
+            }),
             brier: mean(&answered.iter().map(brier).collect::<Vec<f64>>()),
+            ideal_brier: mean(&ideal.iter().map(brier).collect::<Vec<f64>>()),
             truth_probability: mean(&stated),
             verdicts: verdicts.to_vec(),
-            seconds: trials.iter().map(|trial| trial.seconds).sum(),
+            seconds: records.iter().map(|record| record.seconds).sum(),
         }
     }
 
@@ -125,7 +148,8 @@ impl Scores {
                     "rate": one.rate.value(),
                     "low": interval.map(|interval| interval.0),
                     "high": interval.map(|interval| interval.1),
-                    "ideal": one.ideal,
+                    "ideal": one.ideal.value(),
+                    "beside_ideal": one.beside_ideal.value(),
                 }),
             );
         }
@@ -146,41 +170,24 @@ impl Scores {
                 "nulls": self.closure.nulls,
             },
             "brier": self.brier,
+            "ideal_brier": self.ideal_brier,
             "truth_probability": self.truth_probability,
             "first_class": self.first.json(),
             "every_class": self.every.json(),
+            "ideal_first_class": self.ideal_first.json(),
             "verdicts": verdicts,
         })
     }
 }
 
 /// A rate that is counted: whether a test is a hit, or `None` where the test is none of its cases.
-struct Measure {
-    key: &'static str,
+pub struct Measure {
+    pub key: &'static str,
     title: &'static str,
-    hit: fn(&Trial, &Answer) -> Option<bool>,
+    pub hit: fn(&Trial, &Answer) -> Option<bool>,
 }
 
-impl Measure {
-    /// Returns the rate of the ideal observer, where it was asked for.
-    fn ideal(&self, answered: &[Answered]) -> Option<f64> {
-        let ideal = answered.iter();
-        let ideal = ideal.filter_map(|(trial, _)| Some((*trial, trial.ideal.as_ref()?)));
-        let ideal: Vec<Answered> = ideal.collect();
-        Rate::of(&ideal, |(trial, answer)| (self.hit)(trial, answer)).value()
-    }
-
-    fn rate(&self, answered: &[Answered]) -> NamedRate {
-        NamedRate {
-            key: self.key,
-            title: self.title,
-            rate: Rate::of(answered, |(trial, answer)| (self.hit)(trial, answer)),
-            ideal: self.ideal(answered),
-        }
-    }
-}
-
-const MEASURES: [Measure; 21] = [
+pub const MEASURES: [Measure; 21] = [
     Measure {
         key: "first_class_right",
         title: "first class right",
@@ -382,11 +389,20 @@ fn pair_found_or_refused(trial: &Trial, answer: &Answer) -> Option<bool> {
     pair_found(trial, answer).map(|is_found| is_found || is_fair)
 }
 
+/// Returns the most probable classes that hold 90 % together.
+fn list<T>(classes: &[(T, f64)]) -> &[(T, f64)] {
+    let mut sum = 0.0;
+    let enough = classes.iter().position(|one| {
+        sum += one.1;
+        sum >= Thresholds::DEFAULT.set_probability
+    });
+    &classes[..enough.map_or(classes.len(), |last| last + 1)]
+}
+
 /// Whether the list that holds 90 % holds what is true. Tests with two effects are scored for themselves.
 fn list_holds(trial: &Trial, answer: &Answer) -> Option<bool> {
     let truth = trial.truth.explained();
-    let mut list = answer.list(Thresholds::DEFAULT.set_probability).iter();
-    let holds = list.any(|one| one.0 == truth);
+    let holds = list(&answer.classes).iter().any(|one| one.0 == truth);
     (trial.truth.effects.len() < 2).then_some(holds)
 }
 
@@ -445,10 +461,8 @@ fn size_holds(effect: &Effect, answer: &Answer) -> Option<bool> {
 }
 
 fn closures(answered: &[Answered]) -> Closures {
-    let named = answered
-        .iter()
-        .filter(|(trial, answer)| trial.truth.is_single() && answer.named().is_some());
-    let all: Vec<Option<f64>> = named.map(|(_, answer)| answer.closure).collect();
+    let named = answered.iter().filter_map(|(_, outcome)| outcome.closure);
+    let all: Vec<Option<f64>> = named.collect();
     let mut stated: Vec<f64> = all.iter().flatten().copied().collect();
     stated.sort_by(f64::total_cmp);
     Closures {
@@ -471,15 +485,10 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-fn probability_of(answer: &Answer, class: &Explained) -> f64 {
-    let mut classes = answer.classes.iter();
-    classes.find(|one| one.0 == *class).map_or(0.0, |one| one.1)
-}
-
-fn brier((trial, answer): &Answered) -> f64 {
-    let truth = trial.truth.explained();
-    let others = answer.classes.iter().filter(|one| one.0 != truth);
-    (1.0 - probability_of(answer, &truth)).powi(2) + others.map(|one| one.1.powi(2)).sum::<f64>()
+fn brier((record, outcome): &Answered) -> f64 {
+    let others = outcome.classes.iter().filter(|one| one.0 != record.truth);
+    (1.0 - outcome.probability_of(&record.truth)).powi(2)
+        + others.map(|one| one.1.powi(2)).sum::<f64>()
 }
 
 /// How far stated probabilities can be trusted.
@@ -507,15 +516,14 @@ impl Calibration {
     /// Bins the statements that these tests make of classes.
     fn of(
         answered: &[Answered],
-        statements: impl for<'a> Fn(&'a Answer) -> &'a [(Explained, f64)],
+        statements: impl for<'a> Fn(&'a Outcome) -> &'a [(String, f64)],
     ) -> Self {
         let mut bins = vec![Bin::default(); BINS];
-        for (trial, answer) in answered {
-            let truth = trial.truth.explained();
-            for (class, probability) in statements(answer) {
+        for (record, outcome) in answered {
+            for (class, probability) in statements(outcome) {
                 let bin = &mut bins[((probability * BINS as f64) as usize).min(BINS - 1)];
                 bin.rate.of += 1;
-                bin.rate.hits += usize::from(*class == truth);
+                bin.rate.hits += usize::from(*class == record.truth);
                 bin.sum += probability;
             }
         }

@@ -4,8 +4,9 @@
 //! from the diagnosis with all thresholds as they are.
 
 use super::Task;
+use super::record::Record;
 use super::score::Scores;
-use super::trial::{Answer, DrawnTest, Trial, caught};
+use super::trial::{Answer, DrawnTest, caught};
 use rayon::prelude::*;
 use tapjoint::gap::{Comparison, GapSettings, SingleFits, Stage, Thresholds, check};
 
@@ -38,19 +39,21 @@ impl Variant {
 }
 
 /// One test with all thresholds as they are, stage by stage.
-struct Reference<'a> {
-    drawn: &'a DrawnTest,
+struct Reference {
+    number: usize,
+    drawn: DrawnTest,
     fits: Result<SingleFits, String>,
     comparison: Result<Comparison, String>,
     answer: Result<Answer, String>,
 }
 
-impl<'a> Reference<'a> {
-    fn new(drawn: &'a DrawnTest, settings: &GapSettings) -> Self {
-        let fits = fitted(drawn, settings);
+impl Reference {
+    fn new(number: usize, drawn: DrawnTest, settings: &GapSettings) -> Self {
+        let fits = fitted(&drawn, settings);
         let comparison = compared(&fits, &settings.thresholds);
         let answer = answered(&comparison, &settings.thresholds);
         Self {
+            number,
             drawn,
             fits,
             comparison,
@@ -58,9 +61,14 @@ impl<'a> Reference<'a> {
         }
     }
 
+    /// Returns what is kept of the test with an answer.
+    fn record(&self, answer: Result<Answer, String>) -> Record {
+        Record::new(0, &self.drawn.answered(self.number, answer, 0.0))
+    }
+
     /// Returns the answer with one threshold changed.
     fn answer(&self, variant: &Variant) -> Result<Answer, String> {
-        let (drawn, thresholds) = (self.drawn, &variant.settings.thresholds);
+        let (drawn, thresholds) = (&self.drawn, &variant.settings.thresholds);
         match variant.stage {
             // The requirements decide nothing but whether there is an answer.
             Stage::Requirements if self.fits.is_ok() => {
@@ -100,6 +108,7 @@ fn answered(
 }
 
 /// Prints the figures of these tests, and one row for each threshold: name, value, and what half and twice of it change.
+/// The rows that need new fits take nearly all of the time and come last.
 ///
 /// # Errors
 /// The text for a threshold that cannot take such a value.
@@ -109,52 +118,50 @@ pub fn print(tasks: &[Task], seed: u64, thresholds: &Thresholds) -> Result<(), S
         thresholds: thresholds.clone(),
         ..GapSettings::default()
     };
-    // All variants of a test, the thresholds as they are first.
-    let tests: Vec<Vec<Trial>> = tasks
+    let tests: Vec<Reference> = tasks
         .par_iter()
-        .filter_map(|task| {
-            let drawn = task.draw(seed)?;
-            let reference = Reference::new(&drawn, &settings);
-            let changed = variants.par_iter().map(|one| reference.answer(one));
-            let mut answers: Vec<Result<Answer, String>> = changed.collect();
-            answers.insert(0, reference.answer.clone());
-            let answers = answers.into_iter();
-            Some(
-                answers
-                    .map(|answer| drawn.answered(task.number, answer, 0.0))
-                    .collect(),
-            )
-        })
+        .filter_map(|task| Some(Reference::new(task.number, task.draw(seed)?, &settings)))
         .collect();
-    let column = |k: usize| -> Vec<&Trial> { tests.iter().map(|test| &test[k]).collect() };
-    let reference = column(0);
-    println!("{} tests: {}", reference.len(), figures(&reference));
+    let before: Vec<Record> = tests
+        .iter()
+        .map(|one| one.record(one.answer.clone()))
+        .collect();
+    let before: Vec<&Record> = before.iter().collect();
+    println!("{} tests: {}", before.len(), figures(&before));
     println!(
         "{:22} {:>9}  {:44} twice",
         "threshold", "value", "half and its changes"
     );
-    for (k, pair) in variants.chunks(FACTORS.len()).enumerate() {
-        let (name, first) = (pair[0].name, 1 + k * FACTORS.len());
-        let cells = pair.iter().enumerate().map(|(side, variant)| {
-            let changed = changes(&reference, &column(first + side));
+    for pair in variants.chunks(FACTORS.len()) {
+        let changed: Vec<Vec<Record>> = pair
+            .par_iter()
+            .map(|variant| {
+                let tests = tests.par_iter();
+                tests.map(|one| one.record(one.answer(variant))).collect()
+            })
+            .collect();
+        let cells = pair.iter().zip(&changed).map(|(variant, after)| {
+            let changed = changes(&before, &after.iter().collect::<Vec<_>>());
             format!("{}: {changed}", number(variant.value()))
         });
         let cells: Vec<String> = cells.collect();
+        let name = pair[0].name;
         let value = number(thresholds.value(name).unwrap_or(f64::NAN));
         println!("{name:22} {value:>9}  {:44} {}", cells[0], cells[1]);
     }
     Ok(())
 }
 
-/// Returns half and twice of each threshold, in the order of their names.
+/// Returns half and twice of each threshold. Those that take the least time come first.
 fn variants(thresholds: &Thresholds) -> Result<Vec<Variant>, String> {
     let mut all = Vec::new();
     for name in Thresholds::names() {
+        let stage = Thresholds::stage(name).unwrap_or(Stage::Fits);
         for factor in FACTORS {
             let changed = thresholds.with_factor(name, factor);
             all.push(Variant {
                 name,
-                stage: Thresholds::stage(name).unwrap_or(Stage::Fits),
+                stage,
                 settings: GapSettings {
                     thresholds: changed.map_err(|error| error.to_string())?,
                     ..GapSettings::default()
@@ -162,12 +169,19 @@ fn variants(thresholds: &Thresholds) -> Result<Vec<Variant>, String> {
             });
         }
     }
+    all.sort_by_key(|one| match one.stage {
+        Stage::Beside => 0,
+        Stage::Verdict => 1,
+        Stage::Requirements => 2,
+        Stage::Pairs => 3,
+        Stage::Fits => 4,
+    });
     Ok(all)
 }
 
 /// Returns all figures as hits of cases.
-fn figures(trials: &[&Trial]) -> String {
-    let scores = Scores::of(trials);
+fn figures(records: &[&Record]) -> String {
+    let scores = Scores::of(records);
     let figures = FIGURES.map(|(key, name)| {
         let rate = scores.rate(key);
         format!("{name} {}/{}", rate.hits, rate.of)
@@ -176,7 +190,7 @@ fn figures(trials: &[&Trial]) -> String {
 }
 
 /// Returns the figures that change, with their change, the number of other verdicts, and that of tests without a diagnosis.
-fn changes(before: &[&Trial], after: &[&Trial]) -> String {
+fn changes(before: &[&Record], after: &[&Record]) -> String {
     let (old, new) = (Scores::of(before), Scores::of(after));
     let mut parts = Vec::new();
     for (key, name) in FIGURES {
@@ -202,10 +216,9 @@ fn changes(before: &[&Trial], after: &[&Trial]) -> String {
 }
 
 /// Returns the verdict of a test; its words do not count.
-fn verdict_of(trial: &Trial) -> Option<(&'static str, Vec<String>)> {
-    let verdict = &trial.answer.as_ref().ok()?.verdict;
-    let names = verdict.hypotheses().iter().map(|one| one.name()).collect();
-    Some((verdict.kind(), names))
+fn verdict_of(record: &Record) -> Option<(&str, &[String])> {
+    let outcome = record.answer.as_ref()?;
+    Some((&outcome.verdict, &outcome.names))
 }
 
 /// Returns a number without the rounding of its last binary digits.

@@ -1,8 +1,7 @@
 //! The scores as text.
 
-use super::plants::Class;
+use super::record::Record;
 use super::score::{BINS, Bin, Calibration, NamedRate, Scores};
-use super::trial::Trial;
 use std::collections::BTreeMap;
 use tapjoint::study::blind_check::Rate;
 
@@ -15,8 +14,8 @@ pub fn print_total(scores: &Scores) {
         scores.seconds / scores.tests.max(1) as f64
     );
     println!(
-        "{:30} {:>11} {:>7}  {:15} {:>6}",
-        "rate", "hits/cases", "%", "95 % interval", "ideal"
+        "{:30} {:>11} {:>7}  {:15} {:>6} {:>6}",
+        "rate", "hits/cases", "%", "95 % interval", "beside", "ideal"
     );
     for one in &scores.rates {
         println!("{}", rate_line(one));
@@ -33,13 +32,15 @@ pub fn print_total(scores: &Scores) {
         scores.closure.nulls
     );
     println!(
-        "Brier {}, mean probability of the truth {}, expected calibration error: first class {}, every class {}",
+        "Brier {} (ideal {}), mean probability of the truth {}, expected calibration error: first class {}, every class {}; ideal, first class {}",
         number(scores.brier, 3),
+        number(scores.ideal_brier, 3),
         number(scores.truth_probability, 3),
         number(scores.first.error(), 3),
-        number(scores.every.error(), 3)
+        number(scores.every.error(), 3),
+        number(scores.ideal_first.error(), 3)
     );
-    print_reliability(&scores.first, &scores.every);
+    print_reliability(&[&scores.first, &scores.every, &scores.ideal_first]);
 }
 
 fn rate_line(one: &NamedRate) -> String {
@@ -48,23 +49,27 @@ fn rate_line(one: &NamedRate) -> String {
         format!("{:.1} to {:.1}", 100.0 * low, 100.0 * high)
     });
     format!(
-        "{:30} {count:>11} {:>7}  {interval:15} {:>6}",
+        "{:30} {count:>11} {:>7}  {interval:15} {:>6} {:>6}",
         one.title,
         percent(&one.rate),
-        number(one.ideal.map(|ideal| 100.0 * ideal), 1)
+        percent(&one.beside_ideal),
+        percent(&one.ideal)
     )
 }
 
-fn print_reliability(first: &Calibration, every: &Calibration) {
-    println!("\nreliability     first class                        every class");
-    println!("probability     cases  stated   right  95 %           cases  stated   right  95 %");
+fn print_reliability(all: &[&Calibration; 3]) {
+    let titles = ["first class", "every class", "ideal, first class"];
+    let titles = titles.map(|title| format!("{title:36}"));
+    println!("\nreliability     {}", titles.join(""));
+    let columns = format!("{:36}", " cases  stated   right  95 %").repeat(all.len());
+    println!("probability    {columns}");
     for index in 0..BINS {
         println!(
-            "{:.1} to {:.1}      {}   {}",
+            "{:.1} to {:.1}     {}",
             index as f64 / BINS as f64,
             (index + 1) as f64 / BINS as f64,
-            bin(&first.bins[index]),
-            bin(&every.bins[index])
+            all.map(|one| format!("{:36}", bin(&one.bins[index])))
+                .join("")
         );
     }
 }
@@ -82,7 +87,7 @@ fn bin(bin: &Bin) -> String {
 }
 
 /// Prints one row of rates for each class.
-pub fn print_classes(rows: &[(Class, Scores)]) {
+pub fn print_classes(rows: &[(String, Scores)]) {
     println!(
         "\n{:26} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
         "class (%)",
@@ -111,7 +116,7 @@ pub fn print_classes(rows: &[(Class, Scores)]) {
         };
         println!(
             "{:26} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
-            class.name(),
+            class,
             scores.tests,
             percent(&scores.rate("first_class_right")),
             percent(&scores.rate("first_group_right")),
@@ -132,7 +137,7 @@ pub fn print_classes(rows: &[(Class, Scores)]) {
 }
 
 /// Prints the verdicts of each class, and what is most often named or first instead of the truth.
-pub fn print_verdicts(rows: &[(Class, Scores)], trials: &[Trial]) {
+pub fn print_verdicts(rows: &[(String, Scores)], records: &[Record]) {
     println!(
         "\n{:26} verdicts; most often first instead of the truth",
         "class"
@@ -143,13 +148,13 @@ pub fn print_verdicts(rows: &[(Class, Scores)], trials: &[Trial]) {
             .map(|(kind, count)| format!("{kind} {count}"))
             .collect();
         let mut others: BTreeMap<String, usize> = BTreeMap::new();
-        for trial in trials.iter().filter(|trial| trial.truth.class == *class) {
-            let Ok(answer) = &trial.answer else { continue };
-            let Some((first, _)) = answer.classes.first() else {
+        for record in records.iter().filter(|record| record.class == *class) {
+            let outcome = record.answer.as_ref();
+            let Some((first, _)) = outcome.and_then(|outcome| outcome.classes.first()) else {
                 continue;
             };
-            if *first != trial.truth.explained() {
-                *others.entry(first.name()).or_default() += 1;
+            if *first != record.truth {
+                *others.entry(first.clone()).or_default() += 1;
             }
         }
         let mut others: Vec<(String, usize)> = others.into_iter().collect();
@@ -160,7 +165,7 @@ pub fn print_verdicts(rows: &[(Class, Scores)], trials: &[Trial]) {
             .collect();
         println!(
             "{:26} {}; {}",
-            class.name(),
+            class,
             verdicts.join(", "),
             others.join(", ")
         );
@@ -173,7 +178,7 @@ pub fn print_parts(rows: &[(String, Scores)]) {
         "\n{:30} {:>5} {:>18} {:>18} {:>18} {:>18}",
         "tests", "tests", "first group right", "names right", "nulls named", "90 % list"
     );
-    for (name, scores) in rows.iter().filter(|row| row.1.tests > 0) {
+    for (name, scores) in rows {
         let rates = [
             "first_group_right",
             "names_right",

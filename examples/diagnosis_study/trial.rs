@@ -12,8 +12,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 use tapjoint::effects::{Effect, EffectId, Group, Place};
 use tapjoint::gap::{
-    DETECTABLE, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, ParameterValue, TestPlan,
-    Verdict, diagnose, nominal_chi_square, observe,
+    DETECTABLE, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, ParameterValue, SingleFits,
+    TestPlan, Verdict, nominal_chi_square, observe,
 };
 use tapjoint::identify::observation::Observations;
 
@@ -178,16 +178,6 @@ impl Answer {
             _ => Some(named),
         }
     }
-
-    /// Returns the most probable classes that hold this probability together.
-    pub fn list(&self, share: f64) -> &[(Explained, f64)] {
-        let mut sum = 0.0;
-        let enough = self.classes.iter().position(|one| {
-            sum += one.1;
-            sum >= share
-        });
-        &self.classes[..enough.map_or(self.classes.len(), |last| last + 1)]
-    }
 }
 
 /// One test and its answer.
@@ -291,12 +281,21 @@ impl DrawnTest {
         })
     }
 
+    /// Returns the answer of the diagnosis, which proposes no next test here.
+    fn answer(&self, settings: &GapSettings) -> Result<Answer, String> {
+        let thresholds = &settings.thresholds;
+        let found = caught(|| {
+            let fits = SingleFits::new(&self.observed, &self.described, settings)?;
+            Ok(fits.with_pairs(thresholds).without_next_tests(thresholds))
+        });
+        found.map(|found| Answer::of(&found))
+    }
+
     /// Returns the answer of an observer who knows the study's distributions. `None` without a diagnosis.
     fn ideal(&self, diagnosis: &GapSettings) -> Option<Answer> {
         let mut random = stream(self.seed, Stream::Ideal);
         let settings = ideal::settings(&mut random, &self.structure, &self.test, diagnosis);
-        let found = caught(|| diagnose(&self.observed, &self.described, &settings));
-        found.ok().map(|found| Answer::of(&found))
+        self.answer(&settings).ok()
     }
 
     /// Returns the test with an answer, which took some seconds.
@@ -347,8 +346,7 @@ impl Trial {
     /// Diagnoses a test, also as the ideal observer would if asked to.
     pub fn run(drawn: &DrawnTest, number: usize, settings: &GapSettings, ideal: bool) -> Self {
         let begin = Instant::now();
-        let found = caught(|| diagnose(&drawn.observed, &drawn.described, settings));
-        let answer = found.map(|found| Answer::of(&found));
+        let answer = drawn.answer(settings);
         let seconds = begin.elapsed().as_secs_f64();
         Self {
             ideal: if ideal { drawn.ideal(settings) } else { None },

@@ -5,7 +5,7 @@ use crate::candidates::candidate_effects;
 use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
-use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
+use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_without};
 use crate::foreign_fits::{ForeignFit, fit_foreign};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
@@ -223,7 +223,7 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
             .total_cmp(&b.best.optimum.objective)
     });
     for fit in better.into_iter().take(REFITTED) {
-        if let Some(again) = refit_nominal(&dataset, fit)
+        if let Some(again) = refit_without(&dataset, fit, 0)
             && again.log_evidence > none.log_evidence
         {
             none = again;

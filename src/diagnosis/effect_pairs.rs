@@ -2,11 +2,10 @@
 
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
-use crate::fit::{CoarseModel, Search, Start, settle, unexplained};
+use crate::fit::{CoarseModel, Search, Start, refit_without, settle, unexplained};
 use crate::parameters::CandidateEffect;
 use crate::result::Hypothesis;
-use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
-use crate::verdict::{Candidate, GoodnessOfFit, refutes_by_holdout, set_probabilities};
+use crate::verdict::{Candidate, GoodnessOfFit, set_probabilities};
 use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
 
@@ -34,11 +33,10 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     let suffices_one = candidates
         .iter()
         .any(|one| !one.is_unknown() && one.drift.is_none() && stands(dataset, &one.fit));
-    let singles: Vec<&Candidate> = candidates
-        .iter()
-        .filter(|one| one.effects().len() == 1 && one.drift.is_none())
-        .collect();
-    let search = PairSearch { dataset, singles };
+    let search = PairSearch {
+        dataset,
+        singles: singles_of(candidates),
+    };
     let needed = if suffices_one {
         thresholds.promised_by_second
     } else {
@@ -51,9 +49,45 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
         pairs.extend(far);
         tried = tried.max(asked);
     }
-    let found: Vec<Option<Candidate>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
-    candidates.extend(distinct(found.into_iter().flatten().collect()));
+    let fitted: Vec<Option<Fit>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
+    let fitted: Vec<Fit> = fitted.into_iter().flatten().collect();
+    // A search for two effects may lead further than that for one of them. The other one gets no credit for it.
+    let better = fitted.par_iter().map(|pair| singles_from(dataset, pair));
+    for fit in better.collect::<Vec<Vec<Fit>>>().into_iter().flatten() {
+        let mut singles = candidates.iter_mut();
+        if let Some(known) = singles.find(|one| one.effects() == effects_of(&fit)) {
+            known.fit.replace_by_better(fit);
+        }
+    }
+    let singles = singles_of(candidates);
+    let found = fitted.into_par_iter();
+    let found = found.filter_map(|fit| accepted(dataset, &singles, fit));
+    let found: Vec<Candidate> = found.collect();
+    candidates.extend(distinct(found));
     set_probabilities(candidates, tried, thresholds);
+}
+
+/// Returns the candidates of one effect.
+fn singles_of(candidates: &[Candidate]) -> Vec<&Candidate> {
+    let all = candidates.iter();
+    all.filter(|one| one.effects().len() == 1 && one.drift.is_none())
+        .collect()
+}
+
+fn effects_of(fit: &Fit) -> Vec<EffectId> {
+    let effects = fit.effects.iter();
+    effects.filter_map(CandidateEffect::effect).collect()
+}
+
+/// Returns the fits of each of two effects alone, from where both were fitted.
+fn singles_from(dataset: &Dataset, pair: &Fit) -> Vec<Fit> {
+    // A fixture's evidence depends on the peaks beside the modes, which only its own search counts.
+    let singles = [0, 1]
+        .into_iter()
+        .filter(|k| !pair.effects[1 - k].is(EffectId::Fixture));
+    singles
+        .filter_map(|k| refit_without(dataset, pair, k))
+        .collect()
 }
 
 /// Two single effects that are tried together, and points where a multi-start search ended, the most
@@ -181,9 +215,8 @@ impl<'a> PairSearch<'a> {
         (all.len(), best_pairs(found, FITTED_PAIRS))
     }
 
-    /// Fits a pair, if it is accepted: it has to beat the better of the two by
-    /// themselves in evidence, and hold on data outside the fit.
-    fn fit(&self, pair: &Pair<'_>) -> Option<Candidate> {
+    /// Fits a pair from all its starts.
+    fn fit(&self, pair: &Pair<'_>) -> Option<Fit> {
         let (first, second) = (&pair.first.fit, &pair.second.fit);
         let mut fits: Vec<Fit> = Vec::new();
         if pair.starts.is_empty() {
@@ -202,44 +235,31 @@ impl<'a> PairSearch<'a> {
         // Only the best of several things that an effect may act on is fitted.
         let variants = fit.effects.iter().map(|one| (one.variants as f64).ln());
         fit.log_evidence -= variants.sum::<f64>();
-        let alone = if first.log_evidence > second.log_evidence {
-            first
-        } else {
-            second
-        };
-        let thresholds = &self.dataset.settings.thresholds;
-        let [own, one, other] = [&fit, first, second].map(|fit| fit.best.optimum.objective);
-        // A pair that explains less than one of its members has not reached its optimum.
-        if own > one.min(other) || fit.log_evidence < alone.log_evidence + thresholds.second_effect
-        {
-            return None;
-        }
-        // The hold-out data are predicted better, or at least do not refute the fit: two effects leave more open than one
-        // does. Without hold-out data each mode is predicted better from the others.
-        let dataset = self.dataset;
-        let [before, after] = [alone, &fit].map(|fit| HoldoutErrors::new(dataset, fit));
-        let improves = match before.zip(after) {
-            Some((before, after)) => {
-                after.rms() < before.rms()
-                    || holdout_goodness(dataset, &fit, |p| refutes_by_holdout(p, thresholds))
-                        .is_some_and(|p| !refutes_by_holdout(p, thresholds))
-            }
-            None => {
-                let [before, after] =
-                    [alone, &fit].map(|fit| Residuals::new(dataset, fit)?.left_out_rms(dataset));
-                (before.zip(after)).is_some_and(|(before, after)| after < before)
-            }
-        };
-        if !improves {
-            return None;
-        }
-        let effects = fit
-            .effects
-            .iter()
-            .filter_map(CandidateEffect::effect)
-            .collect();
-        Some(Candidate::new(Hypothesis::Effects(effects), fit))
+        Some(fit)
     }
+}
+
+/// Returns a pair as a candidate, if it beats the better of the two by themselves in evidence. Whether it holds on data outside
+/// the fit decides on its name, not on its probability.
+fn accepted(dataset: &Dataset, singles: &[&Candidate], fit: Fit) -> Option<Candidate> {
+    let thresholds = &dataset.settings.thresholds;
+    let effects = effects_of(&fit);
+    let alone = singles
+        .iter()
+        .filter(|one| effects.contains(&one.effects()[0]));
+    let alone: Vec<&Fit> = alone.map(|one| &one.fit).collect();
+    let objectives = alone.iter().map(|one| one.best.optimum.objective);
+    // A pair that explains less than one of its members has not reached its optimum.
+    if fit.best.optimum.objective > objectives.fold(f64::INFINITY, f64::min) {
+        return None;
+    }
+    let alone = alone
+        .into_iter()
+        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+    if fit.log_evidence < alone.log_evidence + thresholds.second_effect {
+        return None;
+    }
+    Some(Candidate::new(Hypothesis::Effects(effects), fit))
 }
 
 /// Returns the distinct starts of least objective, the best first.

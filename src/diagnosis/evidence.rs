@@ -56,6 +56,17 @@ impl Fit {
         })
     }
 
+    /// Takes a fit of the same effects in its place, if that explains the data better. The evidence is that of both optima.
+    pub fn replace_by_better(&mut self, other: Fit) {
+        if other.best.optimum.objective < self.best.optimum.objective {
+            let log_evidence = log_sum(&[self.log_evidence, other.log_evidence]);
+            *self = Fit {
+                log_evidence,
+                ..other
+            };
+        }
+    }
+
     /// Best parameters.
     pub fn parameters(&self) -> &[f64] {
         &self.best.optimum.parameters
@@ -64,6 +75,10 @@ impl Fit {
 
 /// Searches with the drift that suits the optimum.
 const RETURNS: usize = 2;
+/// Searches with a wider prior of a size.
+const WIDENINGS: usize = 2;
+/// Width of the wider prior, over the size found so far: it then pulls by next to nothing.
+const WIDER: f64 = 4.0;
 /// Difference of log probability up to which the linearised model counts as true.
 const LINEAR_ENOUGH: f64 = 0.3;
 
@@ -72,8 +87,15 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
     let (dataset, layout) = (forward.dataset, &forward.layout);
     let drifts = &dataset.settings.drift_stds;
     let middle = drifts[drifts.len() / 2];
-    let priors = dataset.with_drift(layout, priors, middle);
+    let mut priors = dataset.with_drift(layout, priors, middle);
     let mut optimum = maximise(&dataset.data, &priors, start, forward)?;
+    // The search's normal prior would hold back a size far beyond its scale, which Cauchy's does not.
+    for _ in 0..WIDENINGS {
+        if !widen(layout, &mut priors, &optimum) {
+            break;
+        }
+        optimum = maximise(&dataset.data, &priors, &optimum.parameters, forward)?;
+    }
     let mut found = over_drifts(dataset, layout, &priors, &optimum, drifts);
     // Another drift moves the optimum by the linearised model; where the true one does not follow, it
     // is searched again with that drift.
@@ -85,7 +107,15 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
         if (truly - found.optimum.objective).abs() < LINEAR_ENOUGH {
             return Some(found);
         }
-        optimum = maximise(&dataset.data, &own, there, forward)?;
+        // The linearised step may have crossed to another valley, as where a tap moves off the end of a beam.
+        let before = &optimum.model.predicted;
+        let kept = objective_at(&dataset.data, &own, &optimum.parameters, before);
+        let start = if kept < truly {
+            &optimum.parameters
+        } else {
+            there
+        };
+        optimum = maximise(&dataset.data, &own, start, forward)?;
         found = over_drifts(dataset, layout, &own, &optimum, drifts);
     }
     // A search that does not settle counts with the true model, without other drifts.
@@ -99,6 +129,21 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
         log_evidence,
         drifts: vec![(middle, log_evidence)],
     })
+}
+
+/// Widens the normal prior of each size that lies beyond its standard deviation. Returns whether there is one.
+fn widen(layout: &Layout, priors: &mut [Prior], optimum: &Optimum) -> bool {
+    let mut is_wider = false;
+    for effect in 0..layout.effects.len() {
+        let size = layout.size(effect);
+        let prior = &mut priors[size];
+        let away = (optimum.parameters[size] - prior.centre).abs();
+        if !prior.is_held() && away > prior.std {
+            prior.std = WIDER * away;
+            is_wider = true;
+        }
+    }
+    is_wider
 }
 
 /// Averages the evidence at an optimum over the drift's spreads, by the model linearised there.

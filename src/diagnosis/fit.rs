@@ -11,7 +11,9 @@ use crate::fixture::with_peaks;
 use crate::forward::Forward;
 use crate::modal_model::ModalModel;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
-use crate::parameters::{CandidateEffect, Cause, LocationKind, LocationRange, Prior};
+use crate::parameters::{
+    CandidateEffect, Cause, LocationKind, LocationRange, NuisanceParameter, Prior,
+};
 use crate::structure::COUPLING;
 use crate::thresholds::Thresholds;
 use tapjoint_numerics::stats::root_mean_square;
@@ -27,7 +29,8 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
             *parameter = value;
         }
     }
-    Fit::of_variants(vec![evaluate(&forward, &priors, &start)?])
+    let found = evaluate(&forward, &priors, &start)?;
+    Fit::of_variants(vec![from_other_places(&forward, &found).unwrap_or(found)])
 }
 
 /// Largest size from which a search begins, over its scale.
@@ -66,16 +69,87 @@ pub fn fit_frequencies(dataset: &Dataset) -> Option<Fit> {
     fit_nominal(&alone)
 }
 
-/// Fits the nominal model from where an effect was fitted. That search may have led further than the one without.
-/// `None` if the fit fails.
-pub fn refit_nominal(dataset: &Dataset, with: &Fit) -> Option<Fit> {
-    let forward = Forward::new(dataset, &[]);
-    let joint = forward.layout.joint.len();
+/// Fits the model without one effect from where it was fitted with it: that search may have led further than the one
+/// without. `None` if the fit fails.
+pub fn refit_without(dataset: &Dataset, with: &Fit, effect: usize) -> Option<Fit> {
+    let mut kept = with.effects.clone();
+    kept.remove(effect);
+    let forward = Forward::new(dataset, &kept);
+    let layout = dataset.layout(&with.effects);
+    let own = 1 + usize::from(layout.location(effect).is_some());
     let mut start = with.parameters().to_vec();
-    start.drain(joint..dataset.layout(&with.effects).first_nuisance());
-    Fit::of_variants(vec![evaluate(&forward, &forward.priors(), &start)?])
+    start.drain(layout.size(effect)..layout.size(effect) + own);
+    let found = evaluate(&forward, &forward.priors(), &start)?;
+    let found = from_other_places(&forward, &found).unwrap_or(found);
+    Some(Fit {
+        effects: kept,
+        ..Fit::of_variants(vec![found])?
+    })
 }
 
+/// Places of sensors and taps from which a search begins again, over the standard uncertainty of the stated one.
+const OTHER_PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+/// Decrease of the objective that is worth another search: three standard deviations.
+const WORTH_A_SEARCH: f64 = 4.5;
+
+/// Returns a better optimum with sensors and taps elsewhere within their tolerances; `None` where there is none. A shape has
+/// equal values on both sides of an extreme, so that a search from the stated place may end on the wrong side.
+fn from_other_places(forward: &Forward<'_>, found: &LocalOptimum) -> Option<LocalOptimum> {
+    let (dataset, optimum) = (forward.dataset, &found.optimum);
+    let (mut shapes, mut chi_square) = (0.0, 0.0);
+    for (row, observable) in dataset.observables.iter().enumerate() {
+        if observable.is_shape() {
+            shapes += 1.0;
+            chi_square += dataset.data[row]
+                .residual(optimum.model.predicted[row])
+                .powi(2);
+        }
+    }
+    // Shapes that fit leave nothing to search.
+    if chi_square <= shapes + 3.0 * f64::sqrt(2.0 * shapes) {
+        return None;
+    }
+    let models = forward.solve(&optimum.parameters)?;
+    let objective = |at: &[f64]| {
+        let predicted = forward.predict_set_up(at, &models)?;
+        Some(objective_at(&dataset.data, &found.priors, at, &predicted))
+    };
+    let mut start = optimum.parameters.clone();
+    let here = objective(&start)?;
+    let mut least = here;
+    let first = forward.layout.first_nuisance();
+    let mut held = found.priors.clone();
+    for (k, nuisance) in dataset.nuisances.iter().enumerate() {
+        use NuisanceParameter::{SensorPosition, TapPosition};
+        if !matches!(
+            nuisance.parameter,
+            SensorPosition { .. } | TapPosition { .. }
+        ) {
+            continue;
+        }
+        let mut best = start[first + k];
+        for away in OTHER_PLACES {
+            start[first + k] = nuisance.centre + away * nuisance.std;
+            if let Some(own) = objective(&start)
+                && own < least
+            {
+                (best, least) = (start[first + k], own);
+            }
+        }
+        start[first + k] = best;
+        held[first + k] = Prior::held(best);
+    }
+    if least > here - WORTH_A_SEARCH {
+        return None;
+    }
+    // All else follows the new places first: a moved mass moves the frequencies, which would draw it back.
+    let there = maximise(&dataset.data, &held, &start, forward)?;
+    let other = evaluate(forward, &forward.priors(), &there.parameters)?;
+    is_better(&other, found).then_some(other)
+}
+
+/// Logarithm of the evidence by which the best node may stay below the best optimum.
+const MISSED_BY_NODES: f64 = 5.0;
 /// Nodes of a location at which the true model is fitted.
 const CORRECTED: usize = 6;
 
@@ -264,7 +338,11 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the fit with what the size's profile and a fixture's peak add to its evidence.
-    fn finish(&self, forward: &Forward<'_>, best: LocalOptimum, log_evidence: f64) -> Fit {
+    fn finish(&self, forward: &Forward<'_>, mut best: LocalOptimum, mut log_evidence: f64) -> Fit {
+        if let Some(other) = from_other_places(forward, &best) {
+            log_evidence = log_sum(&[log_evidence, other.log_evidence]);
+            best = other;
+        }
         let correction = profile_correction(forward, &best);
         let most = log_likelihood(&self.dataset.data, &best.optimum);
         let fit = Fit {
@@ -384,7 +462,11 @@ impl<'a> Search<'a> {
             descend(forward, &starts, &mut found);
         }
         let best = best_of(&found)?.clone();
-        let total = if is_located(&best, at, spacing, thresholds) {
+        // Linearised nodes miss an effect that is larger than their reach.
+        let nodes_hold = evidence
+            .iter()
+            .any(|node| *node > best.log_evidence - MISSED_BY_NODES);
+        let total = if !nodes_hold || is_located(&best, at, spacing, thresholds) {
             log_sum(&evidences_of(&found))
         } else {
             log_mean(&evidence)

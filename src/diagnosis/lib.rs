@@ -58,6 +58,8 @@ mod observations;
 mod optimum;
 mod parameters;
 mod result;
+#[cfg(test)]
+mod search_tests;
 mod set_up;
 #[cfg(test)]
 mod set_up_tests;

@@ -1,0 +1,138 @@
+//! What is kept of a test: enough for all scores, so that studies run apart can be scored together.
+
+use super::score::{MEASURES, Measure};
+use super::trial::{Answer, Trial};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// A test and what two observers made of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Record {
+    pub seed: u64,
+    pub number: usize,
+    /// Cell of the study.
+    pub class: String,
+    pub support: String,
+    pub tolerances: String,
+    pub errors: String,
+    pub plan: String,
+    pub recordings: usize,
+    /// What is to be found: `none`, `unknown`, or groups of effects.
+    pub truth: String,
+    /// Two effects are planted.
+    pub is_pair: bool,
+    /// `None` without a diagnosis.
+    pub answer: Option<Outcome>,
+    /// That of the ideal observer, where it was asked for.
+    pub ideal: Option<Outcome>,
+    /// Time of the diagnosis (s).
+    pub seconds: f64,
+}
+
+/// An answer, scored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Kind of the verdict.
+    pub verdict: String,
+    /// Hypotheses that the verdict names.
+    pub names: Vec<String>,
+    /// Probability of each class, the most probable first.
+    pub classes: Vec<(String, f64)>,
+    /// Keys of the rates that this test is a case of, and whether it is a hit.
+    pub hits: Vec<(String, bool)>,
+    /// Closure on spared data, where one effect is planted and something is named; the inner `None` where none is stated.
+    pub closure: Option<Option<f64>>,
+}
+
+impl Outcome {
+    fn new(trial: &Trial, answer: &Answer) -> Self {
+        let is_scored = |measure: &Measure| {
+            let hit = (measure.hit)(trial, answer)?;
+            Some((measure.key.to_owned(), hit))
+        };
+        let classes = answer.classes.iter();
+        let names = answer.verdict.hypotheses();
+        let is_closed = trial.truth.is_single() && answer.named().is_some();
+        Self {
+            verdict: answer.verdict.kind().to_owned(),
+            names: names.iter().map(|one| one.name()).collect(),
+            classes: classes.map(|(class, p)| (class.name(), *p)).collect(),
+            hits: MEASURES.iter().filter_map(is_scored).collect(),
+            closure: is_closed.then_some(answer.closure),
+        }
+    }
+
+    /// Returns whether this test is a hit of a rate; `None` where it is none of its cases.
+    pub fn hit(&self, key: &str) -> Option<bool> {
+        let mut hits = self.hits.iter();
+        hits.find(|one| one.0 == key).map(|one| one.1)
+    }
+
+    /// Returns the stated probability of a class.
+    pub fn probability_of(&self, class: &str) -> f64 {
+        let mut classes = self.classes.iter();
+        classes.find(|one| one.0 == class).map_or(0.0, |one| one.1)
+    }
+}
+
+impl Record {
+    pub fn new(seed: u64, trial: &Trial) -> Self {
+        Self {
+            seed,
+            number: trial.number,
+            class: trial.truth.class.name(),
+            support: trial.support.name().to_owned(),
+            tolerances: trial.tolerances.name().to_owned(),
+            errors: trial.errors.name().to_owned(),
+            plan: trial.plan.name().to_owned(),
+            recordings: trial.recordings,
+            truth: trial.truth.explained().name(),
+            is_pair: trial.truth.effects.len() == 2,
+            answer: trial
+                .answer
+                .as_ref()
+                .ok()
+                .map(|answer| Outcome::new(trial, answer)),
+            ideal: trial
+                .ideal
+                .as_ref()
+                .map(|answer| Outcome::new(trial, answer)),
+            seconds: trial.seconds,
+        }
+    }
+}
+
+/// Reads the tests of earlier studies from the files that `--json` wrote.
+///
+/// # Errors
+/// The text for a file that is none, or that has a test which another one has too.
+pub fn read(files: &[String]) -> Result<Vec<Record>, String> {
+    let mut all: Vec<Record> = Vec::new();
+    for file in files {
+        let failed = |reason: String| format!("{file}: {reason}");
+        let text = std::fs::read_to_string(file).map_err(|error| failed(error.to_string()))?;
+        let mut document: Value =
+            serde_json::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        let records: Vec<Record> = serde_json::from_value(document["records"].take())
+            .map_err(|error| failed(format!("`records` of a study: {error}")))?;
+        for record in &records {
+            let mut known = all.iter();
+            let is_same = |one: &Record| {
+                one.seed == record.seed && one.number == record.number && one.class == record.class
+            };
+            if known.any(is_same) {
+                let Record {
+                    seed,
+                    number,
+                    class,
+                    ..
+                } = record;
+                return Err(failed(format!(
+                    "seed {seed} {class} {number} is read twice"
+                )));
+            }
+        }
+        all.extend(records);
+    }
+    Ok(all)
+}

@@ -148,8 +148,6 @@ fn from_other_places(forward: &Forward<'_>, found: &LocalOptimum) -> Option<Loca
     is_better(&other, found).then_some(other)
 }
 
-/// Logarithm of the evidence by which the best node may stay below the best optimum.
-const MISSED_BY_NODES: f64 = 5.0;
 /// Nodes of a location at which the true model is fitted.
 const CORRECTED: usize = 6;
 
@@ -462,15 +460,17 @@ impl<'a> Search<'a> {
             descend(forward, &starts, &mut found);
         }
         let best = best_of(&found)?.clone();
-        // Linearised nodes miss an effect that is larger than their reach.
-        let nodes_hold = evidence
-            .iter()
-            .any(|node| *node > best.log_evidence - MISSED_BY_NODES);
-        let total = if !nodes_hold || is_located(&best, at, spacing, thresholds) {
-            log_sum(&evidences_of(&found))
-        } else {
-            log_mean(&evidence)
-        };
+        let mut total = log_sum(&evidences_of(&found));
+        if !is_located(&best, at, spacing, thresholds) {
+            // The nodes see an effect that may lie anywhere, and miss a maximum that is narrow for them.
+            let narrow = found.iter().filter(|one| {
+                let covariance = one.covariance();
+                let variance = covariance.map_or(f64::INFINITY, |c| c[(at + 1, at + 1)]);
+                variance.sqrt() < thresholds.located * spacing
+            });
+            let narrow: Vec<f64> = narrow.map(|one| one.log_evidence).collect();
+            total = log_mean(&evidence).max(log_sum(&narrow));
+        }
         Some(self.finish(forward, best, total))
     }
 }

@@ -248,8 +248,8 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
 }
 
 /// Sets the prior of each group to 1, split evenly inside. Exceptions are `none` (`no_gap_prior`), `unknown`
-/// (`unknown_prior`) and a rigid joint that gives (`rigid_prior`). All `tried` pairs share 1. Sorts the most
-/// probable first.
+/// (`unknown_prior`) and a rigid joint that gives (`rigid_prior`). All `tried` pairs share 1. Beside each single effect a second
+/// cause may stand that the data do not show. Its share (`hidden_second`) counts as `unknown`. Sorts the most probable first.
 pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds: &Thresholds) {
     for k in 0..candidates.len() {
         let one = &candidates[k];
@@ -269,7 +269,14 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds:
             weight / same.count() as f64
         };
     }
-    let logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
+    let mut logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
+    let pairs = candidates.iter().zip(&logs);
+    let singles = pairs.filter(|(one, _)| one.effects().len() == 1);
+    let singles: Vec<f64> = singles.map(|(_, log)| *log).collect();
+    if let Some(unknown) = candidates.iter().position(Candidate::is_unknown) {
+        let hidden = log_sum(&singles) + thresholds.hidden_second.ln();
+        logs[unknown] = log_sum(&[logs[unknown], hidden]);
+    }
     let total = log_sum(&logs);
     for (candidate, log) in candidates.iter_mut().zip(&logs) {
         candidate.probability = (log - total).exp();
@@ -701,6 +708,29 @@ mod tests {
             );
             assert_eq!(answer, expected, "{misfit}");
         }
+    }
+
+    /// However certain an effect is, a second cause beside it may not show.
+    #[test]
+    fn val_a_second_cause_that_does_not_show_has_its_share() {
+        let (_, fit) = fitted();
+        let candidate = |hypothesis, evidence: f64| {
+            let mut candidate = Candidate::new(hypothesis, fit.clone());
+            candidate.fit.log_evidence = evidence;
+            candidate
+        };
+        let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+        let mut candidates = [
+            candidate(Hypothesis::Unknown, 0.0),
+            candidate(mass, 100.0),
+            candidate(Hypothesis::None, 0.0),
+        ];
+        set_probabilities(&mut candidates, 0, &Thresholds::DEFAULT);
+        let [mass, unknown, none] = [0, 1, 2].map(|k| candidates[k].probability);
+        // 1 : 0.06, beside e^-100.
+        assert!((mass - 1.0 / 1.06).abs() < 1e-12, "{mass}");
+        assert!((unknown - 0.06 / 1.06).abs() < 1e-12, "{unknown}");
+        assert!(none < 1e-40);
     }
 
     /// Something unknown is an answer only where it is as probable as a name has to be.

@@ -81,13 +81,19 @@ fn effects_of(fit: &Fit) -> Vec<EffectId> {
 
 /// Returns the fits of each of two effects alone, from where both were fitted.
 fn singles_from(dataset: &Dataset, pair: &Fit) -> Vec<Fit> {
-    // A fixture's evidence depends on the peaks beside the modes, which only its own search counts.
-    let singles = [0, 1]
-        .into_iter()
-        .filter(|k| !pair.effects[1 - k].is(EffectId::Fixture));
+    let mut singles = Vec::new();
+    for other in [0, 1] {
+        let alone = pair.effects[1 - other];
+        // A fixture's evidence depends on the peaks beside the modes, which only its own search counts.
+        if !alone.is(EffectId::Fixture)
+            && let Some(mut fit) = refit_without(dataset, pair, other)
+        {
+            // One of several things that the effect may act on.
+            fit.log_evidence -= (alone.variants as f64).ln();
+            singles.push(fit);
+        }
+    }
     singles
-        .filter_map(|k| refit_without(dataset, pair, k))
-        .collect()
 }
 
 /// Two single effects that are tried together, and points where a multi-start search ended, the most

@@ -56,9 +56,10 @@ impl Fit {
         })
     }
 
-    /// Takes a fit of the same effects in its place, if that explains the data better. The evidence is that of both optima.
+    /// Takes a fit of the same effects in its place, if that explains the data better by a standard deviation. The evidence is that
+    /// of both optima.
     pub fn replace_by_better(&mut self, other: Fit) {
-        if other.best.optimum.objective < self.best.optimum.objective {
+        if other.best.optimum.objective < self.best.optimum.objective - 0.5 {
             let log_evidence = log_sum(&[self.log_evidence, other.log_evidence]);
             *self = Fit {
                 log_evidence,

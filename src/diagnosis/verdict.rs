@@ -189,6 +189,8 @@ pub struct Candidate {
     pub fit: Fit,
     /// Probability (1).
     pub probability: f64,
+    /// Part of it that is a second cause beside a single effect, which the data do not show (1); 0 for all but `unknown`.
+    pub hidden: f64,
     /// Prior probability, in units of one group of effects (1).
     pub prior: f64,
     /// Standard deviation of the joint's drift, where that is the hypothesis.
@@ -202,6 +204,7 @@ impl Candidate {
             hypothesis,
             fit,
             probability: 0.0,
+            hidden: 0.0,
             prior: 1.0,
             drift: None,
         }
@@ -210,6 +213,11 @@ impl Candidate {
     /// Logarithm of evidence times prior.
     pub fn log_weight(&self) -> f64 {
         self.fit.log_evidence + self.prior.ln()
+    }
+
+    /// Probability without a second cause that the data do not show (1).
+    pub fn shown_probability(&self) -> f64 {
+        self.probability - self.hidden
     }
 
     /// Its effects; none for `none` and `unknown`.
@@ -273,13 +281,16 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds:
     let pairs = candidates.iter().zip(&logs);
     let singles = pairs.filter(|(one, _)| one.effects().len() == 1);
     let singles: Vec<f64> = singles.map(|(_, log)| *log).collect();
+    let hidden = log_sum(&singles) + thresholds.hidden_second.ln();
     if let Some(unknown) = candidates.iter().position(Candidate::is_unknown) {
-        let hidden = log_sum(&singles) + thresholds.hidden_second.ln();
         logs[unknown] = log_sum(&[logs[unknown], hidden]);
     }
     let total = log_sum(&logs);
     for (candidate, log) in candidates.iter_mut().zip(&logs) {
         candidate.probability = (log - total).exp();
+        if candidate.is_unknown() {
+            candidate.hidden = (hidden - total).exp();
+        }
     }
     sort(candidates);
 }

@@ -98,8 +98,10 @@ impl<'a> Compared<'a> {
         let mut candidates: Vec<&Candidate> = all.iter().take(most).collect();
         let mut probabilities = vec![1.0; candidates.len()];
         if *verdict != Verdict::Unknown {
-            candidates.retain(|one| one.probability > thresholds.least_compared);
-            probabilities = candidates.iter().map(|one| one.probability).collect();
+            // A second cause that does not show is no reason for a test.
+            candidates.retain(|one| one.shown_probability() > thresholds.least_compared);
+            let shown = candidates.iter().map(|one| one.shown_probability());
+            probabilities = shown.collect();
         }
         let total: f64 = probabilities.iter().sum();
         for p in &mut probabilities {

@@ -14,13 +14,13 @@
 //! `cargo run --release --example diagnosis_study -- [--tests N] [--seed S] [--cell NAME] [--number K] [--set NAME=VALUE]
 //! [--sweep] [--ideal] [--list] [--from FILE] [--json FILE]`
 //!
-//! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class,
-//! or each of several. `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
+//! `--tests`: tests of each cell (20); of `nothing` four times, of `pair` twice as many. `--cell`: one class; it may be given
+//! several times. `--number`: one test of each cell. `--list`: one line for each test: what is true, the verdict, the first
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
 //! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
 //! threshold, with what half and twice of its value change. `--ideal`: beside each rate that of an observer who knows the
-//! study's distributions of sizes; it takes twice the time. `--from`: no test is run; those of such a file are scored, or of
-//! several files together, as `--json` wrote them.
+//! study's distributions of sizes; it takes twice the time. The column `beside` has the diagnosis on the tests that this observer
+//! saw. `--from`: no test is run. The tests of a file that `--json` wrote are scored, or those of several files together.
 
 mod draws;
 mod ideal;
@@ -125,6 +125,16 @@ impl Request {
         set.map_err(|error| error.to_string())
     }
 
+    /// Returns the thresholds that are changed, with their values.
+    fn set_thresholds(&self) -> Map<String, Value> {
+        let thresholds = &self.settings.thresholds;
+        let names = Thresholds::names().into_iter();
+        names
+            .filter(|name| thresholds.value(name) != Thresholds::DEFAULT.value(name))
+            .map(|name| (name.to_owned(), json!(thresholds.value(name))))
+            .collect()
+    }
+
     /// Returns every test.
     fn tasks(&self) -> Result<Vec<Task>, String> {
         let all = Class::all();
@@ -156,6 +166,9 @@ fn main() -> Result<(), String> {
     let request = Request::read()?;
     let tasks = request.tasks()?;
     let (seed, settings) = (request.seed, &request.settings);
+    if !request.from.is_empty() && (request.sweep || request.ideal || request.list) {
+        return Err("--from runs no test: it has no --sweep, --ideal or --list".to_owned());
+    }
     if request.sweep {
         if request.ideal || request.list || request.json.is_some() {
             return Err("--sweep has no --ideal, --list or --json".to_owned());
@@ -163,7 +176,7 @@ fn main() -> Result<(), String> {
         sweep::print(&tasks, seed, &settings.thresholds)?;
         return Ok(());
     }
-    let mut records = record::read(&request.from)?;
+    let mut records = record::read(&request.from, &request.set_thresholds())?;
     if request.from.is_empty() {
         let trials: Vec<Trial> = tasks
             .par_iter()
@@ -266,21 +279,14 @@ fn document(
 ) -> Value {
     let [cells, parts] = [classes, parts].map(|rows| {
         let rows = rows.iter();
-        let rows: Map<String, Value> = rows
-            .map(|(name, scores)| (name.clone(), scores.json()))
-            .collect();
-        rows
+        rows.map(|(name, scores)| (name.clone(), scores.json()))
+            .collect::<Map<String, Value>>()
     });
-    let thresholds = &request.settings.thresholds;
-    let names = Thresholds::names().into_iter();
-    let set = names.filter(|name| thresholds.value(name) != Thresholds::DEFAULT.value(name));
-    let set: Map<String, Value> = set
-        .map(|name| (name.to_owned(), json!(thresholds.value(name))))
-        .collect();
+    let is_run = request.from.is_empty();
     json!({
-        "seed": request.seed,
-        "set": set,
-        "tests_per_cell": request.tests,
+        "seed": is_run.then_some(request.seed),
+        "set": request.set_thresholds(),
+        "tests_per_cell": is_run.then_some(request.tests),
         "total": total.json(),
         "cells": cells,
         "parts": parts,

@@ -3,7 +3,8 @@
 use super::score::{MEASURES, Measure};
 use super::trial::{Answer, Trial};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
+use std::collections::HashSet;
 
 /// A test and what two observers made of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -40,8 +41,10 @@ pub struct Outcome {
     pub classes: Vec<(String, f64)>,
     /// Keys of the rates that this test is a case of, and whether it is a hit.
     pub hits: Vec<(String, bool)>,
-    /// Closure on spared data, where one effect is planted and something is named; the inner `None` where none is stated.
-    pub closure: Option<Option<f64>>,
+    /// One effect is planted, and something is named.
+    pub is_named_single: bool,
+    /// Closure on spared data by the first hypothesis of effects; `None` where none is stated.
+    pub closure: Option<f64>,
 }
 
 impl Outcome {
@@ -52,13 +55,13 @@ impl Outcome {
         };
         let classes = answer.classes.iter();
         let names = answer.verdict.hypotheses();
-        let is_closed = trial.truth.is_single() && answer.named().is_some();
         Self {
             verdict: answer.verdict.kind().to_owned(),
             names: names.iter().map(|one| one.name()).collect(),
             classes: classes.map(|(class, p)| (class.name(), *p)).collect(),
             hits: MEASURES.iter().filter_map(is_scored).collect(),
-            closure: is_closed.then_some(answer.closure),
+            is_named_single: trial.truth.is_single() && answer.named().is_some(),
+            closure: answer.closure,
         }
     }
 
@@ -102,37 +105,44 @@ impl Record {
     }
 }
 
-/// Reads the tests of earlier studies from the files that `--json` wrote.
+/// What is read of the document that `--json` wrote.
+#[derive(Deserialize)]
+struct Document {
+    /// Thresholds that were changed.
+    set: Map<String, Value>,
+    records: Vec<Record>,
+}
+
+/// Reads the tests of earlier studies from the files that `--json` wrote, all with these thresholds changed.
 ///
 /// # Errors
-/// The text for a file that is none, or that has a test which another one has too.
-pub fn read(files: &[String]) -> Result<Vec<Record>, String> {
+/// The text for a file that is none, that has other thresholds, or a test of an earlier file.
+pub fn read(files: &[String], set: &Map<String, Value>) -> Result<Vec<Record>, String> {
     let mut all: Vec<Record> = Vec::new();
+    let mut known = HashSet::new();
     for file in files {
-        let failed = |reason: String| format!("{file}: {reason}");
-        let text = std::fs::read_to_string(file).map_err(|error| failed(error.to_string()))?;
-        let mut document: Value =
-            serde_json::from_str(&text).map_err(|error| failed(error.to_string()))?;
-        let records: Vec<Record> = serde_json::from_value(document["records"].take())
-            .map_err(|error| failed(format!("`records` of a study: {error}")))?;
-        for record in &records {
-            let mut known = all.iter();
-            let is_same = |one: &Record| {
-                one.seed == record.seed && one.number == record.number && one.class == record.class
-            };
-            if known.any(is_same) {
-                let Record {
-                    seed,
-                    number,
-                    class,
-                    ..
-                } = record;
-                return Err(failed(format!(
-                    "seed {seed} {class} {number} is read twice"
-                )));
-            }
+        let text = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
+        let document: Document = serde_json::from_str(&text)
+            .map_err(|error| format!("{file}: no file of `--json`: {error}"))?;
+        if document.set != *set {
+            return Err(format!(
+                "{file}: its thresholds are not these; give the same `--set` as then"
+            ));
         }
-        all.extend(records);
+        for record in document.records {
+            let Record {
+                seed,
+                number,
+                class,
+                ..
+            } = &record;
+            if !known.insert((*seed, *number, class.clone())) {
+                return Err(format!(
+                    "{file}: test {number} of {class}, seed {seed}, is read twice"
+                ));
+            }
+            all.push(record);
+        }
     }
     Ok(all)
 }

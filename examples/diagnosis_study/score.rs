@@ -461,8 +461,8 @@ fn size_holds(effect: &Effect, answer: &Answer) -> Option<bool> {
 }
 
 fn closures(answered: &[Answered]) -> Closures {
-    let named = answered.iter().filter_map(|(_, outcome)| outcome.closure);
-    let all: Vec<Option<f64>> = named.collect();
+    let named = answered.iter().filter(|one| one.1.is_named_single);
+    let all: Vec<Option<f64>> = named.map(|one| one.1.closure).collect();
     let mut stated: Vec<f64> = all.iter().flatten().copied().collect();
     stated.sort_by(f64::total_cmp);
     Closures {

@@ -63,6 +63,7 @@ impl Reference {
 
     /// Returns what is kept of the test with an answer.
     fn record(&self, answer: Result<Answer, String>) -> Record {
+        // The seed only tells records of several runs apart.
         Record::new(0, &self.drawn.answered(self.number, answer, 0.0))
     }
 

@@ -89,55 +89,69 @@ pub fn refit_without(dataset: &Dataset, with: &Fit, effect: usize) -> Option<Fit
 
 /// Places of sensors and taps from which a search begins again, over the standard uncertainty of the stated one.
 const OTHER_PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
-/// Decrease of the objective that is worth another search: three standard deviations.
+/// Decrease of the objective from which on the search begins again: three standard deviations.
 const WORTH_A_SEARCH: f64 = 4.5;
+
+/// Returns whether the shapes fit: their chi square is below the mean and three standard deviations of its distribution.
+fn shapes_fit(dataset: &Dataset, optimum: &Optimum) -> bool {
+    let (mut count, mut chi_square) = (0.0, 0.0);
+    for (row, observable) in dataset.observables.iter().enumerate() {
+        if observable.is_shape() {
+            let residual = dataset.data[row].residual(optimum.model.predicted[row]);
+            count += 1.0;
+            chi_square += residual * residual;
+        }
+    }
+    chi_square <= count + 3.0 * f64::sqrt(2.0 * count)
+}
+
+/// Returns the objective of parameters that change the set-up alone, by modes that are already solved. `None` where a mode is
+/// missing.
+fn set_up_objective(
+    forward: &Forward<'_>,
+    priors: &[Prior],
+    parameters: &[f64],
+    solved: &[ModalModel],
+) -> Option<f64> {
+    let predicted = forward.predict_set_up(parameters, solved)?;
+    let data = &forward.dataset.data;
+    Some(objective_at(data, priors, parameters, &predicted))
+}
 
 /// Returns a better optimum with sensors and taps elsewhere within their tolerances; `None` where there is none. A shape has
 /// equal values on both sides of an extreme, so that a search from the stated place may end on the wrong side.
 fn from_other_places(forward: &Forward<'_>, found: &LocalOptimum) -> Option<LocalOptimum> {
-    let (dataset, optimum) = (forward.dataset, &found.optimum);
-    let (mut shapes, mut chi_square) = (0.0, 0.0);
-    for (row, observable) in dataset.observables.iter().enumerate() {
-        if observable.is_shape() {
-            shapes += 1.0;
-            chi_square += dataset.data[row]
-                .residual(optimum.model.predicted[row])
-                .powi(2);
-        }
-    }
-    // Shapes that fit leave nothing to search.
-    if chi_square <= shapes + 3.0 * f64::sqrt(2.0 * shapes) {
+    use NuisanceParameter::{SensorPosition, TapPosition};
+    let (dataset, priors) = (forward.dataset, &found.priors);
+    if shapes_fit(dataset, &found.optimum) {
         return None;
     }
-    let models = forward.solve(&optimum.parameters)?;
-    let objective = |at: &[f64]| {
-        let predicted = forward.predict_set_up(at, &models)?;
-        Some(objective_at(&dataset.data, &found.priors, at, &predicted))
-    };
-    let mut start = optimum.parameters.clone();
-    let here = objective(&start)?;
-    let mut least = here;
-    let first = forward.layout.first_nuisance();
-    let mut held = found.priors.clone();
-    for (k, nuisance) in dataset.nuisances.iter().enumerate() {
-        use NuisanceParameter::{SensorPosition, TapPosition};
+    let mut start = found.optimum.parameters.clone();
+    let models = forward.solve(&start)?;
+    let here = set_up_objective(forward, priors, &start, &models)?;
+    let (mut least, mut held) = (here, priors.clone());
+    for (nuisance, k) in dataset
+        .nuisances
+        .iter()
+        .zip(forward.layout.first_nuisance()..)
+    {
         if !matches!(
             nuisance.parameter,
             SensorPosition { .. } | TapPosition { .. }
         ) {
             continue;
         }
-        let mut best = start[first + k];
+        let mut best = start[k];
         for away in OTHER_PLACES {
-            start[first + k] = nuisance.centre + away * nuisance.std;
-            if let Some(own) = objective(&start)
+            start[k] = nuisance.centre + away * nuisance.std;
+            if let Some(own) = set_up_objective(forward, priors, &start, &models)
                 && own < least
             {
-                (best, least) = (start[first + k], own);
+                (best, least) = (start[k], own);
             }
         }
-        start[first + k] = best;
-        held[first + k] = Prior::held(best);
+        start[k] = best;
+        held[k] = Prior::held(best);
     }
     if least > here - WORTH_A_SEARCH {
         return None;
@@ -230,14 +244,13 @@ impl<'a> Search<'a> {
             sizes.sort_by(f64::total_cmp);
         }
         let from = self.by_frequencies.unwrap_or(self.without);
-        let (data, without) = (&self.dataset.data, &self.without.best.optimum);
+        let without = &self.without.best.optimum;
         let mut held = self.without.best.priors.clone();
         held.insert(forward.layout.last_size(), Prior::held(0.0));
         let (mut best, mut logs): (Option<[f64; 2]>, Vec<f64>) = (None, Vec::new());
         for &value in &sizes {
             let at = start_with(from, &forward.layout, value, None);
-            let predicted = forward.predict_set_up(&at, models)?;
-            let gain = without.objective - objective_at(data, &held, &at, &predicted);
+            let gain = without.objective - set_up_objective(&forward, &held, &at, models)?;
             logs.push(gain + size.log_density(value));
             if best.is_none_or(|[most, _]| gain > most) {
                 best = Some([gain, value]);

@@ -189,8 +189,6 @@ pub struct Candidate {
     pub fit: Fit,
     /// Probability (1).
     pub probability: f64,
-    /// Part of it that is a second cause beside a single effect, which the data do not show (1); 0 for all but `unknown`.
-    pub hidden: f64,
     /// Prior probability, in units of one group of effects (1).
     pub prior: f64,
     /// Standard deviation of the joint's drift, where that is the hypothesis.
@@ -204,7 +202,6 @@ impl Candidate {
             hypothesis,
             fit,
             probability: 0.0,
-            hidden: 0.0,
             prior: 1.0,
             drift: None,
         }
@@ -213,11 +210,6 @@ impl Candidate {
     /// Logarithm of evidence times prior.
     pub fn log_weight(&self) -> f64 {
         self.fit.log_evidence + self.prior.ln()
-    }
-
-    /// Probability without a second cause that the data do not show (1).
-    pub fn shown_probability(&self) -> f64 {
-        self.probability - self.hidden
     }
 
     /// Its effects; none for `none` and `unknown`.
@@ -288,11 +280,23 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds:
     let total = log_sum(&logs);
     for (candidate, log) in candidates.iter_mut().zip(&logs) {
         candidate.probability = (log - total).exp();
-        if candidate.is_unknown() {
-            candidate.hidden = (hidden - total).exp();
-        }
     }
     sort(candidates);
+}
+
+/// Returns the part of a probability (1) that is not a second cause beside a single effect, which the data do not show. It
+/// is less than the whole for `unknown` alone.
+pub fn shown_probability(
+    candidate: &Candidate,
+    candidates: &[Candidate],
+    thresholds: &Thresholds,
+) -> f64 {
+    if !candidate.is_unknown() {
+        return candidate.probability;
+    }
+    let singles = candidates.iter().filter(|one| one.effects().len() == 1);
+    let singles: f64 = singles.map(|one| one.probability).sum();
+    candidate.probability - thresholds.hidden_second * singles
 }
 
 fn sort(candidates: &mut [Candidate]) {
@@ -438,7 +442,8 @@ pub fn verdict(
             Verdict::NoGap
         };
     }
-    let is_unknown = first.is_unknown() && first.shown_probability() >= named;
+    let is_unknown =
+        first.is_unknown() && shown_probability(first, candidates, thresholds) >= named;
     if is_unknown || tested.is_some_and(|one| one.refuting_p_value().is_some()) {
         return Verdict::Unknown;
     }

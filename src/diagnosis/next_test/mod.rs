@@ -11,7 +11,7 @@ mod proposals;
 use crate::compare::ModelComparison;
 use crate::result::{NextTest, Proposal, Verdict};
 use crate::thresholds::Thresholds;
-use crate::verdict::Candidate;
+use crate::verdict::{Candidate, shown_probability};
 use nalgebra::DMatrix;
 use predicted_data::{Posterior, PredictedData, distances, expected_information};
 use proposals::{PlannedTests, TestedStructure, sentence};
@@ -99,8 +99,10 @@ impl<'a> Compared<'a> {
         let mut probabilities = vec![1.0; candidates.len()];
         if *verdict != Verdict::Unknown {
             // A second cause that does not show is no reason for a test.
-            candidates.retain(|one| one.shown_probability() > thresholds.least_compared);
-            let shown = candidates.iter().map(|one| one.shown_probability());
+            candidates
+                .retain(|one| shown_probability(one, all, thresholds) > thresholds.least_compared);
+            let shown = candidates.iter();
+            let shown = shown.map(|one| shown_probability(one, all, thresholds));
             probabilities = shown.collect();
         }
         let total: f64 = probabilities.iter().sum();

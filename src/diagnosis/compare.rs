@@ -5,7 +5,7 @@ use crate::candidates::candidate_effects;
 use crate::dataset::{Dataset, MORE_MODES};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, evaluate, log_mean, over_drifts};
-use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_without};
+use crate::fit::{Search, add_by_multi_start, fit_frequencies, fit_nominal, refit_nominal};
 use crate::foreign_fits::{ForeignFit, fit_foreign};
 use crate::forward::Forward;
 use crate::parameters::{CandidateEffect, NuisanceParameter};
@@ -34,6 +34,8 @@ pub struct ModelComparison {
     pub baseline: Fit,
     /// Hypotheses, the most probable first.
     pub candidates: Vec<Candidate>,
+    /// Number of positions of sensors over which the evidence is averaged; the fits are those of one of them.
+    pub positions: usize,
 }
 
 /// Observations of a test, the described structure, and the settings.
@@ -67,6 +69,7 @@ pub fn compare_without_pairs(test: Test<'_>) -> Result<ModelComparison, GapError
         logs.resize(all.len(), f64::NEG_INFINITY);
         averages.push((hypothesis.clone(), log_mean(&logs)));
     }
+    let positions = all.len();
     let mut best: Option<(f64, ModelComparison)> = None;
     for one in all {
         let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
@@ -76,6 +79,7 @@ pub fn compare_without_pairs(test: Test<'_>) -> Result<ModelComparison, GapError
         }
     }
     let (_, mut comparison) = best.ok_or(GapError::NoFit)?;
+    comparison.positions = positions;
     for candidate in &mut comparison.candidates {
         let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
         if let Some((_, log)) = average {
@@ -90,7 +94,7 @@ impl ModelComparison {
     pub fn add_pairs(&mut self) {
         let thresholds = &self.dataset.settings.thresholds;
         set_probabilities(&mut self.candidates, 0, thresholds);
-        add_pairs(&self.dataset, &mut self.candidates);
+        add_pairs(&self.dataset, &mut self.candidates, self.positions);
     }
 }
 
@@ -223,7 +227,7 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
             .total_cmp(&b.best.optimum.objective)
     });
     for fit in better.into_iter().take(REFITTED) {
-        if let Some(again) = refit_without(&dataset, fit, 0)
+        if let Some(again) = refit_nominal(&dataset, fit)
             && again.log_evidence > none.log_evidence
         {
             none = again;
@@ -271,6 +275,7 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
         drifting,
         baseline,
         candidates,
+        positions: 1,
     })
 }
 

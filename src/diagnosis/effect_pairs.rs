@@ -2,10 +2,11 @@
 
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
-use crate::fit::{CoarseModel, Search, Start, refit_without, settle, unexplained};
+use crate::fit::{CoarseModel, Search, Start, refit_nominal, settle, start_without, unexplained};
+use crate::forward::Forward;
 use crate::parameters::CandidateEffect;
 use crate::result::Hypothesis;
-use crate::verdict::{Candidate, GoodnessOfFit, set_probabilities};
+use crate::verdict::{Candidate, GoodnessOfFit, none_of, set_probabilities};
 use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
 
@@ -21,8 +22,8 @@ const PAIR_OPTIMA: usize = 3;
 const SCREENED_PAIRS: usize = 2;
 
 /// Adds a second effect beside each of the best single ones, where none of these suffices or the second promises
-/// much.
-pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
+/// much. `positions` is the number of positions of sensors over which the evidence of the others is averaged.
+pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>, positions: usize) {
     let is_seen = candidates
         .first()
         .is_some_and(|one| one.hypothesis != Hypothesis::None);
@@ -50,15 +51,12 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
         tried = tried.max(asked);
     }
     let fitted: Vec<Option<Fit>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
-    let fitted: Vec<Fit> = fitted.into_iter().flatten().collect();
-    // A search for two effects may lead further than that for one of them. The other one gets no credit for it.
-    let better = fitted.par_iter().map(|pair| singles_from(dataset, pair));
-    for fit in better.collect::<Vec<Vec<Fit>>>().into_iter().flatten() {
-        let mut singles = candidates.iter_mut();
-        if let Some(known) = singles.find(|one| one.effects() == effects_of(&fit)) {
-            known.fit.replace_by_better(fit);
-        }
+    let mut fitted: Vec<Fit> = fitted.into_iter().flatten().collect();
+    for fit in &mut fitted {
+        // These fits are those of one position. The others count as impossible.
+        fit.log_evidence -= (positions as f64).ln();
     }
+    refit(dataset, candidates, &fitted, positions);
     let singles = singles_of(candidates);
     let found = fitted.into_par_iter();
     let found = found.filter_map(|fit| accepted(dataset, &singles, fit));
@@ -74,26 +72,47 @@ fn singles_of(candidates: &[Candidate]) -> Vec<&Candidate> {
         .collect()
 }
 
-fn effects_of(fit: &Fit) -> Vec<EffectId> {
+/// Returns the effects of the catalogue in a fit.
+fn catalogue_effects(fit: &Fit) -> Vec<EffectId> {
     let effects = fit.effects.iter();
     effects.filter_map(CandidateEffect::effect).collect()
 }
 
-/// Returns the fits of each of two effects alone, from where both were fitted.
-fn singles_from(dataset: &Dataset, pair: &Fit) -> Vec<Fit> {
-    let mut singles = Vec::new();
-    for other in [0, 1] {
-        let alone = pair.effects[1 - other];
-        // A fixture's evidence depends on the peaks beside the modes, which only its own search counts.
-        if !alone.is(EffectId::Fixture)
-            && let Some(mut fit) = refit_without(dataset, pair, other)
-        {
-            // One of several things that the effect may act on.
-            fit.log_evidence -= (alone.variants as f64).ln();
-            singles.push(fit);
+/// Fits single effects and the nominal model again from where pairs were fitted. A search for two effects may lead further than
+/// that for one. Without this the second effect would get credit for the better search.
+fn refit(dataset: &Dataset, candidates: &mut [Candidate], pairs: &[Fit], positions: usize) {
+    let Some(none) = none_of(candidates).map(|none| none.fit.clone()) else {
+        return;
+    };
+    let search = Search {
+        dataset,
+        without: &none,
+        by_frequencies: None,
+    };
+    let both: Vec<(&Fit, usize)> = pairs.iter().flat_map(|fit| [(fit, 0), (fit, 1)]).collect();
+    let singles = both.par_iter().map(|(pair, left_out)| {
+        let alone = pair.effects[1 - left_out];
+        let forward = Forward::new(dataset, &[alone]);
+        let mut fit = search.fit_from(&forward, &start_without(dataset, pair, *left_out))?;
+        // One of several things that the effect may act on.
+        fit.log_evidence -= ((alone.variants * positions) as f64).ln();
+        Some(fit)
+    });
+    let singles: Vec<Option<Fit>> = singles.collect();
+    for fit in singles.into_iter().flatten() {
+        let effects = catalogue_effects(&fit);
+        let mut all = candidates.iter_mut();
+        let known = all.find(|one| one.effects() == effects);
+        if !known.is_some_and(|known| known.fit.replace_by_better(fit.clone())) {
+            continue;
+        }
+        let mut all = candidates.iter_mut();
+        let none = all.find(|one| one.hypothesis == Hypothesis::None);
+        if let Some((none, mut nominal)) = none.zip(refit_nominal(dataset, &fit)) {
+            nominal.log_evidence -= (positions as f64).ln();
+            none.fit.replace_by_better(nominal);
         }
     }
-    singles
 }
 
 /// Two single effects that are tried together, and points where a multi-start search ended, the most
@@ -249,7 +268,7 @@ impl<'a> PairSearch<'a> {
 /// the fit decides on its name, not on its probability.
 fn accepted(dataset: &Dataset, singles: &[&Candidate], fit: Fit) -> Option<Candidate> {
     let thresholds = &dataset.settings.thresholds;
-    let effects = effects_of(&fit);
+    let effects = catalogue_effects(&fit);
     let alone = singles
         .iter()
         .filter(|one| effects.contains(&one.effects()[0]));

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 pub struct LocalOptimum {
     /// Best parameters, at the most probable drift.
     pub optimum: Optimum,
-    /// Priors of the parameters there.
+    /// Priors of the parameters there. That of a size far beyond its scale is wider than stated: it only guides the search.
     pub priors: Vec<Prior>,
     /// Logarithm of the evidence.
     pub log_evidence: f64,
@@ -56,16 +56,18 @@ impl Fit {
         })
     }
 
-    /// Takes a fit of the same effects in its place, if that explains the data better by a standard deviation. The evidence is that
-    /// of both optima.
-    pub fn replace_by_better(&mut self, other: Fit) {
-        if other.best.optimum.objective < self.best.optimum.objective - 0.5 {
-            let log_evidence = log_sum(&[self.log_evidence, other.log_evidence]);
+    /// Replaces this fit by another one of the same effects, if that explains the data better. Returns whether it does.
+    pub fn replace_by_better(&mut self, other: Fit) -> bool {
+        let is_better = other.best.optimum.objective < self.best.optimum.objective - BETTER;
+        if is_better {
+            // The worse optimum may be a part of the same valley: both together would count it twice.
+            let log_evidence = self.log_evidence.max(other.log_evidence);
             *self = Fit {
                 log_evidence,
                 ..other
             };
         }
+        is_better
     }
 
     /// Best parameters.
@@ -74,6 +76,8 @@ impl Fit {
     }
 }
 
+/// Decrease of the objective from which on an optimum is better than another one: one standard deviation.
+pub const BETTER: f64 = 0.5;
 /// Searches with the drift that suits the optimum.
 const RETURNS: usize = 2;
 /// Searches with a wider prior of a size.

@@ -4,8 +4,8 @@
 use crate::amplitude::best_law;
 use crate::dataset::{Dataset, Datum};
 use crate::evidence::{
-    Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
-    over_drifts, profile_correction, start_with,
+    BETTER, Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean,
+    log_sum, over_drifts, profile_correction, start_with,
 };
 use crate::fixture::with_peaks;
 use crate::forward::Forward;
@@ -29,8 +29,18 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
             *parameter = value;
         }
     }
-    let found = evaluate(&forward, &priors, &start)?;
-    Fit::of_variants(vec![from_other_places(&forward, &found).unwrap_or(found)])
+    nominal_from(&forward, &start)
+}
+
+/// Fits the nominal model from one start. `None` if the fit fails.
+fn nominal_from(forward: &Forward<'_>, start: &[f64]) -> Option<Fit> {
+    let found = evaluate(forward, &forward.priors(), start)?;
+    let best = from_other_places(forward, &found).unwrap_or(found);
+    Some(Fit {
+        effects: Vec::new(),
+        log_evidence: best.log_evidence,
+        best,
+    })
 }
 
 /// Largest size from which a search begins, over its scale.
@@ -69,22 +79,21 @@ pub fn fit_frequencies(dataset: &Dataset) -> Option<Fit> {
     fit_nominal(&alone)
 }
 
-/// Fits the model without one effect from where it was fitted with it: that search may have led further than the one
-/// without. `None` if the fit fails.
-pub fn refit_without(dataset: &Dataset, with: &Fit, effect: usize) -> Option<Fit> {
-    let mut kept = with.effects.clone();
-    kept.remove(effect);
-    let forward = Forward::new(dataset, &kept);
+/// Fits the nominal model from where an effect was fitted: that search may have led further. `None` if the fit fails.
+pub fn refit_nominal(dataset: &Dataset, with: &Fit) -> Option<Fit> {
+    nominal_from(
+        &Forward::new(dataset, &[]),
+        &start_without(dataset, with, 0),
+    )
+}
+
+/// Returns the parameters of a fit without those of one of its effects.
+pub fn start_without(dataset: &Dataset, with: &Fit, effect: usize) -> Vec<f64> {
     let layout = dataset.layout(&with.effects);
     let own = 1 + usize::from(layout.location(effect).is_some());
     let mut start = with.parameters().to_vec();
     start.drain(layout.size(effect)..layout.size(effect) + own);
-    let found = evaluate(&forward, &forward.priors(), &start)?;
-    let found = from_other_places(&forward, &found).unwrap_or(found);
-    Some(Fit {
-        effects: kept,
-        ..Fit::of_variants(vec![found])?
-    })
+    start
 }
 
 /// Places of sensors and taps from which a search begins again, over the standard uncertainty of the stated one.
@@ -159,7 +168,13 @@ fn from_other_places(forward: &Forward<'_>, found: &LocalOptimum) -> Option<Loca
     // All else follows the new places first: a moved mass moves the frequencies, which would draw it back.
     let there = maximise(&dataset.data, &held, &start, forward)?;
     let other = evaluate(forward, &forward.priors(), &there.parameters)?;
-    is_better(&other, found).then_some(other)
+    if other.optimum.objective > found.optimum.objective - BETTER {
+        return None;
+    }
+    Some(LocalOptimum {
+        log_evidence: other.log_evidence.max(found.log_evidence),
+        ..other
+    })
 }
 
 /// Nodes of a location at which the true model is fitted.
@@ -351,7 +366,7 @@ impl<'a> Search<'a> {
     /// Returns the fit with what the size's profile and a fixture's peak add to its evidence.
     fn finish(&self, forward: &Forward<'_>, mut best: LocalOptimum, mut log_evidence: f64) -> Fit {
         if let Some(other) = from_other_places(forward, &best) {
-            log_evidence = log_sum(&[log_evidence, other.log_evidence]);
+            log_evidence = log_evidence.max(other.log_evidence);
             best = other;
         }
         let correction = profile_correction(forward, &best);
@@ -473,17 +488,15 @@ impl<'a> Search<'a> {
             descend(forward, &starts, &mut found);
         }
         let best = best_of(&found)?.clone();
-        let mut total = log_sum(&evidences_of(&found));
-        if !is_located(&best, at, spacing, thresholds) {
+        let total = if is_located(&best, at, spacing, thresholds) {
+            log_sum(&evidences_of(&found))
+        } else {
             // The nodes see an effect that may lie anywhere, and miss a maximum that is narrow for them.
-            let narrow = found.iter().filter(|one| {
-                let covariance = one.covariance();
-                let variance = covariance.map_or(f64::INFINITY, |c| c[(at + 1, at + 1)]);
-                variance.sqrt() < thresholds.located * spacing
-            });
+            let narrow = found.iter();
+            let narrow = narrow.filter(|one| is_narrow(one, at, spacing, thresholds));
             let narrow: Vec<f64> = narrow.map(|one| one.log_evidence).collect();
-            total = log_mean(&evidence).max(log_sum(&narrow));
-        }
+            log_mean(&evidence).max(log_sum(&narrow))
+        };
         Some(self.finish(forward, best, total))
     }
 }
@@ -536,15 +549,21 @@ fn best_of(found: &[LocalOptimum]) -> Option<&LocalOptimum> {
     found.reduce(|best, one| if is_better(one, best) { one } else { best })
 }
 
+/// Returns whether the data fix the location of the effect with this size within the nodes' spacing.
+fn is_narrow(found: &LocalOptimum, size: usize, spacing: f64, thresholds: &Thresholds) -> bool {
+    let covariance = found.covariance();
+    let variance = covariance.map_or(f64::INFINITY, |c| c[(size + 1, size + 1)]);
+    variance.max(0.0).sqrt() < thresholds.located * spacing
+}
+
 /// Returns whether the data fix an effect's location within the nodes' spacing, and its size so far from
 /// zero that size and location are Gaussian together.
 fn is_located(found: &LocalOptimum, size: usize, spacing: f64, thresholds: &Thresholds) -> bool {
-    let Some(covariance) = found.covariance() else {
-        return false;
-    };
-    let [size_std, location_std] = [size, size + 1].map(|k| covariance[(k, k)].max(0.0).sqrt());
+    let covariance = found.covariance();
+    let variance = covariance.map_or(f64::INFINITY, |c| c[(size, size)]);
     let away = (found.optimum.parameters[size] - found.priors[size].centre).abs();
-    location_std < thresholds.located * spacing && away > thresholds.size_detected * size_std
+    is_narrow(found, size, spacing, thresholds)
+        && away > thresholds.size_detected * variance.max(0.0).sqrt()
 }
 
 /// Returns the nodes from which a search goes on: the local maxima, the best first, at most three.

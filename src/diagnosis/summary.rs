@@ -70,7 +70,7 @@ pub fn without_next_tests(
     let residuals = reference.before.as_ref().zip(after.as_ref());
     Diagnosis {
         next_tests: Vec::new(),
-        locations: location_probabilities(candidates),
+        locations: location_probabilities(candidates, thresholds),
         residuals: residuals.map_or_else(Vec::new, |(before, after)| {
             frequency_residuals(dataset, before, after)
         }),

@@ -16,7 +16,7 @@ use tapjoint_beam::effects::{EffectId, Group, Place};
 
 /// Returns whether a misfit of hold-out data, of probability `p`, refutes an explanation. They are few, and linearised
 /// about the fit: the limit is that of one block among many.
-pub fn refutes_by_holdout(p: f64, thresholds: &Thresholds) -> bool {
+fn refutes_by_holdout(p: f64, thresholds: &Thresholds) -> bool {
     p < thresholds.block_misfit
 }
 
@@ -273,8 +273,8 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds:
     let pairs = candidates.iter().zip(&logs);
     let singles = pairs.filter(|(one, _)| one.effects().len() == 1);
     let singles: Vec<f64> = singles.map(|(_, log)| *log).collect();
-    let hidden = log_sum(&singles) + thresholds.hidden_second.ln();
     if let Some(unknown) = candidates.iter().position(Candidate::is_unknown) {
+        let hidden = log_sum(&singles) + hidden_weight(candidates, thresholds).ln();
         logs[unknown] = log_sum(&[logs[unknown], hidden]);
     }
     let total = log_sum(&logs);
@@ -284,19 +284,33 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize, thresholds:
     sort(candidates);
 }
 
-/// Returns the part of a probability (1) that is not a second cause beside a single effect, which the data do not show. It
-/// is less than the whole for `unknown` alone.
+/// Returns the weight of a second cause that the data do not show, over that of the single effect beside it (1). It is a part of
+/// `unknown`, and 0 without that.
+fn hidden_weight(candidates: &[Candidate], thresholds: &Thresholds) -> f64 {
+    match candidates.iter().any(Candidate::is_unknown) {
+        true => thresholds.hidden_second.max(0.0),
+        false => 0.0,
+    }
+}
+
+/// Returns the probability (1) of a second cause beside a single effect, which the data do not show: a part of that of `unknown`.
+fn hidden_probability(candidates: &[Candidate], thresholds: &Thresholds) -> f64 {
+    let singles = candidates.iter().filter(|one| one.effects().len() == 1);
+    let singles: f64 = singles.map(|one| one.probability).sum();
+    hidden_weight(candidates, thresholds) * singles
+}
+
+/// Returns the probability of a candidate (1). For `unknown` it is that of a cause in place of the catalogue's effects, without a second one beside
+/// them.
 pub fn shown_probability(
     candidate: &Candidate,
     candidates: &[Candidate],
     thresholds: &Thresholds,
 ) -> f64 {
-    if !candidate.is_unknown() {
-        return candidate.probability;
+    match candidate.is_unknown() {
+        true => candidate.probability - hidden_probability(candidates, thresholds),
+        false => candidate.probability,
     }
-    let singles = candidates.iter().filter(|one| one.effects().len() == 1);
-    let singles: f64 = singles.map(|one| one.probability).sum();
-    candidate.probability - thresholds.hidden_second * singles
 }
 
 fn sort(candidates: &mut [Candidate]) {
@@ -350,8 +364,12 @@ fn by_group(candidates: &[Candidate]) -> Vec<CandidateGroup> {
     groups
 }
 
-/// Returns the probability of each location, given that there is a gap.
-pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities {
+/// Returns the probability of each location, given that there is a gap. Of two causes each has half, and so has a second cause
+/// that the data do not show.
+pub fn location_probabilities(
+    candidates: &[Candidate],
+    thresholds: &Thresholds,
+) -> LocationProbabilities {
     let mut all = LocationProbabilities::default();
     let gaps = candidates
         .iter()
@@ -360,11 +378,15 @@ pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities
     if total <= 0.0 {
         return all;
     }
+    let hidden = hidden_weight(candidates, thresholds);
     for candidate in candidates {
         let probability = candidate.probability / total;
-        let share = probability / candidate.effects().len().max(1) as f64;
+        let share = match candidate.effects().len() {
+            1 => probability * (1.0 + 0.5 * hidden),
+            count => probability / count.max(1) as f64,
+        };
         if candidate.is_unknown() {
-            all.unknown += probability;
+            all.unknown += probability - 0.5 * hidden_probability(candidates, thresholds) / total;
         }
         for effect in candidate.effects() {
             *match effect.place() {
@@ -494,7 +516,7 @@ pub fn verdict(
     let holds = tested.passes_holdout() && (first.effects().len() < 2 || tested.improves_holdout());
     // A second cause beside a single effect leaves that effect its name.
     let with_hidden = match first.effects() {
-        [_] => 1.0 + thresholds.hidden_second,
+        [_] => 1.0 + hidden_weight(candidates, thresholds),
         _ => 1.0,
     };
     if with_hidden * groups[0].probability >= named && holds {

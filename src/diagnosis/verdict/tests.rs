@@ -143,52 +143,98 @@ fn limit_the_nominal_model_is_given_up_from_twenty_to_one() {
     }
 }
 
-/// However certain an effect is, a second cause beside it may not show.
+/// Returns these hypotheses with the logarithms of their evidence, all of one fit.
+fn candidates_of(fit: &Fit, all: &[(Hypothesis, f64)]) -> Vec<Candidate> {
+    let all = all.iter().map(|(hypothesis, log_evidence)| {
+        let mut candidate = Candidate::new(hypothesis.clone(), fit.clone());
+        candidate.fit.log_evidence = *log_evidence;
+        candidate
+    });
+    all.collect()
+}
+
+fn probability_of(candidates: &[Candidate], hypothesis: &Hypothesis) -> f64 {
+    let mut all = candidates.iter();
+    let found = all.find(|one| one.hypothesis == *hypothesis);
+    found.map_or(0.0, |one| one.probability)
+}
+
+/// However certain an effect is, a second cause beside it may not show. Without `unknown` there is no place for it, and with a
+/// weight of 0 or less there is none.
 #[test]
 fn val_a_second_cause_that_does_not_show_has_its_share() {
     let (_, fit) = fitted();
-    let candidate = |hypothesis, evidence: f64| {
-        let mut candidate = Candidate::new(hypothesis, fit.clone());
-        candidate.fit.log_evidence = evidence;
-        candidate
-    };
     let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
-    let mut candidates = [
-        candidate(Hypothesis::Unknown, 0.0),
-        candidate(mass, 100.0),
-        candidate(Hypothesis::None, 0.0),
+    let all = [
+        (mass.clone(), 100.0),
+        (Hypothesis::None, 0.0),
+        (Hypothesis::Unknown, 0.0),
     ];
-    set_probabilities(&mut candidates, 0, &Thresholds::DEFAULT);
-    let [mass, unknown, none] = [0, 1, 2].map(|k| candidates[k].probability);
-    // 1 : 0.06, beside e^-100.
-    assert!((mass - 1.0 / 1.06).abs() < 1e-12, "{mass}");
-    assert!((unknown - 0.06 / 1.06).abs() < 1e-12, "{unknown}");
-    assert!(none < 1e-40);
+    for (count, weight, expected) in [
+        (3, 0.06, 1.0 / 1.06),
+        (2, 0.06, 1.0),
+        (3, 0.0, 1.0),
+        (3, -1.0, 1.0),
+    ] {
+        let thresholds = Thresholds {
+            hidden_second: weight,
+            ..Thresholds::DEFAULT
+        };
+        let mut candidates = candidates_of(&fit, &all[..count]);
+        set_probabilities(&mut candidates, 0, &thresholds);
+        let found = probability_of(&candidates, &mass);
+        // Beside e^-100: rounding.
+        assert!(
+            (found - expected).abs() < 1e-12,
+            "{count} {weight}: {found}"
+        );
+        // The place of the mass is that of the effect, and for half of the second cause.
+        let places = location_probabilities(&candidates, &thresholds);
+        let half = 0.5 * (1.0 - expected);
+        assert!(
+            (places.body - expected - half).abs() < 1e-12,
+            "{count} {weight}: {places:?}"
+        );
+        assert!(
+            (places.unknown - half).abs() < 1e-12,
+            "{count} {weight}: {places:?}"
+        );
+    }
 }
 
-/// An effect of 76 % is there with 80.6 %, the second cause beside it included.
+/// The name's limit of 80 % includes a second cause. Where that has no place, the effect itself needs 80 %.
 #[test]
 fn limit_a_second_cause_leaves_an_effect_its_name() {
     let (dataset, fit) = fitted();
     let mut tested = GoodnessOfFit::new(&dataset, &fit).unwrap();
     tested.is_sized = true;
-    let answer = |probability: f64| {
-        let candidate = |hypothesis, evidence, probability| {
-            let mut candidate = Candidate::new(hypothesis, fit.clone());
-            candidate.fit.log_evidence = evidence;
-            candidate.probability = probability;
-            candidate
-        };
-        let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
-        let candidates = [
-            candidate(mass, 20.0, probability),
-            candidate(Hypothesis::Unknown, 19.0, 1.0 - probability),
-            candidate(Hypothesis::None, 0.0, 0.0),
+    let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+    let crack = Hypothesis::Effects(vec![EffectId::LocalCrack]);
+    // The crack takes what the mass lacks; both have the prior of one group.
+    for (share, with_unknown, is_named) in [
+        (0.81, true, true),
+        (0.79, true, false),
+        (0.81, false, true),
+        (0.79, false, false),
+    ] {
+        let evidence = 20.0 + f64::ln((1.0 - share) / share);
+        let all = [
+            (mass.clone(), 20.0),
+            (crack.clone(), evidence),
+            (Hypothesis::None, 0.0),
+            (Hypothesis::Unknown, 0.0),
         ];
-        verdict(&candidates, Some(&tested), None, &Thresholds::DEFAULT)
-    };
-    assert_eq!(answer(0.76), Verdict::Named(vec![EffectId::AddedMass]));
-    assert!(matches!(answer(0.75), Verdict::Set(_)));
+        let count = if with_unknown { 4 } else { 3 };
+        let mut candidates = candidates_of(&fit, &all[..count]);
+        set_probabilities(&mut candidates, 0, &Thresholds::DEFAULT);
+        let answer = verdict(&candidates, Some(&tested), None, &Thresholds::DEFAULT);
+        let expected = Verdict::Named(vec![EffectId::AddedMass]);
+        assert_eq!(
+            answer == expected,
+            is_named,
+            "{share} {with_unknown}: {answer:?}"
+        );
+    }
 }
 
 /// Something unknown is an answer only where it is as probable as a name has to be.

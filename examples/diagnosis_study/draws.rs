@@ -67,8 +67,8 @@ const MOST_STDS: f64 = 3.0;
 pub enum ErrorShape {
     Normal,
     Uniform,
-    /// Student's t with three degrees of freedom up to three standard deviations. What is farther off is a fault by itself, and
-    /// no tolerance.
+    /// Student's t with three degrees of freedom, up to three standard deviations. A larger error is a fault, which a tolerance does
+    /// not cover.
     HeavyTailed,
 }
 
@@ -83,7 +83,7 @@ impl ErrorShape {
         }
     }
 
-    /// Returns an error of unit standard deviation; of 0.78 where the tails are cut off.
+    /// Returns an error. Its standard deviation is 1, and 0.78 with heavy tails, because they are cut off.
     pub fn draw(self, random: &mut ChaCha8Rng) -> f64 {
         match self {
             Self::Normal => normal(random),

@@ -19,7 +19,7 @@
 //! hypotheses with their probabilities. The same seed gives the same answers, whatever the number of threads.
 //! `--set`: another value of a threshold of the diagnosis; it may be given several times. `--sweep`: one row for each
 //! threshold, with what half and twice of its value change. `--ideal`: beside each rate that of an observer who knows the
-//! study's distributions of sizes; it takes twice the time. The column `beside` has the diagnosis on the tests that this observer
+//! study's distributions of sizes and the shares of its classes; it takes twice the time. The column `beside` has the diagnosis on the tests that this observer
 //! saw. `--from`: no test is run. The tests of a file that `--json` wrote are scored, or those of several files together.
 
 mod draws;

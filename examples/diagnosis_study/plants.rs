@@ -190,7 +190,7 @@ pub fn size_of(effect: &Effect) -> f64 {
 }
 
 /// Returns whether these effects move nothing but the common factor of all frequencies, and that by less than two
-/// standard uncertainties. A wrong length shows in other ways too. It must be within two of its own.
+/// standard uncertainties. A wrong length shows in other ways too, so it must be below two standard uncertainties of the length.
 pub fn is_within_tolerance(effects: &[Effect], structure: &Structure) -> bool {
     let mut effects_left = effects.iter();
     !effects.is_empty()

@@ -1,5 +1,6 @@
 //! What is kept of a test: enough for all scores, so that studies run apart can be scored together.
 
+use super::plants::Class;
 use super::score::{MEASURES, Measure};
 use super::trial::{Answer, Trial};
 use serde::{Deserialize, Serialize};
@@ -20,8 +21,6 @@ pub struct Record {
     pub recordings: usize,
     /// What is to be found: `none`, `unknown`, or groups of effects.
     pub truth: String,
-    /// Two effects are planted.
-    pub is_pair: bool,
     /// `None` without a diagnosis.
     pub answer: Option<Outcome>,
     /// That of the ideal observer, where it was asked for.
@@ -79,6 +78,11 @@ impl Outcome {
 }
 
 impl Record {
+    /// Returns whether two effects are planted.
+    pub fn is_pair(&self) -> bool {
+        self.class == Class::Pair.name()
+    }
+
     pub fn new(seed: u64, trial: &Trial) -> Self {
         Self {
             seed,
@@ -90,7 +94,6 @@ impl Record {
             plan: trial.plan.name().to_owned(),
             recordings: trial.recordings,
             truth: trial.truth.explained().name(),
-            is_pair: trial.truth.effects.len() == 2,
             answer: trial
                 .answer
                 .as_ref()

@@ -86,7 +86,7 @@ impl Scores {
         let ideal: Vec<Answered> = ideal.collect();
         let listed: Vec<f64> = answered
             .iter()
-            .filter(|(record, _)| !record.is_pair)
+            .filter(|(record, _)| !record.is_pair())
             .map(|(_, outcome)| list(&outcome.classes).len() as f64)
             .collect();
         let stated = answered

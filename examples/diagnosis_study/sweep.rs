@@ -6,7 +6,7 @@
 use super::Task;
 use super::record::Record;
 use super::score::Scores;
-use super::trial::{Answer, DrawnTest, caught};
+use super::trial::{Answer, DrawnTest, answered, caught, compared, fitted};
 use rayon::prelude::*;
 use tapjoint::gap::{Comparison, GapSettings, SingleFits, Stage, Thresholds, check};
 
@@ -61,7 +61,7 @@ impl Reference {
         }
     }
 
-    /// Returns what is kept of the test with an answer.
+    /// Returns the record of the test with an answer.
     fn record(&self, answer: Result<Answer, String>) -> Record {
         // The seed only tells records of several runs apart.
         Record::new(0, &self.drawn.answered(self.number, answer, 0.0))
@@ -85,27 +85,6 @@ impl Reference {
             Stage::Beside => self.answer.clone(),
         }
     }
-}
-
-fn fitted(drawn: &DrawnTest, settings: &GapSettings) -> Result<SingleFits, String> {
-    caught(|| SingleFits::new(&drawn.observed, &drawn.described, settings))
-}
-
-fn compared(
-    fits: &Result<SingleFits, String>,
-    thresholds: &Thresholds,
-) -> Result<Comparison, String> {
-    let fits = fits.clone()?;
-    caught(|| Ok(fits.with_pairs(thresholds)))
-}
-
-fn answered(
-    comparison: &Result<Comparison, String>,
-    thresholds: &Thresholds,
-) -> Result<Answer, String> {
-    let comparison = comparison.clone()?;
-    let found = caught(|| Ok(comparison.without_next_tests(thresholds)))?;
-    Ok(Answer::of(&found))
 }
 
 /// Prints the figures of these tests, and one row for each threshold: name, value, and what half and twice of it change.
@@ -170,13 +149,7 @@ fn variants(thresholds: &Thresholds) -> Result<Vec<Variant>, String> {
             });
         }
     }
-    all.sort_by_key(|one| match one.stage {
-        Stage::Beside => 0,
-        Stage::Verdict => 1,
-        Stage::Requirements => 2,
-        Stage::Pairs => 3,
-        Stage::Fits => 4,
-    });
+    all.sort_by_key(|one| std::cmp::Reverse(one.stage));
     Ok(all)
 }
 

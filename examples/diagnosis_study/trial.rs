@@ -12,8 +12,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 use tapjoint::effects::{Effect, EffectId, Group, Place};
 use tapjoint::gap::{
-    DETECTABLE, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, ParameterValue, SingleFits,
-    TestPlan, Verdict, nominal_chi_square, observe,
+    Comparison, DETECTABLE, Diagnosis, GapError, GapSettings, Hypothesis, Nominal, ParameterValue,
+    SingleFits, TestPlan, Thresholds, Verdict, nominal_chi_square, observe,
 };
 use tapjoint::identify::observation::Observations;
 
@@ -281,21 +281,11 @@ impl DrawnTest {
         })
     }
 
-    /// Returns the answer of the diagnosis, which proposes no next test here.
-    fn answer(&self, settings: &GapSettings) -> Result<Answer, String> {
-        let thresholds = &settings.thresholds;
-        let found = caught(|| {
-            let fits = SingleFits::new(&self.observed, &self.described, settings)?;
-            Ok(fits.with_pairs(thresholds).without_next_tests(thresholds))
-        });
-        found.map(|found| Answer::of(&found))
-    }
-
     /// Returns the answer of an observer who knows the study's distributions. `None` without a diagnosis.
     fn ideal(&self, diagnosis: &GapSettings) -> Option<Answer> {
         let mut random = stream(self.seed, Stream::Ideal);
         let settings = ideal::settings(&mut random, &self.structure, &self.test, diagnosis);
-        self.answer(&settings).ok()
+        answer(self, &settings).ok()
     }
 
     /// Returns the test with an answer, which took some seconds.
@@ -326,6 +316,36 @@ pub fn caught<T>(step: impl FnOnce() -> Result<T, GapError>) -> Result<T, String
     }
 }
 
+/// Returns the fits of a test without pairs.
+pub fn fitted(drawn: &DrawnTest, settings: &GapSettings) -> Result<SingleFits, String> {
+    caught(|| SingleFits::new(&drawn.observed, &drawn.described, settings))
+}
+
+/// Returns the fits with pairs.
+pub fn compared(
+    fits: &Result<SingleFits, String>,
+    thresholds: &Thresholds,
+) -> Result<Comparison, String> {
+    let fits = fits.clone()?;
+    caught(|| Ok(fits.with_pairs(thresholds)))
+}
+
+/// Returns the answer, without next tests.
+pub fn answered(
+    comparison: &Result<Comparison, String>,
+    thresholds: &Thresholds,
+) -> Result<Answer, String> {
+    let comparison = comparison.clone()?;
+    let found = caught(|| Ok(comparison.without_next_tests(thresholds)))?;
+    Ok(Answer::of(&found))
+}
+
+/// Returns the answer of the diagnosis to a test, without next tests.
+fn answer(drawn: &DrawnTest, settings: &GapSettings) -> Result<Answer, String> {
+    let thresholds = &settings.thresholds;
+    answered(&compared(&fitted(drawn, settings), thresholds), thresholds)
+}
+
 /// Returns whether such a test shows a fault at all: without noise, drift and errors of the description the model without
 /// it leaves a chi square of [`DETECTABLE`].
 fn is_visible(test: &PlannedTest, without: &Nominal, truth: &Nominal, effects: &[Effect]) -> bool {
@@ -346,7 +366,7 @@ impl Trial {
     /// Diagnoses a test, also as the ideal observer would if asked to.
     pub fn run(drawn: &DrawnTest, number: usize, settings: &GapSettings, ideal: bool) -> Self {
         let begin = Instant::now();
-        let answer = drawn.answer(settings);
+        let answer = answer(drawn, settings);
         let seconds = begin.elapsed().as_secs_f64();
         Self {
             ideal: if ideal { drawn.ideal(settings) } else { None },

@@ -20,7 +20,7 @@ fn plan_with_shapes(tap: f64) -> TestPlan {
     plan
 }
 
-/// Two strips one behind the other on a soft joint, whose places are known to 3 mm.
+/// Two strips in a line with a soft joint between them. Places of sensors and taps are known to 3 mm.
 fn lap() -> Nominal {
     let mut nominal = strip(0.004);
     let Body::One(beam) = nominal.specimen.body else {
@@ -42,7 +42,7 @@ fn probability(answer: &Diagnosis, hypothesis: &Hypothesis) -> f64 {
     found.map_or(0.0, |one| one.probability)
 }
 
-/// A tap on the far side of the gap between two beams moves another beam than its stated place says.
+/// The taps hit the right beam, and the description states a place on the left one.
 #[test]
 fn regress_taps_beside_the_end_of_a_beam_are_no_gap() {
     let nominal = lap();
@@ -58,14 +58,14 @@ fn regress_taps_beside_the_end_of_a_beam_are_no_gap() {
             .hypotheses
             .iter()
             .find(|one| one.hypothesis == Hypothesis::None);
-        // Under the right places the data are as probable as any: one in a thousand by chance.
+        // With the right places the model fits; by chance one test in a thousand is below this.
         let fits = none.and_then(|one| one.goodness_of_fit).unwrap();
         assert!(fits > 1e-3, "seed {seed}: {fits:e}");
         assert_eq!(answer.verdict, Verdict::NoGap, "seed {seed}");
     }
 }
 
-/// The size of this effect is that of the rotation. Without any, the search counts on the translation alone.
+/// The size of this effect is its rotation. Here that is zero, and only the translation shows.
 #[test]
 fn regress_a_joint_that_gives_in_translation_alone_is_found() {
     let mut nominal = strip(0.004);

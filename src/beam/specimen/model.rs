@@ -343,6 +343,12 @@ impl Model {
         self.runs[run].middle * (a0 + within * (a1 - a0))
     }
 
+    /// Returns whether the hinges sit in the same elements. Where one moves across a node, the slope there changes by its kink.
+    pub(super) fn has_hinges_where(&self, other: &Self) -> bool {
+        let [own, others] = [self, other].map(|model| model.hinged.iter().map(|one| one.node));
+        own.eq(others)
+    }
+
     fn hinged_at(&self, node: usize) -> Option<&HingedElement> {
         self.hinged.iter().find(|hinged| hinged.node == node)
     }

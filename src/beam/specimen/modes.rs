@@ -324,14 +324,16 @@ impl SpecimenModes {
     /// (Parlett 1998, 4.7), so that differences over small steps are those of exact modes, for less
     /// than their price.
     ///
-    /// `None` where the other has other motions (rigid springs, a base) or where some are loose: there
-    /// [`Specimen::modes`] has to solve anew. Modes after [`SpecimenModes::on_suspension`] lose the suspension.
+    /// `None` where the other has other motions (rigid springs, a base), where some are loose, or where a hinge moved
+    /// to another element: there [`Specimen::modes`] has to solve anew. Modes after [`SpecimenModes::on_suspension`] lose the suspension.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
     pub fn perturbed(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
         let model = self.model_of(other)?;
-        if model.numbering != self.model.numbering || !self.loose.is_empty() {
+        let is_alike =
+            model.numbering == self.model.numbering && model.has_hinges_where(&self.model);
+        if !is_alike || !self.loose.is_empty() {
             return Ok(None);
         }
         let modes = match model.resonators.is_empty() {

@@ -344,7 +344,7 @@ impl Model {
     }
 
     /// Returns whether the hinges sit in the same elements. Where one moves across a node, the slope there changes by its kink.
-    pub(super) fn has_hinges_where(&self, other: &Self) -> bool {
+    pub(super) fn has_hinges_in_same_elements(&self, other: &Self) -> bool {
         let [own, others] = [self, other].map(|model| model.hinged.iter().map(|one| one.node));
         own.eq(others)
     }

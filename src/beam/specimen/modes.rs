@@ -331,8 +331,8 @@ impl SpecimenModes {
     /// As [`Specimen::modes`].
     pub fn perturbed(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
         let model = self.model_of(other)?;
-        let is_alike =
-            model.numbering == self.model.numbering && model.has_hinges_where(&self.model);
+        let is_alike = model.numbering == self.model.numbering
+            && model.has_hinges_in_same_elements(&self.model);
         if !is_alike || !self.loose.is_empty() {
             return Ok(None);
         }

@@ -301,8 +301,8 @@ thresholds! {
     /// Prior probability of something unknown over that of one group of effects. A real rig has about as many causes
     /// outside the catalogue as in it. Ten is their share in `diagnosis_study`, whose figures are therefore favourable.
     unknown_prior: f64 = 10.0, Value, Pairs;
-    /// Weight of a second cause that the data do not show, over that of the effect that they show. All pairs together have the
-    /// prior of one group. Two of fourteen groups are in a pair, and four of ten second effects do not show beside the first.
+    /// Weight of a second cause that the data do not show, over that of the effect that they show. Without it, first answers above
+    /// 0.9 stated 0.99 on drawn tests. Of these, 222 were right and 13 wrong: odds of 0.06.
     hidden_second: f64 = 0.06, Value, Pairs;
     /// Standard deviations of an effect's size from zero from which on it is a name: a size within two may be zero.
     sized: f64 = 2.0, Value, Verdict;

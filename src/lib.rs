@@ -72,6 +72,7 @@ pub mod references;
 pub use tapjoint_analysis as pipeline;
 pub use tapjoint_beam as structure;
 pub use tapjoint_beam::effects;
+pub use tapjoint_compare as compare;
 pub use tapjoint_description as description;
 pub use tapjoint_diagnosis as gap;
 pub use tapjoint_identify as identify;

@@ -11,6 +11,7 @@
 
 mod amplitude;
 mod checks;
+mod compared;
 mod explained;
 mod fits;
 mod found;
@@ -34,6 +35,7 @@ mod wiring;
 
 pub use amplitude::AmplitudeChange;
 use checks::judge;
+pub use compared::compared_test;
 pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
 pub use free_test::{FreeTest, FreeTestError, measure_free_test};

@@ -568,3 +568,14 @@ pub(super) fn perturbed_by(methods: &[EstimateMethod]) -> IdentifySettings {
         ..IdentifySettings::default()
     }
 }
+
+/// Parses a repeatability: a ratio, or a percentage with its sign.
+pub(super) fn repeatability(text: &str) -> Result<f64, String> {
+    let value = parse_quantity(text, Dimension::Ratio).map_err(|error| error.to_string())?;
+    match (1e-6..=0.1).contains(&value) {
+        true => Ok(value),
+        false => Err(format!(
+            "{text} is no repeatability; give \"0.0001 %\" to \"10 %\", such as \"0.1 %\""
+        )),
+    }
+}

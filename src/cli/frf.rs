@@ -5,9 +5,10 @@ use super::arguments::{
     RecordingArguments, SpectrumSettings, channel_of, channel_scale, estimator, response_form,
     sensor_kind,
 };
-use super::input::{TestFile, check_file, is_description, read_test, stem};
+use super::input::{TestFile, check_file, read_test, stem};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
+use super::place::is_description;
 use super::recording::{analyse, holds_functions, refuse_given};
 use super::terminal::Terminal;
 use anyhow::bail;

@@ -224,9 +224,3 @@ pub(super) fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
 }
-
-/// Returns true for a test description, by the name: a recording may be any text.
-pub(super) fn is_description(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
-}

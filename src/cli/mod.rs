@@ -14,6 +14,7 @@ mod staging;
 mod terminal;
 
 mod blind_check;
+mod compare;
 mod diagnose;
 mod export;
 mod frf;
@@ -27,8 +28,8 @@ mod simulate;
 
 use arguments::CommonArguments;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
-use input::is_description;
 use overwrite::{Expanded, Files, described};
+use place::is_description;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -68,6 +69,7 @@ enum Command {
     Perturb(identify::PerturbArguments),
     Plan(plan::PlanArguments),
     Diagnose(diagnose::DiagnoseArguments),
+    Compare(compare::CompareArguments),
     BlindCheck(blind_check::BlindCheckArguments),
     Resolution(resolution::ResolutionArguments),
     Reproduce(program::ReproduceArguments),
@@ -177,6 +179,7 @@ fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outco
         Command::Perturb(arguments) => identify::perturb(arguments, seed, terminal),
         Command::Plan(arguments) => plan::run(arguments, seed, terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, seed, terminal),
+        Command::Compare(arguments) => compare::run(arguments, terminal),
         Command::BlindCheck(arguments) => blind_check::run(arguments, seed, terminal),
         Command::Resolution(arguments) => resolution::run(arguments, seed, terminal),
         Command::Reproduce(_) => program::print_reproduction(terminal),
@@ -222,7 +225,7 @@ mod tests {
             let names = argument.get_value_names().unwrap_or_default();
             let is_path = names
                 .iter()
-                .any(|name| ["FILE", "DIR", "TEST"].contains(&name.as_str()));
+                .any(|name| ["FILE", "DIR", "TEST", "BEFORE", "AFTER"].contains(&name.as_str()));
             let place = (command.get_name(), argument.get_id());
             assert_eq!(is_path, found == path || found == json, "{place:?}");
         }

@@ -8,7 +8,7 @@
 //! A file that tapjoint made has a mark: in the file, or in a list of checksums beside it.
 
 use super::arguments::JsonDestination;
-use super::place::{Place, folder_of};
+use super::place::{Place, folder_of, is_description};
 use anyhow::bail;
 use clap::ArgMatches;
 use serde_json::Value;
@@ -24,6 +24,9 @@ use tapjoint::description::TestDescription;
 const OUTPUTS: [&str; 8] = [
     "json", "out", "png", "csv", "uff58", "uff58b", "model", "keep",
 ];
+
+/// Arguments of `compare` that name tests.
+const COMPARED: [&str; 5] = ["first", "second", "before", "after", "pair"];
 
 /// An option with all files that it writes.
 pub(super) type Expanded = (&'static str, Vec<PathBuf>);
@@ -71,6 +74,17 @@ impl Files {
         }
         if let Some((path, test)) = test {
             inputs.extend(files_of(path, test));
+        }
+        // A comparison reads several descriptions. `simulate` writes the recordings that one names.
+        let compared = matches.ids().map(clap::Id::as_str);
+        let compared = compared.filter(|id| COMPARED.contains(id));
+        let compared: Vec<PathBuf> = compared.flat_map(|id| paths(matches, id)).collect();
+        for path in compared.into_iter().filter(|path| is_description(path)) {
+            inputs.extend(
+                described(&path)
+                    .iter()
+                    .flat_map(|test| files_of(&path, test)),
+            );
         }
         Self {
             inputs: inputs.iter().filter_map(|path| Place::of(path)).collect(),

@@ -110,3 +110,9 @@ pub(super) fn owner_of(found: &fs::Metadata) -> Option<u32> {
 pub(super) fn owner_of(_found: &fs::Metadata) -> Option<u32> {
     None
 }
+
+/// Returns true for a test description, by the name: a recording may be any text.
+pub(super) fn is_description(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}

@@ -5,8 +5,9 @@ use super::arguments::{
     RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
 };
 use super::diagnose::add_model;
-use super::input::{TestFile, check_file, file_name, is_description, read_test, stem};
+use super::input::{TestFile, check_file, file_name, read_test, stem};
 use super::overwrite::Expanded;
+use super::place::is_description;
 use super::publication::OutputFolder;
 use super::recording::analyse;
 use super::terminal::Terminal;

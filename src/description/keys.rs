@@ -57,7 +57,7 @@ pub(super) const RECORDING: KnownTable = KnownTable::new(
     "[[recording]]",
     "file files length tap level band block at mass sample_rate time_unit form values variables sensor overload torque temperature date",
 );
-pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "position mass");
+pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "name position mass");
 pub(super) const MEASURED: KnownTable = KnownTable::new(
     "[measured]",
     "frequencies file first_node modes half_line std scatter",

@@ -3,6 +3,7 @@
 //! [`TestDescription::parse`] takes text and returns validated data in SI units. It opens no files: the caller reads
 //! them. A [`DescriptionError`] names the line, the key, the allowed values and the nearest known key.
 
+mod fastened;
 mod free_test;
 mod keys;
 mod parse;
@@ -282,6 +283,8 @@ pub struct RecordingDescription {
     pub at: BTreeMap<String, f64>,
     /// Known masses fastened to the beam for this recording, in the order of the file.
     pub masses: Vec<PointMass>,
+    /// Names of these masses, in the same order; `None` for one without a name.
+    pub mass_names: Vec<Option<String>>,
     /// Sample rate (Hz) of a CSV file without a time column.
     pub sample_rate: Option<f64>,
     /// Unit of the time column (s) where its heading does not name it.

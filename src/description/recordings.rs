@@ -1,6 +1,7 @@
 //! `[hammer]` and `[[sensor]]`: channels of the recordings and their scales. `[[recording]]`: files of the test, each
 //! with its own settings. `[measured]`: natural frequencies that were read elsewhere.
 
+use super::fastened::{check_weight, read_fastened};
 use super::property::read_free_length;
 use super::reader::{
     DescriptionError, Entry, Limits, Table, did_you_mean, number, quoted, with_unit,
@@ -8,9 +9,8 @@ use super::reader::{
 use super::structure::along;
 use super::{
     Assembly, BeamDescription, ChannelPlace, ChannelRef, FirstNode, FunctionForm,
-    HammerDescription, MeasuredFrequencies, ModeFile, PointMass, RecordingDescription,
-    ResponseForm, Scale, SensorDescription, SensorKind, ValueColumns, VariableRole, Variables,
-    keys,
+    HammerDescription, MeasuredFrequencies, ModeFile, RecordingDescription, ResponseForm, Scale,
+    SensorDescription, SensorKind, ValueColumns, VariableRole, Variables, keys,
 };
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -44,8 +44,6 @@ const SENSOR_MASS: Limits = Limits::between(
 );
 
 const BESIDE: Limits = Limits::between(-1e4, 1e4, "positions run along the beam in m");
-/// Largest mass on a beam, in masses of the beam. More of it leaves no beam to tap, and its modes are found slowly.
-const HEAVIEST: f64 = 3.0;
 
 /// Reads `[hammer]`.
 pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, DescriptionError> {
@@ -144,26 +142,6 @@ fn read_sensor(
         }
     }
     Ok(sensor)
-}
-
-/// Warns of what weighs (kg) more than the beam itself, and refuses what weighs more than [`HEAVIEST`].
-fn check_weight(
-    entry: &Entry<'_>,
-    mass: f64,
-    beam: &BeamDescription,
-    question: &str,
-) -> Result<(), DescriptionError> {
-    let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
-    if mass > HEAVIEST * beam_mass {
-        let most = with_unit(HEAVIEST * beam_mass, "kg");
-        let allowed = format!("up to {most}, {HEAVIEST} times the mass of the beam");
-        return Err(entry.impossible(mass, "kg", &allowed, question));
-    }
-    if mass > beam_mass {
-        let usual = format!("less than the beam's {}", with_unit(beam_mass, "kg"));
-        entry.unusual(mass, "kg", &usual, question);
-    }
-    Ok(())
 }
 
 /// Warns of each mass without a place in some recording, or in the description if there is no recording.
@@ -285,15 +263,6 @@ const TEMPERATURE: Limits = Limits::between(
     "give degrees Celsius, or a unit: \"293 K\"",
 );
 
-/// Most masses fastened for one recording.
-const MOST_MASSES: usize = 100;
-/// Largest mass that is fastened to a beam for a test; the heaviest beams take more than a kilogram.
-const FASTENED_MASS: Limits = Limits::above(
-    0.0,
-    1e3,
-    "give what it weighs in kg, or with its unit: \"50 g\"; leave the table out where nothing is fastened",
-);
-
 /// Reads one `[[recording]]`.
 pub(super) fn read_recording(
     entry: &Entry<'_>,
@@ -325,14 +294,8 @@ pub(super) fn read_recording(
     if let Some(entry) = table.get("length").filter(|_| length != Some(described)) {
         check_places_at_length(&entry, beam.length, &at, sensors)?;
     }
-    let masses: Option<Vec<_>> = table.optional("mass", |entry| {
-        let wanted = "a list of tables, each under its own header [[recording.mass]],";
-        let entries = entry.list_up_to(MOST_MASSES, wanted)?;
-        entries
-            .iter()
-            .map(|entry| read_fastened(entry, beam))
-            .collect()
-    })?;
+    let fastened = table.optional("mass", |entry| read_fastened(entry, beam, sensors))?;
+    let (mass_names, masses) = fastened.unwrap_or_default();
     let form = table.choice("form", &FUNCTION_FORMS)?;
     let values = table.choice("values", &ValueColumns::WORDS)?;
     let sensor = table.optional("sensor", |entry| {
@@ -380,7 +343,8 @@ pub(super) fn read_recording(
         band: table.optional("band", read_band)?,
         block: table.optional("block", |entry| entry.count(&BLOCK))?,
         at,
-        masses: masses.unwrap_or_default(),
+        masses,
+        mass_names,
         sample_rate: table.within("sample_rate", Dimension::Rate, &SAMPLE_RATE)?,
         time_unit: table.choice("time_unit", &TIME_UNITS)?,
         form,
@@ -561,16 +525,6 @@ fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {
     }
     let remedy = "write the lower edge first: `band = [0, 200]`";
     Err(high.out_of_range(upper, "Hz", &Limits::above(low, BAND_EDGE.high, remedy)))
-}
-
-fn read_fastened(entry: &Entry<'_>, beam: &BeamDescription) -> Result<PointMass, DescriptionError> {
-    let table = entry.table(&keys::FASTENED)?;
-    let position = table.need("position", "its place on the beam (m)", "position = 0.20")?;
-    let weight = table.need("mass", "what it weighs (kg)", "mass = \"50 g\"")?;
-    let position = position.within(Dimension::Length, &along(beam.length))?;
-    let mass = weight.within(Dimension::Mass, &FASTENED_MASS)?;
-    check_weight(&weight, mass, beam, "did you mean g? Write \"50 g\"")?;
-    Ok(PointMass::new(position, mass))
 }
 
 fn check_sensor(

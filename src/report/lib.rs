@@ -25,6 +25,7 @@ pub mod charts {
 
 /// Every sentence about a result, once.
 pub mod words {
+    pub mod comparison;
     pub mod diagnosis;
     pub mod findings;
     pub(crate) mod sizes;
@@ -35,7 +36,8 @@ pub use data_files::{
     render_perturbation_csv, render_taps_csv,
 };
 pub use document::{
-    datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
+    comparison_of, datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of,
+    prediction_of,
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
@@ -43,7 +45,8 @@ pub use run::{
     render_schema, render_spectrum_picture,
 };
 pub use text::{
-    render_gap_text, render_readings, render_reproduction, render_stages, render_text, wrapped,
+    render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,
+    render_text, wrapped,
 };
 
 /// A finished file.

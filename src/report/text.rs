@@ -6,6 +6,7 @@ use crate::document::{Document, EstimateSection, ReadBy, method_name};
 use crate::format::{MISSING, capital, signed_percent, significant, trimmed};
 use crate::short_names::ways;
 use crate::tables::{self, Column, Place, Table, listed};
+use crate::words::comparison::answer;
 use crate::words::diagnosis::gap_story;
 use crate::words::findings::{brief, no_estimate};
 use tapjoint_study::publication::{Agreement, Reproduction};
@@ -180,6 +181,33 @@ fn joined<const N: usize>(parts: [String; N]) -> String {
 pub fn render_gap_text(document: &Document) -> String {
     let prediction = plain(tables::prediction(document));
     joined([prediction, gap(document), warnings(document)])
+}
+
+/// Returns what changed between two tests: the answer, the frequencies, and the causes.
+pub fn render_comparison(document: &Document) -> String {
+    let sentences = answer(document);
+    let sentences: Vec<String> = sentences
+        .iter()
+        .map(|sentence| wrapped(sentence, 2))
+        .collect();
+    let tables = [tables::changed_modes(document), tables::changes(document)];
+    let codes: BTreeSet<&str> = document
+        .warnings
+        .iter()
+        .map(|one| one.code.as_str())
+        .collect();
+    let codes: Vec<&str> = codes.into_iter().collect();
+    let doubts = match codes.as_slice() {
+        [] => String::new(),
+        codes => wrapped(
+            &format!(
+                "Doubts about the readings: {}. `tapjoint run` on each test explains them.",
+                codes.join(", ")
+            ),
+            2,
+        ),
+    };
+    joined([sentences.join(""), joined(tables.map(noted)), doubts])
 }
 
 /// The story of the gap and the hypotheses; empty without a diagnosis.

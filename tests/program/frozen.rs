@@ -343,6 +343,47 @@ fn frozen_five_simulated_recordings() {
     assert_frozen("five_recordings", folder.path(), "v/test.toml");
 }
 
+/// A joint that is retightened: 8 % less rotational stiffness, as another person would record it.
+#[test]
+fn frozen_compare() {
+    let folder = tempfile::tempdir().unwrap();
+    copy_recordings("cantilever", folder.path());
+    for (name, ky, seed) in [("before", "13", "1"), ("after", "12", "2")] {
+        let simulate = [
+            "simulate",
+            "test.toml",
+            "--kx",
+            "1500",
+            "--ky",
+            ky,
+            "--seed",
+            seed,
+            "--out",
+            name,
+            "-q",
+        ];
+        assert_eq!(put_out(folder.path(), &simulate), "");
+    }
+    let tests = ["before/test.toml", "after/test.toml"];
+    let mut text = String::new();
+    for after in [tests[1], tests[0]] {
+        let compare = ["compare", tests[0], after, "--repeatability", "0.1 %"];
+        text.push_str(&put_out(folder.path(), &compare));
+        text.push('\n');
+    }
+    let json = [
+        "compare",
+        tests[0],
+        tests[1],
+        "--repeatability",
+        "0.1 %",
+        "--json",
+        "-",
+    ];
+    text.push_str(&readable(&put_out(folder.path(), &json)));
+    assert_snapshot("compare", &text);
+}
+
 #[test]
 fn frozen_help() {
     let folder = tempfile::tempdir().unwrap();
@@ -360,6 +401,7 @@ fn frozen_help() {
         "export",
         "plan",
         "diagnose",
+        "compare",
         "simulate",
         "blind-check",
         "reproduce",

@@ -129,6 +129,47 @@ const TABLE: &[Row] = &[
         &[],
     ),
     row(
+        &["compare", "cantilever/test.toml", "cantilever/test.toml"],
+        &[
+            "cantilever/test.toml",
+            "cantilever/low.wav",
+            "cantilever/high.wav",
+        ],
+        &[],
+        &[],
+    ),
+    row(
+        &[
+            "compare",
+            "--before",
+            "cantilever/test.toml",
+            "--after",
+            "cantilever/test.toml",
+        ],
+        &[
+            "cantilever/test.toml",
+            "cantilever/low.wav",
+            "cantilever/high.wav",
+        ],
+        &[],
+        &[],
+    ),
+    row(
+        &[
+            "compare",
+            "--pair",
+            "cantilever/test.toml",
+            "cantilever/test.toml",
+        ],
+        &[
+            "cantilever/test.toml",
+            "cantilever/low.wav",
+            "cantilever/high.wav",
+        ],
+        &[],
+        &[],
+    ),
+    row(
         &["blind-check", "--folder", "tests", "--truth", "truths.json"],
         &["truths.json", "tests/a/test.toml", "tests/a/taps.wav"],
         &[],
@@ -564,10 +605,12 @@ fn prop_the_table_has_every_option_with_a_file() {
     let mut listed = BTreeSet::new();
     for row in TABLE {
         let command = row.arguments[0];
-        let given = row
-            .arguments
-            .iter()
-            .filter(|argument| ["--report", "--folder", "--truth"].contains(argument));
+        let given = row.arguments.iter().filter(|argument| {
+            [
+                "--report", "--folder", "--truth", "--before", "--after", "--pair",
+            ]
+            .contains(argument)
+        });
         let folders = row.folders.iter().map(|folder| folder.option);
         let options = row
             .all_files()

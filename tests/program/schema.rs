@@ -49,6 +49,7 @@ fn prop_reports_keep_to_the_shipped_schema() {
         &["spectrum", wav, "--hammer", "1"],
         &["frf", wav, "--hammer", "1"],
         &["diagnose", cantilever],
+        &["compare", cantilever, cantilever],
         &["plan", virtual_test, "--draws", "1"],
         &["export", cantilever],
         &[

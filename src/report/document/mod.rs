@@ -38,6 +38,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
+use tapjoint_compare::Comparison;
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::QualityVerdict;
@@ -102,6 +103,9 @@ pub struct Document {
     /// The gap between model and measurement: where, which effect, how far it closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<GapSection>,
+    /// What changed between two tests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compare: Option<Comparison>,
     /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<QualityVerdict>>,
@@ -248,6 +252,25 @@ pub fn prediction_of(name: &str, structure: &TestedStructure, modes: &[Predicted
         version: VERSION,
         test: Some(test_section(name, Some(structure))),
         prediction: Some(predictions(modes)),
+        ..Document::default()
+    }
+}
+
+/// Returns the document of a comparison. `name` is that of the first test, `warnings` are those of all tests.
+pub fn comparison_of(
+    name: &str,
+    structure: &TestedStructure,
+    found: Comparison,
+    warnings: Vec<Warning>,
+) -> Document {
+    Document {
+        version: VERSION,
+        test: Some(test_section(name, Some(structure))),
+        compare: Some(found),
+        warnings: warnings
+            .iter()
+            .map(|warning| WarningSection::of(warning, false))
+            .collect(),
         ..Document::default()
     }
 }

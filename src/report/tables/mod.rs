@@ -1,10 +1,12 @@
 //! The report's tables as words, for the page and for the terminal.
 
+mod comparison;
 mod diagnosis;
 mod joint;
 mod modes;
 mod recordings;
 
+pub use comparison::{changed_modes, changes};
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;
 pub use joint::{

@@ -49,6 +49,7 @@ pub fn document() -> Document {
         perturbation: Some(perturbation()),
         resolution_span: Some(vec![span()]),
         gap: None,
+        compare: None,
         quality: Some(quality()),
         warnings: vec![
             WarningSection {

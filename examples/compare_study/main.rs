@@ -1,0 +1,262 @@
+//! How often a comparison of two tests is right, on drawn pairs of tests (frequencies, not recordings) of many kinds.
+//!
+//! Every class of changes is a cell. The model is wrong by the tolerances of a description and by one effect that both
+//! tests share. The scatter between tests has long tails (Student's with four degrees of freedom), and a part of it
+//! is common to all modes. Half of the pairs state their repeatability, a quarter has three tests on either side, and a
+//! quarter knows nothing of it.
+//!
+//! "Visible" are the pairs in which the change alone has a chi square of 14.9 or more: one in a hundred false alarms and one
+//! in ten misses, for an observer who knows what to look for. A first cause is right where its group is.
+//!
+//! `cargo run --release --example compare_study -- [--pairs N] [--seed S] [--cell NAME] [--list]`
+//!
+//! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
+//! of threads.
+
+mod draw;
+
+use draw::{Cell, Drawn};
+use rayon::prelude::*;
+use tapjoint::compare::{CauseKind, Comparison, VerdictKind, compare};
+
+const USAGE: &str = "usage: compare_study [--pairs N] [--seed S] [--cell NAME] [--list]";
+/// Structures drawn for one pair until one of them can be.
+const ATTEMPTS: u64 = 50;
+/// Chi square of a visible change.
+const VISIBLE: f64 = 14.9;
+
+struct Row {
+    cell: Cell,
+    drawn: Drawn,
+    found: Comparison,
+}
+
+/// Hits among cases.
+#[derive(Default, Clone, Copy)]
+struct Rate {
+    hits: usize,
+    cases: usize,
+}
+
+impl Rate {
+    fn count(&mut self, hit: bool) {
+        self.hits += usize::from(hit);
+        self.cases += 1;
+    }
+}
+
+impl std::fmt::Display for Rate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.cases == 0 {
+            return write!(f, "-");
+        }
+        let share = 100.0 * self.hits as f64 / self.cases as f64;
+        write!(f, "{share:.1} % ({} of {})", self.hits, self.cases)
+    }
+}
+
+/// Causes whose frequencies hardly differ.
+fn group(kind: CauseKind) -> usize {
+    match kind {
+        CauseKind::LostMass | CauseKind::AddedMass | CauseKind::SensorPosition => 1,
+        CauseKind::Length | CauseKind::Modulus => 2,
+        other => 10 + other as usize,
+    }
+}
+
+impl Row {
+    fn is_named(&self) -> bool {
+        matches!(
+            self.found.verdict.kind,
+            VerdictKind::Named | VerdictKind::Group
+        )
+    }
+
+    fn is_right(&self, kind: CauseKind) -> bool {
+        self.drawn
+            .causes
+            .iter()
+            .any(|own| group(*own) == group(kind))
+    }
+
+    fn first_is_right(&self) -> bool {
+        let mut causes = self.found.hypotheses.iter();
+        let first = causes.find(|one| one.effect != CauseKind::NoChange);
+        first.is_some_and(|first| self.is_right(first.effect))
+    }
+
+    /// The list of the answer holds the truth.
+    fn holds(&self) -> bool {
+        let verdict = &self.found.verdict;
+        match verdict.kind {
+            VerdictKind::Unknown => true,
+            VerdictKind::NoChange => self.drawn.chi_square < VISIBLE,
+            _ => verdict
+                .effects
+                .iter()
+                .any(|kind| self.is_right(*kind) || *kind == CauseKind::Unknown),
+        }
+    }
+}
+
+fn main() -> Result<(), String> {
+    let (mut pairs, mut seed, mut cells, mut list) = (20_usize, 1_u64, Vec::new(), false);
+    let mut given = std::env::args().skip(1);
+    while let Some(name) = given.next() {
+        if name == "--list" {
+            list = true;
+            continue;
+        }
+        let value = given.next().ok_or(USAGE)?;
+        match name.as_str() {
+            "--pairs" => pairs = value.parse().map_err(|_| USAGE)?,
+            "--seed" => seed = value.parse().map_err(|_| USAGE)?,
+            "--cell" => cells.push(value),
+            _ => return Err(USAGE.to_owned()),
+        }
+    }
+    let mut tasks = Vec::new();
+    for cell in Cell::ALL {
+        if cells.is_empty() || cells.iter().any(|name| name == cell.name()) {
+            let count = if cell == Cell::Nothing {
+                4 * pairs
+            } else {
+                pairs
+            };
+            tasks.extend((0..count as u64).map(|number| (cell, number)));
+        }
+    }
+    let rows: Vec<Row> = tasks
+        .par_iter()
+        .filter_map(|&(cell, number)| {
+            let drawn =
+                (0..ATTEMPTS).find_map(|attempt| Drawn::new(cell, seed, number, attempt))?;
+            let found = compare(&drawn.pairs, &drawn.settings).ok()?;
+            Some(Row { cell, drawn, found })
+        })
+        .collect();
+    if list {
+        for row in &rows {
+            print_row(row);
+            print_causes(row);
+        }
+    }
+    print_scores(&rows);
+    Ok(())
+}
+
+fn print_row(row: &Row) {
+    let verdict = &row.found.verdict;
+    let names: Vec<&str> = verdict.effects.iter().map(|kind| kind.name()).collect();
+    println!(
+        "{:16} chi2 {:9.1} r {:.4} {:?} -> {} {} {:.3}; first {} {:.3}",
+        row.cell.name(),
+        row.drawn.chi_square,
+        100.0 * row.drawn.repeatability,
+        row.drawn.sizes,
+        verdict.kind.name(),
+        names.join(","),
+        verdict.probability,
+        row.found.hypotheses[0].effect.name(),
+        row.found.hypotheses[0].probability,
+    );
+}
+
+fn print_scores(rows: &[Row]) {
+    println!(
+        "{:16} {:>20} {:>20} {:>20} {:>20} {:>20} {:>20}",
+        "cell", "visible", "first right", "named", "named wrongly", "list holds", "called a change"
+    );
+    for cell in Cell::ALL {
+        let own: Vec<&Row> = rows.iter().filter(|row| row.cell == cell).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let (mut visible, mut first, mut named) =
+            (Rate::default(), Rate::default(), Rate::default());
+        let (mut wrong, mut list, mut called) = (Rate::default(), Rate::default(), Rate::default());
+        for row in own {
+            let is_visible = row.drawn.chi_square >= VISIBLE;
+            visible.count(is_visible);
+            let kinds = &row.found.verdict.effects;
+            let is_wrong = row.is_named() && !kinds.iter().any(|kind| row.is_right(*kind));
+            wrong.count(is_wrong);
+            called.count(row.is_named() || row.found.verdict.kind == VerdictKind::Unknown);
+            if is_visible {
+                first.count(row.first_is_right());
+                named.count(row.is_named());
+                list.count(row.holds());
+            }
+        }
+        println!(
+            "{:16} {:>20} {:>20} {:>20} {:>20} {:>20} {:>20}",
+            cell.name(),
+            visible.to_string(),
+            first.to_string(),
+            named.to_string(),
+            wrong.to_string(),
+            list.to_string(),
+            called.to_string()
+        );
+    }
+    let (mut first, mut wrong) = (Rate::default(), Rate::default());
+    let mut held: [Rate; 4] = Default::default();
+    let mut bins = [(0.0, Rate::default()); 5];
+    for row in rows {
+        let is_single = row.drawn.causes.len() == 1;
+        if is_single && row.drawn.chi_square >= VISIBLE {
+            first.count(row.first_is_right());
+            let kinds = &row.found.verdict.effects;
+            wrong.count(row.is_named() && !kinds.iter().any(|kind| row.is_right(*kind)));
+        }
+        row.drawn
+            .count_intervals(&row.found, |index, holds| held[index].count(holds));
+        // What is stated of the first cause of all.
+        let top = &row.found.hypotheses[0];
+        let right = match top.effect {
+            CauseKind::NoChange => row.drawn.causes.is_empty() && row.cell == Cell::Nothing,
+            CauseKind::Unknown => row.cell == Cell::Outside,
+            kind => row.is_right(kind),
+        };
+        let together: f64 = row
+            .found
+            .hypotheses
+            .iter()
+            .filter(|one| group(one.effect) == group(top.effect))
+            .map(|one| one.probability)
+            .sum();
+        let bin = ((together * 5.0) as usize).min(4);
+        bins[bin].0 += together;
+        bins[bin].1.count(right);
+    }
+    println!("first cause of visible single changes {first}, named wrongly {wrong}");
+    for (name, rate) in ["Kt", "Kr", "mass", "position"].iter().zip(held) {
+        println!("95 % interval of {name} holds {rate}");
+    }
+    for (sum, rate) in bins.iter().filter(|one| one.1.cases > 0) {
+        println!("stated {:.3} right {rate}", sum / rate.cases as f64);
+    }
+}
+
+/// Prints the first causes with their sizes.
+fn print_causes(row: &Row) {
+    for cause in row.found.hypotheses.iter().take(5) {
+        let sizes: Vec<String> = cause
+            .parameters
+            .iter()
+            .map(|(name, value)| {
+                format!(
+                    "{name} {:.4} ({:.4} to {:.4})",
+                    value.value, value.low, value.high
+                )
+            })
+            .collect();
+        println!(
+            "    {:16} {:.4} fit {:.3} {}",
+            cause.effect.name(),
+            cause.probability,
+            cause.goodness_of_fit.unwrap_or(f64::NAN),
+            sizes.join(", ")
+        );
+    }
+}

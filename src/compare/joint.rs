@@ -1,0 +1,284 @@
+//! A change of the joint: translation, rotation and coupling at once.
+//!
+//! The most probable change is searched by least squares. The posterior is summed over a grid about it, which is fine near
+//! the centre and reaches to the largest changes.
+
+use crate::cause::SizePrior;
+use crate::likelihood::{Data, Gaussian};
+use crate::model::{PairModel, Predicted};
+use crate::search::{Point, Posterior, normalised};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use tapjoint_numerics::least_squares::{Linearised, Problem, Settings as SearchSettings, minimise};
+
+/// Half width of the prior of a stiffness (logarithm), of the coupling, and of the compliance of a rigid joint (1, beams):
+/// half of all changes are smaller.
+const STIFFNESS: f64 = 0.1;
+const COUPLING: f64 = 0.05;
+const COMPLIANCE: f64 = 0.01;
+/// Largest change of each: a factor of 20, the whole coupling, a joint as soft as the beam.
+const MOST: [f64; 3] = [3.0, 0.5, 1.0];
+/// Points on either side of the most probable change along each axis, for one, two and three directions.
+const POINTS: [i32; 3] = [20, 12, 5];
+/// Their distance near the centre, in standard deviations.
+const POINT_STEP: f64 = 0.5;
+/// Step of differences.
+const STEP: f64 = 0.01;
+
+/// Directions of a joint, and what is known of their changes.
+pub(crate) struct JointChange {
+    /// Directions: 0 translation, 1 rotation, 2 coupling.
+    pub(crate) directions: Vec<usize>,
+    half_widths: Vec<f64>,
+    most: Vec<f64>,
+}
+
+impl JointChange {
+    /// Returns the directions that may change; `None` where there is no joint.
+    pub(crate) fn new(pairs: &[PairModel]) -> Option<Self> {
+        let mut directions = pairs[0].joint_directions();
+        directions.retain(|one| {
+            pairs
+                .iter()
+                .all(|pair| pair.joint_directions().contains(one))
+        });
+        // A direction that is rigid in one description and elastic in another has no common size of its change.
+        let all = pairs.iter().filter_map(PairModel::joints);
+        let all: Vec<[f64; 2]> = all.flatten().map(|joint| [joint.kt, joint.kr]).collect();
+        let stiffnesses = *all.first()?;
+        directions.retain(|&one| {
+            let mut others = all.iter();
+            one > 1
+                || others.all(|other| other[one].is_infinite() == stiffnesses[one].is_infinite())
+        });
+        let (mut half_widths, mut most) = (Vec::new(), Vec::new());
+        for &direction in &directions {
+            let is_rigid = direction < 2 && stiffnesses[direction].is_infinite();
+            let kind = match direction {
+                2 => 1,
+                _ if is_rigid => 2,
+                _ => 0,
+            };
+            half_widths.push([STIFFNESS, COUPLING, COMPLIANCE][kind]);
+            most.push(MOST[kind]);
+        }
+        (!directions.is_empty()).then_some(Self {
+            directions,
+            half_widths,
+            most,
+        })
+    }
+
+    /// Returns the names of its values, by the joint of a pair.
+    pub(crate) fn names(&self, pair: &PairModel) -> Vec<&'static str> {
+        let stiffnesses = pair.structure().joint_stiffnesses();
+        let names = self.directions.iter();
+        names
+            .map(|&direction| match direction {
+                2 => "coupling",
+                one if stiffnesses[one].is_infinite() => ["kt_compliance", "kr_compliance"][one],
+                one => ["kt", "kr"][one],
+            })
+            .collect()
+    }
+
+    /// Returns the logarithm of the prior density.
+    fn log_prior(&self, steps: &[f64]) -> f64 {
+        let pairs = steps.iter().zip(&self.half_widths);
+        pairs
+            .map(|(step, half_width)| {
+                SizePrior::Cauchy {
+                    half_width: *half_width,
+                    below: 0.5,
+                }
+                .log_density(*step)
+            })
+            .sum()
+    }
+
+    fn predict(&self, data: &Data<'_>, steps: &[f64]) -> Option<Vec<Predicted>> {
+        let pairs = data.pairs.iter();
+        pairs
+            .map(|pair| pair.predict_joint(&self.directions, steps))
+            .collect()
+    }
+
+    /// Returns the most probable change by searches from these starts, and the curvature of the logarithm of the posterior
+    /// there; `None` where the search fails.
+    fn peak(&self, data: &Data<'_>, starts: &[Vec<f64>]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let limits = SearchSettings {
+            gain: 1e-4,
+            polish: false,
+            ..SearchSettings::default()
+        };
+        let none: Vec<Predicted> = data.pairs.iter().map(Predicted::nothing).collect();
+        let mut starts = starts.to_vec();
+        let mut favoured = data.favoured(&none);
+        // The second turn takes the repeatability that the first one's answer leaves.
+        for turn in 0..2 {
+            let search = Search {
+                change: self,
+                data,
+                variances: &data.variances[favoured],
+                bounds: self.most.iter().map(|most| [-most, *most]).collect(),
+            };
+            let mut best: Option<(f64, Vec<f64>)> = None;
+            for start in &starts {
+                let Some(found) = minimise(&search, start, &limits) else {
+                    continue;
+                };
+                let cost = search.cost(&found.state);
+                if best.as_ref().is_none_or(|one| cost < one.0) {
+                    best = Some((cost, found.parameters));
+                }
+            }
+            let (_, centre) = best?;
+            let next = data.favoured(&self.predict(data, &centre)?);
+            if turn == 1 || next == favoured {
+                let state = search.evaluate(&centre, None)?;
+                let slopes = search.slopes(&centre, &state)?;
+                return Some((centre, slopes.transpose() * slopes));
+            }
+            favoured = next;
+            starts = vec![centre];
+        }
+        None
+    }
+
+    /// Returns the logarithm of the evidence by the parabola at its peak, searched from one start.
+    pub(crate) fn log_evidence_near(&self, data: &Data<'_>, start: Vec<f64>) -> Option<f64> {
+        let (centre, curvature) = self.peak(data, &[start])?;
+        let log_determinant = curvature.cholesky()?.determinant().ln();
+        let half_count = 0.5 * centre.len() as f64;
+        let log = data.log_density(&self.predict(data, &centre)?) + self.log_prior(&centre);
+        Some(log + half_count * (2.0 * PI).ln() - 0.5 * log_determinant)
+    }
+
+    /// Returns the posterior of a change; `None` where the search fails.
+    pub(crate) fn posterior(&self, data: &Data<'_>) -> Option<Posterior> {
+        // The prior's long tails may leave two optima: one near no change, and one beyond.
+        let starts = [0.0, 1.0, -1.0].map(|share| {
+            let widths = self.half_widths.iter();
+            widths.map(|width| share * width).collect()
+        });
+        let (centre, curvature) = self.peak(data, &starts)?;
+        let axes = SymmetricEigen::new(curvature);
+        let count = self.directions.len();
+        let each = POINTS[count - 1];
+        let mut grids = Vec::with_capacity(count);
+        for (value, axis) in axes.eigenvalues.iter().zip(axes.eigenvectors.column_iter()) {
+            let shares = axis
+                .iter()
+                .zip(&self.most)
+                .map(|(along, most)| most / along.abs());
+            let reach = shares.fold(f64::INFINITY, f64::min) * 1.2;
+            grids.push(stretched(each, value.sqrt().recip(), reach));
+        }
+        let steps_each = (2 * each + 1) as usize;
+        let indices: Vec<usize> = (0..steps_each.pow(count as u32)).collect();
+        let points: Vec<Point> = indices
+            .into_par_iter()
+            .filter_map(|index| {
+                let mut moved = DVector::from_column_slice(&centre);
+                let (mut rest, mut log_volume) = (index, 0.0);
+                for (axis, grid) in grids.iter().enumerate() {
+                    let (away, volume) = grid[rest % steps_each];
+                    rest /= steps_each;
+                    log_volume += volume.ln();
+                    moved += axes.eigenvectors.column(axis) * away;
+                }
+                let mut sizes = moved.iter().zip(&self.most);
+                if sizes.any(|(one, most)| one.abs() > *most) {
+                    return None;
+                }
+                let predicted = self.predict(data, moved.as_slice())?;
+                let log_prior = self.log_prior(moved.as_slice());
+                Some(Point {
+                    log_weight: data.log_density(&predicted) + log_prior + log_volume,
+                    values: moved.as_slice().to_vec(),
+                })
+            })
+            .collect();
+        normalised(points, |values| self.predict(data, values))
+    }
+}
+
+/// Returns points about zero with the piece of the axis that each stands for: [`POINT_STEP`] standard deviations apart near
+/// zero, and farther and farther apart up to `reach`: sinh of equal steps.
+fn stretched(each: i32, std: f64, reach: f64) -> Vec<(f64, f64)> {
+    let step = POINT_STEP * std;
+    let (mut low, mut high) = (1e-6, 3.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        let end = step * (middle * f64::from(each)).sinh() / middle;
+        match end < reach {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    (-each..=each)
+        .map(|k| {
+            let along = low * f64::from(k);
+            (step * along.sinh() / low, step * along.cosh())
+        })
+        .collect()
+}
+
+/// Search for the most probable change of the joint, at one value of the repeatability.
+struct Search<'a> {
+    change: &'a JointChange,
+    data: &'a Data<'a>,
+    variances: &'a [Vec<f64>],
+    bounds: Vec<[f64; 2]>,
+}
+
+impl Search<'_> {
+    fn slopes(&self, parameters: &[f64], state: &[f64]) -> Option<DMatrix<f64>> {
+        let mut slopes = DMatrix::zeros(state.len(), parameters.len());
+        for column in 0..parameters.len() {
+            let mut moved = parameters.to_vec();
+            let step = if moved[column] > 0.0 { -STEP } else { STEP };
+            moved[column] += step * self.change.half_widths[column] / STIFFNESS;
+            let away = moved[column] - parameters[column];
+            let state_there = self.evaluate(&moved, None)?;
+            for (row, value) in state_there.into_iter().enumerate() {
+                slopes[(row, column)] = (value - state[row]) / away;
+            }
+        }
+        Some(slopes)
+    }
+}
+
+impl Problem for Search<'_> {
+    type State = Vec<f64>;
+
+    /// Residuals in standard deviations, and what makes Cauchy's prior a sum of squares.
+    fn evaluate(&self, parameters: &[f64], _: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let predicted = self.change.predict(self.data, parameters)?;
+        let mut residuals = Vec::new();
+        for ((pair, variances), predicted) in
+            self.data.pairs.iter().zip(self.variances).zip(&predicted)
+        {
+            let own = Gaussian::new(pair, variances, predicted)?;
+            residuals.extend(own.whitened()?.iter());
+        }
+        for (step, half_width) in parameters.iter().zip(&self.change.half_widths) {
+            let loss = (2.0 * (1.0 + (step / half_width).powi(2)).ln()).sqrt();
+            residuals.push(loss.copysign(*step));
+        }
+        Some(residuals)
+    }
+
+    fn cost(&self, state: &Vec<f64>) -> f64 {
+        0.5 * state.iter().map(|one| one * one).sum::<f64>()
+    }
+
+    fn linearise(&self, parameters: &[f64], state: &mut Vec<f64>) -> Option<Linearised> {
+        Some(Linearised::of_rows(self.slopes(parameters, state)?, state))
+    }
+
+    fn bounds(&self) -> &[[f64; 2]] {
+        &self.bounds
+    }
+}

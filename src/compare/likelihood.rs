@@ -1,0 +1,254 @@
+//! Probability of the measured changes, given a predicted one.
+//!
+//! The measured change of each mode is the predicted one, plus scatter between set-ups. Its covariance is
+//! r^2 I (the repeatability r, or the readings where they are worse) + sum of g g' (the joint before the change is
+//! uncertain) + (e d)^2 + (e/2)^2 d d' (a predicted change d has the relative error e in each mode, and half of it in all).
+
+use crate::model::{PairModel, Predicted};
+use crate::test::Settings;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::f64::consts::PI;
+use tapjoint_numerics::stats::chi_square_tail;
+
+/// Median of the repeatability where nothing is known of it (1), and spread of its logarithm: frequencies of a beam that
+/// is set up again scatter by 0.05 to 0.4 %.
+const USUAL_REPEATABILITY: f64 = 1e-3;
+const USUAL_SPREAD: f64 = 0.8;
+/// Steps over a repeatability that is not known, in its logarithm, to either side, and how many spreads they reach.
+const STEPS: i32 = 12;
+const REACH: f64 = 3.5;
+
+/// Error that the predicted changes of all modes have in common, over that of one.
+const COMMON_SHARE: f64 = 0.5;
+
+/// A value of the repeatability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scatter {
+    /// Standard deviation of the difference between two tests of one state (1).
+    pub(crate) std: f64,
+    /// Logarithm of its weight.
+    pub(crate) log_weight: f64,
+}
+
+/// Returns the values of the repeatability with their weights, which add up to 1.
+pub(crate) fn scatters(pairs: &[PairModel], settings: &Settings) -> Vec<Scatter> {
+    if let Some(std) = settings.repeatability {
+        return vec![Scatter {
+            std,
+            log_weight: 0.0,
+        }];
+    }
+    // The grid lies about what prior and repeats say together.
+    let squares: f64 = pairs.iter().map(|pair| pair.repeats.0).sum();
+    let freedom: f64 = pairs.iter().map(|pair| pair.repeats.1).sum();
+    let (mut centre, mut spread) = (USUAL_REPEATABILITY.ln(), USUAL_SPREAD);
+    if freedom > 0.0 && squares > 0.0 {
+        // The difference of two tests has twice the variance of one.
+        let of_repeats = 0.5 * (2.0 * squares / freedom).ln();
+        let precision = USUAL_SPREAD.powi(-2);
+        centre = (precision * centre + 2.0 * freedom * of_repeats) / (precision + 2.0 * freedom);
+        spread = (precision + 2.0 * freedom).powf(-0.5);
+    }
+    let mut all = Vec::new();
+    for step in -STEPS..=STEPS {
+        let log_std = centre + REACH * spread * f64::from(step) / f64::from(STEPS);
+        let away = (log_std - USUAL_REPEATABILITY.ln()) / USUAL_SPREAD;
+        let variance = 0.5 * (2.0 * log_std).exp();
+        all.push(Scatter {
+            std: log_std.exp(),
+            log_weight: -0.5 * (away * away + freedom * variance.ln() + squares / variance),
+        });
+    }
+    let total = log_sum(all.iter().map(|one| one.log_weight));
+    for one in &mut all {
+        one.log_weight -= total;
+    }
+    // What is next to impossible takes time and changes nothing.
+    all.retain(|one| one.log_weight > -16.0);
+    all
+}
+
+/// Returns the logarithm of a sum of exponentials.
+pub(crate) fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return most;
+    }
+    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
+}
+
+/// Returns the variance of the measured change of each mode by scatter and readings alone.
+pub(crate) fn variances(pair: &PairModel, std: f64, is_stated: bool) -> Vec<f64> {
+    let scatter = std * std * pair.scatter_share;
+    let of_reading = pair.reading.iter();
+    // A stated repeatability and the scatter of repeats hold the readings' own noise. An assumed one does not.
+    let holds_readings = is_stated || pair.repeats.1 > 0.0;
+    of_reading
+        .map(|reading| match holds_readings {
+            true => scatter.max(*reading),
+            false => scatter + reading,
+        })
+        .collect()
+}
+
+/// Measured less predicted changes with their covariance.
+pub(crate) struct Gaussian {
+    residual: DVector<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+/// Returns the covariance of the measured changes: scatter and readings, and the uncertainty of what is predicted and of what
+/// the descriptions tell.
+pub(crate) fn covariance(
+    pair: &PairModel,
+    variances: &[f64],
+    predicted: &Predicted,
+) -> DMatrix<f64> {
+    let count = variances.len();
+    let mut covariance = DMatrix::from_diagonal(&DVector::from_column_slice(variances));
+    let common = (COMMON_SHARE * pair.shape_error).powi(2);
+    let both = predicted.change.iter().zip(&pair.described);
+    let total: Vec<f64> = both.map(|(change, described)| change + described).collect();
+    for (i, one) in total.iter().enumerate() {
+        covariance[(i, i)] += (pair.shape_error * one).powi(2);
+        for (j, other) in total.iter().enumerate() {
+            covariance[(i, j)] += common * one * other;
+        }
+    }
+    for (axis, described) in pair.described_aside.iter().enumerate() {
+        let mut aside = described.clone();
+        if let Some(own) = predicted.aside.get(axis) {
+            aside.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        }
+        for i in 0..count {
+            for j in 0..count {
+                covariance[(i, j)] += aside[i] * aside[j];
+            }
+        }
+    }
+    covariance
+}
+
+impl Gaussian {
+    /// With the prediction's own uncertainty; `None` where the covariance is none.
+    pub(crate) fn new(pair: &PairModel, variances: &[f64], predicted: &Predicted) -> Option<Self> {
+        let residual = pair.measured.iter().zip(&predicted.change);
+        let residual = residual.map(|(measured, predicted)| measured - predicted);
+        let residual = DVector::from_iterator(variances.len(), residual);
+        Self::of(residual, covariance(pair, variances, predicted))
+    }
+
+    /// With this covariance; `None` where it is none.
+    pub(crate) fn of(residual: DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
+        let factor = covariance.cholesky()?;
+        Some(Self { residual, factor })
+    }
+
+    /// Returns residual' covariance^-1 residual.
+    pub(crate) fn chi_square(&self) -> f64 {
+        self.residual.dot(&self.factor.solve(&self.residual))
+    }
+
+    /// Returns the logarithm of the density.
+    pub(crate) fn log_density(&self) -> f64 {
+        let diagonal = self.factor.l_dirty().diagonal();
+        let log_determinant = 2.0 * diagonal.iter().map(|one| one.ln()).sum::<f64>();
+        let count = self.residual.len() as f64;
+        -0.5 * (self.chi_square() + log_determinant + count * (2.0 * PI).ln())
+    }
+
+    /// Returns residuals in standard deviations, independent of each other.
+    pub(crate) fn whitened(&self) -> Option<DVector<f64>> {
+        self.factor.l().solve_lower_triangular(&self.residual)
+    }
+}
+
+/// All pairs with the values of their repeatability.
+pub(crate) struct Data<'a> {
+    /// The pairs.
+    pub(crate) pairs: &'a [PairModel],
+    /// Values of the repeatability.
+    pub(crate) scatters: Vec<Scatter>,
+    /// Variances of each mode, by value of the repeatability and by pair.
+    pub(crate) variances: Vec<Vec<Vec<f64>>>,
+}
+
+impl<'a> Data<'a> {
+    /// Takes the pairs.
+    pub(crate) fn new(pairs: &'a [PairModel], settings: &Settings) -> Self {
+        let scatters = scatters(pairs, settings);
+        let is_stated = settings.repeatability.is_some();
+        let of_scatter = scatters.iter().map(|scatter| {
+            let of_pair = pairs
+                .iter()
+                .map(|pair| variances(pair, scatter.std, is_stated));
+            of_pair.collect()
+        });
+        Self {
+            pairs,
+            variances: of_scatter.collect(),
+            scatters,
+        }
+    }
+
+    /// Returns the logarithm of the density of all measured changes, the repeatability averaged over.
+    pub(crate) fn log_density(&self, predicted: &[Predicted]) -> f64 {
+        log_sum(self.by_scatter(predicted).iter().map(|one| one.0))
+    }
+
+    /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there.
+    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<(f64, f64)> {
+        let mut all = Vec::with_capacity(self.scatters.len());
+        for (scatter, variances) in self.scatters.iter().zip(&self.variances) {
+            let (mut log, mut chi_square) = (scatter.log_weight, 0.0);
+            for ((pair, variances), predicted) in self.pairs.iter().zip(variances).zip(predicted) {
+                match Gaussian::new(pair, variances, predicted) {
+                    Some(own) => {
+                        log += own.log_density();
+                        chi_square += own.chi_square();
+                    }
+                    None => log = f64::NEG_INFINITY,
+                }
+            }
+            all.push((log, chi_square));
+        }
+        all
+    }
+
+    /// Returns the probability of a larger chi square, averaged over the repeatability by what the data say of it. `sizes` were
+    /// fitted.
+    pub(crate) fn goodness(&self, predicted: &[Predicted], sizes: usize) -> f64 {
+        let all = self.by_scatter(predicted);
+        let total = log_sum(all.iter().map(|one| one.0));
+        let count: usize = self.pairs.iter().map(|pair| pair.measured.len()).sum();
+        let freedom = count.saturating_sub(sizes).max(1) as f64;
+        let shares = all.iter().filter(|one| one.0.is_finite());
+        shares
+            .map(|(log, chi_square)| (log - total).exp() * chi_square_tail(*chi_square, freedom))
+            .sum()
+    }
+
+    /// Returns chi square at the mean repeatability.
+    pub(crate) fn mean_chi_square(&self, predicted: &[Predicted]) -> f64 {
+        let all = self.by_scatter(predicted);
+        let weighted = self.scatters.iter().zip(&all);
+        weighted
+            .map(|(scatter, one)| scatter.log_weight.exp() * one.1)
+            .sum()
+    }
+
+    /// Returns the index of the repeatability that the data favour, given a prediction.
+    pub(crate) fn favoured(&self, predicted: &[Predicted]) -> usize {
+        let all = self.by_scatter(predicted).into_iter().enumerate();
+        let most = all.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        most.map_or(0, |one| one.0)
+    }
+
+    /// Returns the mean of the repeatability by its weights (1).
+    pub(crate) fn mean_scatter(&self) -> f64 {
+        self.scatters
+            .iter()
+            .map(|one| one.log_weight.exp() * one.std)
+            .sum()
+    }
+}

@@ -1,0 +1,439 @@
+//! Tests of comparisons.
+
+use crate::{
+    CauseKind, CompareError, Comparison, Item, ItemKind, MeasuredMode, Pair, RepeatabilityOrigin,
+    Settings, Test, VerdictKind, compare,
+};
+use tapjoint_beam::specimen::{Joint, Mesh, PointMass, Specimen};
+use tapjoint_beam::{Assembly, Beam, BeamTheory};
+
+const BEAM: Beam = Beam {
+    length: 0.4,
+    width: 0.02,
+    thickness: 0.005,
+    modulus: 205e9,
+    density: 7850.0,
+    poisson: 0.3,
+};
+const MODES: usize = 6;
+
+fn cantilever(joint: Joint) -> Specimen {
+    let lap = Default::default();
+    Specimen::jointed(
+        BeamTheory::Euler,
+        &BEAM,
+        Assembly::Cantilever,
+        &lap,
+        Some(joint),
+    )
+}
+
+fn springs() -> Joint {
+    let stiffness = BEAM.bending_stiffness();
+    Joint {
+        kt: 1500.0 * stiffness / BEAM.length.powi(3),
+        kr: 10.0 * stiffness / BEAM.length,
+        coupling: 0.0,
+    }
+}
+
+fn frequencies(structure: &Specimen) -> Vec<f64> {
+    let mesh = Mesh { elements: 100 };
+    structure.modes(MODES, mesh).unwrap().frequencies().to_vec()
+}
+
+fn test(structure: &Specimen, items: &[Item], frequencies: &[f64]) -> Test {
+    let modes = frequencies.iter().enumerate();
+    Test {
+        structure: structure.clone(),
+        items: items.to_vec(),
+        knows_joint: [false; 2],
+        common_std: 0.01,
+        modes: modes
+            .map(|(index, frequency)| MeasuredMode {
+                mode: index + 1,
+                frequency: *frequency,
+                std: 0.0,
+            })
+            .collect(),
+        unnumbered: Vec::new(),
+    }
+}
+
+fn pair(before: Test, after: Test) -> Pair {
+    Pair {
+        before: vec![before],
+        after: vec![after],
+    }
+}
+
+fn stated(repeatability: f64) -> Settings {
+    Settings {
+        repeatability: Some(repeatability),
+    }
+}
+
+fn probability(found: &Comparison, kind: CauseKind) -> f64 {
+    let own = found.hypotheses.iter().filter(|one| one.effect == kind);
+    own.map(|one| one.probability).sum()
+}
+
+/// Root of 1 + cos l cosh l + m l (cos l sinh l - sin l cosh l) between two values: a clamped beam with the mass m (1, masses
+/// of the beam) at its end (Blevins 2016, table 4.7).
+fn end_mass_root(mass: f64, mut low: f64, mut high: f64) -> f64 {
+    let value = |l: f64| {
+        // Over cosh l, so that nothing overflows.
+        l.cosh().recip() + l.cos() + mass * l * (l.cos() * l.tanh() - l.sin())
+    };
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        match (value(low) > 0.0) == (value(middle) > 0.0) {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[test]
+fn val_a_mass_at_the_end_is_found_with_its_size_and_place() {
+    let structure = cantilever(Joint::RIGID);
+    // Roots of a clamped beam: 1.8751, 4.6941, 7.8548, ...; a mass at the end lowers each by less than pi.
+    let bare: Vec<f64> = (0..MODES)
+        .map(|k| end_mass_root(0.0, 0.5 + k as f64 * 3.1, 3.2 + k as f64 * 3.1))
+        .collect();
+    assert!((bare[0] - 1.875_104).abs() < 1e-6 && (bare[1] - 4.694_091).abs() < 1e-6);
+    let share = 0.02;
+    let loaded: Vec<f64> = bare
+        .iter()
+        .map(|root| end_mass_root(share, root - 0.5, *root))
+        .collect();
+    let unit = (BEAM.bending_stiffness() / (BEAM.mass() * BEAM.length.powi(3))).sqrt()
+        / (2.0 * std::f64::consts::PI);
+    let [before, after] = [bare, loaded].map(|roots| {
+        roots
+            .iter()
+            .map(|root| root * root * unit)
+            .collect::<Vec<f64>>()
+    });
+    let found = compare(
+        &[pair(
+            test(&structure, &[], &before),
+            test(&structure, &[], &after),
+        )],
+        &stated(5e-4),
+    )
+    .unwrap();
+    let first = &found.hypotheses[0];
+    assert_eq!(first.effect, CauseKind::AddedMass);
+    assert!(found.verdict.effects.contains(&CauseKind::AddedMass));
+    let mass = first.parameters["mass"];
+    let truth = share * BEAM.mass();
+    // Both are exact but for half of a standard deviation of the prior and the grid.
+    assert!(
+        (mass.value - truth).abs() < mass.std && mass.std < 0.1 * truth,
+        "{mass:?} {truth}"
+    );
+    assert!(first.parameters["position"].high > 0.99 * BEAM.length);
+}
+
+#[test]
+fn limit_equal_tests_show_no_change() {
+    let structure = cantilever(springs());
+    let own = frequencies(&structure);
+    let seen: Vec<f64> = [1e-4, 1e-3]
+        .map(|repeatability| {
+            let one = test(&structure, &[], &own);
+            let found = compare(&[pair(one.clone(), one)], &stated(repeatability)).unwrap();
+            assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+            assert!(found.hypotheses[0].probability > 0.8);
+            assert_eq!(found.repeatability.origin, RepeatabilityOrigin::Stated);
+            let kr = found.joint.unwrap().kr.unwrap();
+            assert!(kr.low < 0.0 && kr.high > 0.0);
+            kr.seen_from_percent[0].unwrap()
+        })
+        .to_vec();
+    // The smallest change that is seen grows with the repeatability, about in proportion.
+    assert!(
+        seen[1] > 5.0 * seen[0] && seen[1] < 15.0 * seen[0],
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn prop_what_both_descriptions_tell_is_no_change() {
+    let before = cantilever(springs());
+    let mut after = before.clone();
+    after.masses.push(PointMass::new(0.3, 0.02));
+    let pair = pair(
+        test(&before, &[], &frequencies(&before)),
+        test(&after, &[], &frequencies(&after)),
+    );
+    let found = compare(&[pair], &stated(1e-3)).unwrap();
+    assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+    assert!(found.modes[0].described_percent < -1.0);
+    assert!(
+        found.modes.iter().all(|mode| mode.z.abs() < 0.1),
+        "{:?}",
+        found.modes
+    );
+}
+
+#[test]
+fn prop_a_described_change_that_is_off_by_some_percent_is_no_change() {
+    let before = cantilever(springs());
+    let mut described = before.clone();
+    described.masses.push(PointMass::new(0.3, 0.02));
+    // The mass is in truth 4 % heavier: its frequencies change by as much more.
+    let mut actual = before.clone();
+    actual.masses.push(PointMass::new(0.3, 0.0208));
+    let pair = pair(
+        test(&before, &[], &frequencies(&before)),
+        test(&described, &[], &frequencies(&actual)),
+    );
+    let found = compare(&[pair], &stated(2e-4)).unwrap();
+    assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+    assert!(found.modes.iter().any(|mode| mode.z.abs() > 5.0));
+}
+
+#[test]
+fn prop_a_rigid_joint_that_gives_is_found_on_either_side() {
+    let rigid = cantilever(Joint::RIGID);
+    let mut gives = rigid.clone();
+    // A rotational compliance of 1 % of the beam's.
+    gives.joint = Some(Joint {
+        kr: 100.0 * BEAM.bending_stiffness() / BEAM.length,
+        ..Joint::RIGID
+    });
+    let [firm, soft] = [&rigid, &gives].map(|one| test(&rigid, &[], &frequencies(one)));
+    let softer = compare(&[pair(firm.clone(), soft.clone())], &stated(3e-4)).unwrap();
+    let stiffer = compare(&[pair(soft, firm)], &stated(3e-4)).unwrap();
+    for (found, truth) in [(softer, 0.01), (stiffer, -0.01)] {
+        let mut all = found.hypotheses.iter();
+        let joint = all
+            .find(|one| one.effect == CauseKind::JointChange)
+            .unwrap();
+        let size = joint.parameters["kr_compliance"];
+        assert!((size.value - truth).abs() < 0.002, "{size:?} {truth}");
+        assert!(found.hypotheses[0].probability > joint.probability - 1e-12);
+        assert_eq!(found.joint.unwrap().kr, None);
+    }
+}
+
+#[test]
+fn prop_pairs_share_one_change() {
+    // Two structures of different length, each 8 % less stiff in rotation afterwards.
+    let mut pairs = Vec::new();
+    for scale in [1.0, 1.3] {
+        let mut before = cantilever(springs());
+        for beam in before.body.beams_mut() {
+            beam.length *= scale;
+        }
+        let mut after = before.clone();
+        after.joint.as_mut().unwrap().kr *= 0.92;
+        let [first, second] = [&before, &after].map(|one| test(&before, &[], &frequencies(one)));
+        pairs.push(pair(first, second));
+    }
+    let one = compare(&pairs[..1], &stated(1e-3)).unwrap();
+    let both = compare(&pairs, &stated(1e-3)).unwrap();
+    assert_eq!(both.hypotheses[0].effect, CauseKind::JointChange);
+    assert_eq!(both.modes.len(), 2 * MODES);
+    let [one, both] = [one, both].map(|found| found.joint.unwrap().kr.unwrap());
+    assert!(both.low <= -8.0 && -8.0 <= both.high);
+    assert!(both.high - both.low < one.high - one.low);
+    let free = {
+        let lap = Default::default();
+        let beam = Specimen::jointed(BeamTheory::Euler, &BEAM, Assembly::Free, &lap, None);
+        test(&beam, &[], &frequencies(&beam))
+    };
+    pairs.push(pair(free.clone(), free));
+    let found = compare(&pairs, &stated(1e-3));
+    assert!(matches!(found, Err(CompareError::Different { .. })));
+}
+
+#[test]
+fn prop_the_other_way_round_the_change_is_the_opposite() {
+    let before = cantilever(springs());
+    let mut after = before.clone();
+    after.joint.as_mut().unwrap().kr *= 1.1;
+    let [first, second] = [&before, &after].map(|one| test(&before, &[], &frequencies(one)));
+    let there = compare(&[pair(first.clone(), second.clone())], &stated(5e-4)).unwrap();
+    let back = compare(&[pair(second, first)], &stated(5e-4)).unwrap();
+    for found in [&there, &back] {
+        assert_eq!(found.hypotheses[0].effect, CauseKind::JointChange);
+    }
+    let [there, back] = [there, back].map(|found| found.joint.unwrap().kr.unwrap().change_percent);
+    assert!((there - 10.0).abs() < 1.0, "{there}");
+    // The joint before is fitted to other frequencies; a tenth of the change is left to that.
+    assert!(
+        ((1.0 + 0.01 * there) * (1.0 + 0.01 * back) - 1.0).abs() < 0.01,
+        "{there} {back}"
+    );
+}
+
+#[test]
+fn prop_a_lost_item_is_named_before_a_mass_anywhere() {
+    let item = Item {
+        name: "L1".to_owned(),
+        point: PointMass::new(0.22, 0.01),
+        kind: ItemKind::Mass,
+    };
+    let without = cantilever(springs());
+    let mut with = without.clone();
+    with.masses.push(item.point);
+    let items = [item];
+    let [before, after] = [&with, &without].map(|one| test(&with, &items, &frequencies(one)));
+    let found = compare(&[pair(before, after)], &stated(1e-3)).unwrap();
+    assert_eq!(found.hypotheses[0].effect, CauseKind::LostMass);
+    assert_eq!(found.hypotheses[0].item.as_deref(), Some("L1"));
+    assert!(found.verdict.effects.contains(&CauseKind::LostMass));
+    assert!(!found.verdict.effects.contains(&CauseKind::JointChange));
+}
+
+#[test]
+fn prop_a_free_beam_tells_a_change_of_its_modulus() {
+    let lap = Default::default();
+    let free = Specimen::jointed(BeamTheory::Euler, &BEAM, Assembly::Free, &lap, None);
+    let before = frequencies(&free);
+    let after: Vec<f64> = before.iter().map(|one| 0.99 * one).collect();
+    let [before, after] = [before, after].map(|own| test(&free, &[], &own));
+    let found = compare(&[pair(before, after)], &stated(5e-4)).unwrap();
+    assert!(found.joint.is_none());
+    assert!(probability(&found, CauseKind::NoChange) < 1e-3);
+    // Length and modulus change all frequencies alike.
+    let both = probability(&found, CauseKind::Modulus) + probability(&found, CauseKind::Length);
+    assert!(both > 0.9, "{both}");
+}
+
+#[test]
+fn prop_repeats_tell_the_repeatability() {
+    let structure = cantilever(springs());
+    let own = frequencies(&structure);
+    let scattered = |signs: [f64; MODES]| {
+        let moved: Vec<f64> = own
+            .iter()
+            .zip(signs)
+            .map(|(one, sign)| one * (1.0 + 0.002 * sign))
+            .collect();
+        test(&structure, &[], &moved)
+    };
+    let patterns = [
+        [1.0, -1.0, 1.0, -1.0, 1.0, -1.0],
+        [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0],
+        [1.0, 1.0, -1.0, -1.0, 1.0, 1.0],
+    ];
+    let tests: Vec<Test> = patterns.into_iter().map(scattered).collect();
+    let pair = Pair {
+        before: tests.clone(),
+        after: tests,
+    };
+    let found = compare(&[pair], &Settings::default()).unwrap();
+    assert_eq!(found.repeatability.origin, RepeatabilityOrigin::Repeats);
+    // Single tests scatter by 0.2 %, differences by sqrt 2 times as much; 24 degrees of freedom leave 15 %.
+    let expected = 0.2 * 2.0_f64.sqrt();
+    let ratio = found.repeatability.percent / expected;
+    assert!(ratio > 0.7 && ratio < 1.4, "{ratio}");
+}
+
+#[test]
+fn prop_a_peak_without_a_number_that_lies_nearer_is_the_mode() {
+    let structure = cantilever(springs());
+    let own = frequencies(&structure);
+    let first = test(&structure, &[], &own);
+    let mut second = first.clone();
+    second.modes[3].frequency *= 1.03;
+    second.unnumbered.push(own[3]);
+    let found = compare(&[pair(first, second)], &stated(1e-3)).unwrap();
+    assert_eq!(found.matched.len(), 1);
+    assert_eq!(found.matched[0].taken, Some(own[3]));
+    assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+}
+
+#[test]
+fn limit_what_cannot_be_compared_has_its_reason() {
+    let structure = cantilever(springs());
+    let own = frequencies(&structure);
+    let good = test(&structure, &[], &own);
+    let few = test(&structure, &[], &own[..2]);
+    let found = compare(&[pair(good.clone(), few)], &stated(1e-3));
+    assert_eq!(
+        found,
+        Err(CompareError::TooFewModes {
+            common: 2,
+            least: 3
+        })
+    );
+    let none = Pair {
+        before: vec![good.clone()],
+        after: Vec::new(),
+    };
+    assert_eq!(
+        compare(&[none], &stated(1e-3)),
+        Err(CompareError::NoTest { side: "after" })
+    );
+    let found = compare(&[pair(good.clone(), good.clone())], &stated(f64::NAN));
+    assert!(matches!(found, Err(CompareError::Repeatability { .. })));
+    let many = vec![pair(good.clone(), good); 17];
+    let found = compare(&many, &stated(1e-3));
+    assert_eq!(
+        found,
+        Err(CompareError::TooManyPairs {
+            count: 17,
+            most: 16
+        })
+    );
+}
+
+/// Numbers that look random: a linear congruential generator, and the sum of twelve of its values less six.
+struct Draw(u64);
+
+impl Draw {
+    fn normal(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+#[test]
+fn recover_changes_of_the_joint() {
+    const PAIRS: usize = 100;
+    let mut draw = Draw(7);
+    let before = cantilever(springs());
+    let mut held = [0; 2];
+    for _ in 0..PAIRS {
+        let changes = [0.1 * draw.normal(), 0.1 * draw.normal()];
+        let mut after = before.clone();
+        if let Some(joint) = &mut after.joint {
+            joint.kt *= changes[0].exp();
+            joint.kr *= changes[1].exp();
+        }
+        let repeatability = 5e-4;
+        let [first, second] = [&before, &after].map(|one| {
+            let own: Vec<f64> = frequencies(one)
+                .iter()
+                .map(|one| one * (repeatability / 2.0_f64.sqrt() * draw.normal()).exp())
+                .collect();
+            test(&before, &[], &own)
+        });
+        let found = compare(&[pair(first, second)], &stated(repeatability)).unwrap();
+        let joint = found.joint.unwrap();
+        for (k, one) in [joint.kt.unwrap(), joint.kr.unwrap()]
+            .into_iter()
+            .enumerate()
+        {
+            let truth = 100.0 * changes[k].exp_m1();
+            held[k] += usize::from(one.low <= truth && truth <= one.high);
+        }
+    }
+    // 95 of 100 with a standard deviation of 2.2.
+    for count in held {
+        assert!((89..=100).contains(&count), "{held:?}");
+    }
+}

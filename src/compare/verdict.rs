@@ -1,0 +1,290 @@
+//! Probabilities of all causes, and the answer that follows from them.
+
+use crate::cause::{Cause, CauseKind};
+use crate::likelihood::{Data, log_sum};
+use crate::result::{CauseResult, ChangeVerdict, Interval, VerdictKind};
+use crate::search::Posterior;
+use std::collections::BTreeMap;
+use tapjoint_numerics::stats::NORMAL_95;
+
+/// A cause with its evidence.
+pub(crate) struct Candidate {
+    pub(crate) kind: CauseKind,
+    pub(crate) item: Option<String>,
+    /// Logarithm of its evidence.
+    pub(crate) log_evidence: f64,
+    /// `None` where it has no size: no change, and an unknown one.
+    pub(crate) posterior: Option<Posterior>,
+    /// Names of the values of the posterior's points.
+    pub(crate) names: Vec<&'static str>,
+    pub(crate) goodness: Option<f64>,
+    /// Standard uncertainty of its place by errors of the shapes (m).
+    pub(crate) place_std: f64,
+    /// Place of the item that is gone (m).
+    pub(crate) known_place: Option<f64>,
+    /// Length of the structure (m).
+    pub(crate) length: f64,
+    /// Unit of its size (SI).
+    pub(crate) unit: f64,
+}
+
+impl Interval {
+    /// Returns the interval with another independent uncertainty.
+    fn widened(self, std: f64) -> Self {
+        let [below, above] = [self.value - self.low, self.high - self.value];
+        Self {
+            std: self.std.hypot(std),
+            low: self.value - below.hypot(NORMAL_95 * std),
+            high: self.value + above.hypot(NORMAL_95 * std),
+            ..self
+        }
+    }
+}
+
+/// Probability from which on an answer is given.
+const SURE: f64 = 0.9;
+/// Probability of no change above which something is not said to have changed.
+const PERHAPS_NOTHING: f64 = 0.05;
+/// Probability of no change from which on it is the answer.
+const PROBABLY_NOTHING: f64 = 0.5;
+/// Goodness of fit below which a cause does not explain the changes.
+const NO_FIT: f64 = 0.01;
+/// Standard deviations that a size must be away from zero.
+const CLEAR: f64 = 2.0;
+
+/// Returns the probability of each candidate.
+pub(crate) fn probabilities(candidates: &[Candidate]) -> Vec<f64> {
+    let logs: Vec<f64> = candidates
+        .iter()
+        .map(|one| {
+            // Causes about one item share the prior of their kind.
+            let alike = candidates
+                .iter()
+                .filter(|other| other.kind == one.kind)
+                .count();
+            one.log_evidence + (one.kind.prior() / alike as f64).ln()
+        })
+        .collect();
+    let total = log_sum(logs.iter().copied());
+    logs.iter().map(|log| (log - total).exp()).collect()
+}
+
+/// Returns the median of a posterior's values with their 95 % interval.
+fn interval(posterior: &Posterior, index: usize, transformed: impl Fn(f64) -> f64) -> Interval {
+    let mut values: Vec<(f64, f64)> = posterior
+        .points
+        .iter()
+        .map(|point| (transformed(point.values[index]), point.log_weight.exp()))
+        .collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = values.iter().map(|one| one.1).sum();
+    let mean = values.iter().map(|one| one.0 * one.1).sum::<f64>() / total;
+    let squares = values.iter().map(|one| (one.0 - mean).powi(2) * one.1);
+    // The median lies within the interval also where two places are as probable.
+    let mut value = mean;
+    let [mut low, mut high] = [values[0].0, values[values.len() - 1].0];
+    let (mut below, mut before) = (0.0, low);
+    for (at, weight) in &values {
+        // Half of a point's weight lies on either side of it.
+        let share = (below + 0.5 * weight) / total;
+        if share <= 0.025 {
+            low = *at;
+        }
+        if share <= 0.5 {
+            value = *at;
+        }
+        if share >= 0.975 {
+            high = *at;
+            break;
+        }
+        below += weight;
+        before = *at;
+    }
+    high = high.max(before);
+    Interval {
+        value,
+        std: (squares.sum::<f64>() / total).sqrt(),
+        low,
+        high,
+    }
+}
+
+impl Candidate {
+    /// Returns its result.
+    pub(crate) fn result(&self, probability: f64) -> CauseResult {
+        let mut parameters = BTreeMap::new();
+        let mut explains = Vec::new();
+        if let Some(place) = self.known_place {
+            let known = Interval {
+                value: place,
+                std: 0.0,
+                low: place,
+                high: place,
+            };
+            parameters.insert("position", known);
+        }
+        if let Some(posterior) = &self.posterior {
+            for (index, name) in self.names.iter().enumerate() {
+                let found = match *name {
+                    "kt" | "kr" => interval(posterior, index, f64::exp_m1),
+                    "position" => {
+                        let own = interval(posterior, index, |place| place * self.length);
+                        let wide = own.widened(self.place_std);
+                        Interval {
+                            low: wide.low.max(0.0),
+                            high: wide.high.min(self.length),
+                            ..wide
+                        }
+                    }
+                    _ => interval(posterior, index, |value| value * self.unit),
+                };
+                parameters.insert(*name, found);
+            }
+            explains = posterior.best[0]
+                .change
+                .iter()
+                .map(|one| 100.0 * one.exp_m1())
+                .collect();
+        }
+        CauseResult {
+            effect: self.kind,
+            item: self.item.clone(),
+            probability,
+            parameters,
+            goodness_of_fit: self.goodness,
+            explains_percent: explains,
+        }
+    }
+
+    /// Returns true where one of its sizes is clearly not zero.
+    fn has_clear_size(&self) -> bool {
+        let Some(posterior) = &self.posterior else {
+            return false;
+        };
+        let sizes = (0..self.names.len()).filter(|index| self.names[*index] != "position");
+        let mut sizes = sizes.map(|index| interval(posterior, index, |value| value));
+        sizes.any(|size| size.value.abs() > CLEAR * size.std)
+    }
+
+    /// Returns true where it explains the changes.
+    fn fits(&self) -> bool {
+        self.goodness.is_some_and(|goodness| goodness >= NO_FIT)
+    }
+}
+
+/// Returns the order of the candidates, the most probable first.
+pub(crate) fn order(probabilities: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..probabilities.len()).collect();
+    order.sort_by(|&a, &b| {
+        probabilities[b]
+            .total_cmp(&probabilities[a])
+            .then(a.cmp(&b))
+    });
+    order
+}
+
+/// Returns the answer.
+pub(crate) fn verdict(candidates: &[Candidate], probabilities: &[f64]) -> ChangeVerdict {
+    let order = order(probabilities);
+    let of_kind = |kind: CauseKind| -> f64 {
+        let all = candidates.iter().zip(probabilities);
+        all.filter(|one| one.0.kind == kind).map(|one| one.1).sum()
+    };
+    let nothing = of_kind(CauseKind::NoChange);
+    let answer = |kind: VerdictKind, chosen: &[usize], probability: f64| ChangeVerdict {
+        kind,
+        effects: chosen.iter().map(|index| candidates[*index].kind).collect(),
+        items: chosen
+            .iter()
+            .map(|index| candidates[*index].item.clone())
+            .collect(),
+        probability,
+    };
+    if nothing >= PROBABLY_NOTHING {
+        return answer(VerdictKind::NoChange, &[], nothing);
+    }
+    let explained: Vec<usize> = order
+        .iter()
+        .copied()
+        .filter(|index| candidates[*index].posterior.is_some())
+        .collect();
+    if nothing <= PERHAPS_NOTHING {
+        let unknown = of_kind(CauseKind::Unknown);
+        let first = explained.first().map(|index| &candidates[*index]);
+        if unknown >= 0.5 || first.is_none_or(|first| !first.fits()) {
+            return answer(VerdictKind::Unknown, &[], 1.0 - nothing);
+        }
+        if let Some(&index) = explained.first() {
+            let leads = order[0] == index;
+            let own = &candidates[index];
+            if leads && probabilities[index] >= SURE && own.has_clear_size() {
+                return answer(VerdictKind::Named, &[index], probabilities[index]);
+            }
+            let members: Vec<usize> = explained
+                .iter()
+                .copied()
+                .filter(|one| candidates[*one].kind.group() == own.kind.group())
+                .collect();
+            let together: f64 = members.iter().map(|one| probabilities[*one]).sum();
+            if leads && together >= SURE && own.has_clear_size() {
+                // Those without which it would be no group are enough.
+                let mut chosen = Vec::new();
+                let mut sum = 0.0;
+                for member in members {
+                    chosen.push(member);
+                    sum += probabilities[member];
+                    if sum >= SURE {
+                        break;
+                    }
+                }
+                return answer(VerdictKind::Group, &chosen, together);
+            }
+        }
+    }
+    let mut chosen = Vec::new();
+    let mut sum = 0.0;
+    for &index in &order {
+        chosen.push(index);
+        sum += probabilities[index];
+        if sum >= SURE {
+            break;
+        }
+    }
+    answer(VerdictKind::Set, &chosen, sum)
+}
+
+/// Returns what a cause of one size is made into.
+pub(crate) fn candidate_of(data: &Data<'_>, cause: &Cause, posterior: Posterior) -> Candidate {
+    let size = match cause.kind {
+        CauseKind::LostMass | CauseKind::AddedMass => "mass",
+        CauseKind::LocalCrack => "compliance",
+        CauseKind::AxialLoad => "force",
+        CauseKind::SensorPosition => "sensor_shift",
+        _ => "relative",
+    };
+    let mut names = vec![size];
+    if cause.is_placed {
+        names.push("position");
+    }
+    // A stated size was not fitted.
+    let fitted = if cause.kind == CauseKind::LostMass {
+        0
+    } else {
+        names.len()
+    };
+    let lost = data.pairs[0]
+        .item(cause, 0)
+        .filter(|_| cause.kind == CauseKind::LostMass);
+    Candidate {
+        kind: cause.kind,
+        item: cause.item.clone(),
+        log_evidence: posterior.log_evidence,
+        goodness: Some(data.goodness(&posterior.best, fitted)),
+        names,
+        posterior: Some(posterior),
+        place_std: data.pairs[0].place_std(),
+        known_place: lost.map(|item| item.position),
+        length: data.pairs[0].structure().body.length(),
+        unit: lost.map_or(1.0, |item| item.mass),
+    }
+}

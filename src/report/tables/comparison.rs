@@ -1,0 +1,70 @@
+//! Tables of a comparison of two tests.
+
+use super::{Table, number, page_words, words};
+use crate::document::Document;
+use crate::format::{or_missing, probability, signed_percent, significant};
+use crate::words::comparison::{cause, size};
+
+/// Causes below this probability are left out.
+const LEAST_PROBABILITY: f64 = 0.005;
+/// Most causes that are listed.
+const MOST_LISTED: usize = 5;
+
+/// The compared modes; `None` without a comparison.
+pub fn changed_modes(document: &Document) -> Option<Table> {
+    let found = document.compare.as_ref()?;
+    let several = found.modes.iter().any(|mode| mode.pair > 0);
+    let is_described = found
+        .modes
+        .iter()
+        .any(|mode| mode.described_percent.abs() > 1e-9);
+    let mut rows = Vec::new();
+    for mode in &found.modes {
+        let mut row = Vec::new();
+        if several {
+            row.push(number("Pair", (mode.pair + 1).to_string()));
+        }
+        row.push(number("Mode", mode.mode.to_string()));
+        row.push(number("Before (Hz)", significant(mode.before, 6)));
+        row.push(number("After (Hz)", significant(mode.after, 6)));
+        row.push(number("Change (%)", signed(mode.change_percent)));
+        if is_described {
+            row.push(number("Described (%)", signed(mode.described_percent)));
+        }
+        row.push(number("Scatter (%)", significant(mode.std_percent, 2)));
+        row.push(number("Change/scatter", significant(mode.z, 2)));
+        rows.push(row);
+    }
+    let note = match is_described {
+        true => {
+            "Described: what the two descriptions explain. The rest is compared with the scatter of repeated tests."
+        }
+        false => "Scatter: standard deviation of the change if nothing changed.",
+    };
+    Some(Table::of("Frequencies", rows, note))
+}
+
+fn signed(percent: f64) -> String {
+    signed_percent(Some(percent)).replace(" %", "")
+}
+
+/// The causes, the most probable first; `None` without a comparison.
+pub fn changes(document: &Document) -> Option<Table> {
+    let found = document.compare.as_ref()?;
+    let listed = found
+        .hypotheses
+        .iter()
+        .filter(|one| one.probability >= LEAST_PROBABILITY);
+    let rows = listed.take(MOST_LISTED).map(|one| {
+        [
+            words("Cause", cause(one.effect, one.item.as_deref())),
+            number("Probability", probability(one.probability)),
+            page_words(
+                "Fit (p)",
+                or_missing(one.goodness_of_fit.map(|p| significant(p, 2))),
+            ),
+            words("Size", size(one)),
+        ]
+    });
+    Some(Table::of("What may have changed", rows, ""))
+}

@@ -1,0 +1,170 @@
+//! Sentences about what changed between two tests.
+
+use crate::document::Document;
+use crate::format::{capital, probability, significant};
+use tapjoint_compare::{
+    CauseKind, CauseResult, Comparison, Interval, RepeatabilityOrigin, VerdictKind,
+};
+
+/// Returns what a cause is, in words: "L3 is gone".
+pub fn cause(kind: CauseKind, item: Option<&str>) -> String {
+    let item = item.unwrap_or("an item");
+    match kind {
+        CauseKind::NoChange => "no change".to_owned(),
+        CauseKind::JointChange => "the joint changed".to_owned(),
+        CauseKind::LostMass => format!("{item} is gone"),
+        CauseKind::AddedMass => "a mass came or went".to_owned(),
+        CauseKind::LocalCrack => "a crack, or one repaired".to_owned(),
+        CauseKind::Length => "the free length changed".to_owned(),
+        CauseKind::Modulus => "the modulus changed (temperature?)".to_owned(),
+        CauseKind::SensorPosition => format!("sensor {item} was moved"),
+        CauseKind::AxialLoad => "the axial load changed".to_owned(),
+        CauseKind::Unknown => "something else changed".to_owned(),
+    }
+}
+
+/// Returns the sizes of a cause with their 95 % intervals.
+pub fn size(found: &CauseResult) -> String {
+    let parts = found.parameters.iter().map(|(name, value)| {
+        let percent = |value: f64| significant(100.0 * value, 3);
+        match *name {
+            "mass" => format!("mass {}", in_unit(value, 1e3, "g")),
+            "position" => format!("at {}", in_unit(value, 1e3, "mm")),
+            "sensor_shift" => format!("by {}", in_unit(value, 1e3, "mm")),
+            "force" => format!("force {}", in_unit(value, 1.0, "N")),
+            "kt" | "kr" | "relative" => {
+                let label = match *name {
+                    "kt" => "Kt ",
+                    "kr" => "Kr ",
+                    _ => "",
+                };
+                let [low, high] = [percent(value.low), percent(value.high)];
+                format!("{label}{} % ({low} to {high})", percent(value.value))
+            }
+            name => format!("{} {}", name.replace('_', " "), in_unit(value, 1.0, "")),
+        }
+    });
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+fn in_unit(found: &Interval, factor: f64, unit: &str) -> String {
+    let [value, low, high] =
+        [found.value, found.low, found.high].map(|one| significant(factor * one, 3));
+    if found.std == 0.0 {
+        return format!("{value} {unit}");
+    }
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    format!("{value}{unit} ({low} to {high})")
+}
+
+/// Returns the answer in a few sentences, the shortest first.
+pub fn answer(document: &Document) -> Vec<String> {
+    let Some(found) = &document.compare else {
+        return Vec::new();
+    };
+    let verdict = &found.verdict;
+    let sure = probability(verdict.probability);
+    let causes = verdict.effects.iter().zip(&verdict.items);
+    let causes: Vec<String> = causes
+        .map(|(kind, item)| cause(*kind, item.as_deref()))
+        .collect();
+    let list = causes.join(", or ");
+    let mut sentences = vec![match verdict.kind {
+        VerdictKind::NoChange => {
+            format!("No change: repeating the test changes the frequencies as much ({sure}).")
+        }
+        VerdictKind::Named => format!("Changed: {list} ({sure})."),
+        VerdictKind::Group => {
+            format!("Changed: {list} ({sure} together). These data do not tell them apart.")
+        }
+        VerdictKind::Set => format!("Not decided: {list} ({sure} together)."),
+        VerdictKind::Unknown => "Something changed that no cause here explains.".to_owned(),
+    }];
+    let first = verdict.effects.iter().zip(&verdict.items).next();
+    let own = first.and_then(|(kind, item)| {
+        let mut all = found.hypotheses.iter();
+        all.find(|one| one.effect == *kind && one.item == *item)
+    });
+    if let Some(own) = own.filter(|own| !own.parameters.is_empty()) {
+        let subject = cause(own.effect, own.item.as_deref());
+        sentences.push(format!("If {subject}: {}.", size(own)));
+    }
+    sentences.extend(seen_from(found));
+    sentences.push(repeatability(found));
+    for one in &found.matched {
+        let [first, other] = [one.first, one.other].map(|frequency| significant(frequency, 5));
+        sentences.push(match one.taken {
+            Some(taken) => format!(
+                "Mode {} is {first} Hz in the first test. Another test numbers the peak at {other} Hz; that at {} Hz is taken.",
+                one.mode,
+                significant(taken, 5)
+            ),
+            None => format!(
+                "Mode {} is left out: the tests number different peaks, {first} and {other} Hz.",
+                one.mode
+            ),
+        });
+    }
+    sentences
+}
+
+/// Returns the smallest change of the joint that would have been seen.
+fn seen_from(found: &Comparison) -> Vec<String> {
+    let Some(joint) = &found.joint else {
+        return Vec::new();
+    };
+    if found.verdict.kind != VerdictKind::NoChange {
+        return Vec::new();
+    }
+    let (mut parts, mut unseen) = (Vec::new(), Vec::new());
+    for (name, change) in [("Kt", &joint.kt), ("Kr", &joint.kr)] {
+        let Some(change) = change else {
+            continue;
+        };
+        parts.push(match change.seen_from_percent {
+            [Some(rise), Some(fall)] => format!(
+                "a rise of {name} by more than {} % or a fall by more than {} %",
+                significant(rise, 2),
+                significant(-fall, 2)
+            ),
+            [Some(rise), None] => {
+                format!("a rise of {name} by more than {} %", significant(rise, 2))
+            }
+            [None, Some(fall)] => {
+                format!("a fall of {name} by more than {} %", significant(-fall, 2))
+            }
+            [None, None] => {
+                unseen.push(name);
+                continue;
+            }
+        });
+    }
+    let mut sentences = Vec::new();
+    if !parts.is_empty() {
+        let all = capital(&parts.join(", or "));
+        sentences.push(format!("{all} would have been seen, nine times of ten."));
+    }
+    if !unseen.is_empty() {
+        let names = unseen.join(" and ");
+        sentences.push(format!(
+            "These data do not tell {names}: not even a factor of 20 would have been seen."
+        ));
+    }
+    sentences
+}
+
+fn repeatability(found: &Comparison) -> String {
+    let percent = significant(found.repeatability.percent, 2);
+    match found.repeatability.origin {
+        RepeatabilityOrigin::Stated => format!("Repeatability: {percent} %, as stated."),
+        RepeatabilityOrigin::Repeats => format!("Repeatability: {percent} %, from the repeats."),
+        RepeatabilityOrigin::Assumed => format!(
+            "Repeatability: about {percent} %, assumed. Give repeats (--before, --after) or --repeatability: they decide \
+             what counts as a change."
+        ),
+    }
+}

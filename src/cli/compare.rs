@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::arguments::repeatability;
 use super::input::{TestFile, check_file, read_test};
+use super::output::OutputFile;
 use super::place::is_description;
 use super::terminal::Terminal;
 use anyhow::{anyhow, bail};
@@ -10,7 +11,7 @@ use clap::Args;
 use std::path::{Path, PathBuf, absolute};
 use tapjoint::compare::{MOST_PAIRS, Pair, Settings, Test, compare};
 use tapjoint::pipeline::{IdentifySettings, TestedStructure, Warning, compared_test};
-use tapjoint::report::{comparison_of, render_comparison};
+use tapjoint::report::{comparison_of, render_comparison, render_comparison_picture};
 
 /// Say what changed between two tests of one structure.
 ///
@@ -44,6 +45,9 @@ pub(super) struct CompareArguments {
     /// repeats, else about 0.1 % is assumed
     #[arg(long, value_name = "R", value_parser = repeatability)]
     repeatability: Option<f64>,
+    /// Draw the changes of the frequencies and the causes into this file (PNG, or SVG if its name ends in .svg)
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
 }
 
 /// Most repeats on one side.
@@ -71,6 +75,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
             );
         }
     }
+    let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
     let template = arguments
         .test
         .as_deref()
@@ -124,6 +129,11 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     };
     let found = compare(&pairs, &settings)?;
     let document = comparison_of(&name, &structure, found, warnings);
+    if let Some(file) = png
+        && let Some(bytes) = render_comparison_picture(&document, file.picture_format())?
+    {
+        file.write(&bytes)?;
+    }
     terminal.say(&render_comparison(&document))?;
     terminal.write_document(&document)?;
     Ok(Outcome::Answered)

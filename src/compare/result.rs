@@ -32,7 +32,7 @@ pub struct CauseResult {
     pub parameters: BTreeMap<&'static str, Interval>,
     /// Probability of a worse fit if this cause is true (1); `null` for an unknown change.
     pub goodness_of_fit: Option<f64>,
-    /// What it changes each frequency by (%), for the first pair.
+    /// What it changes each frequency by (%), in the order of the compared modes; empty where it has no size.
     pub explains_percent: Vec<f64>,
 }
 

@@ -140,11 +140,8 @@ impl Candidate {
                 };
                 parameters.insert(*name, found);
             }
-            explains = posterior.best[0]
-                .change
-                .iter()
-                .map(|one| 100.0 * one.exp_m1())
-                .collect();
+            let changes = posterior.best.iter().flat_map(|pair| &pair.change);
+            explains = changes.map(|one| 100.0 * one.exp_m1()).collect();
         }
         CauseResult {
             effect: self.kind,

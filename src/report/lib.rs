@@ -17,6 +17,7 @@ mod text;
 
 /// The charts of a report, each built once from the results that it shows.
 pub mod charts {
+    pub mod comparison;
     pub mod diagnosis;
     pub mod joint;
     pub mod modes;
@@ -41,8 +42,8 @@ pub use document::{
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
-    MODEL_FILE, earlier_files, render_cloud_picture, render_frf_picture, render_json, render_run,
-    render_schema, render_spectrum_picture,
+    MODEL_FILE, earlier_files, render_cloud_picture, render_comparison_picture, render_frf_picture,
+    render_json, render_run, render_schema, render_spectrum_picture,
 };
 pub use text::{
     render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,

@@ -7,6 +7,7 @@ use serde_json::Value;
 use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint_signal::spectral::FrfEstimator;
 
+use crate::charts::comparison;
 use crate::charts::diagnosis::{gap, place_map};
 use crate::charts::joint::{cloud, frequencies, shapes};
 use crate::charts::modes::{amplitude, stabilisation};
@@ -105,6 +106,19 @@ pub fn render_cloud_picture(
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
     cloud(document)
+        .map(|chart| chart.render(format))
+        .transpose()
+}
+
+/// The comparison of two tests as a picture; `None` without one.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_comparison_picture(
+    document: &Document,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    comparison::changes(document)
         .map(|chart| chart.render(format))
         .transpose()
 }

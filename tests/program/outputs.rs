@@ -135,7 +135,7 @@ const TABLE: &[Row] = &[
             "cantilever/low.wav",
             "cantilever/high.wav",
         ],
-        &[],
+        &["--png"],
         &[],
     ),
     row(

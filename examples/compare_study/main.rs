@@ -55,15 +55,6 @@ impl std::fmt::Display for Rate {
     }
 }
 
-/// Causes whose frequencies hardly differ.
-fn group(kind: CauseKind) -> usize {
-    match kind {
-        CauseKind::LostMass | CauseKind::AddedMass | CauseKind::SensorPosition => 1,
-        CauseKind::Length | CauseKind::Modulus => 2,
-        other => 10 + other as usize,
-    }
-}
-
 impl Row {
     fn is_named(&self) -> bool {
         matches!(
@@ -73,10 +64,7 @@ impl Row {
     }
 
     fn is_right(&self, kind: CauseKind) -> bool {
-        self.drawn
-            .causes
-            .iter()
-            .any(|own| group(*own) == group(kind))
+        self.drawn.causes.iter().any(|own| own.is_like(kind))
     }
 
     fn first_is_right(&self) -> bool {
@@ -222,7 +210,7 @@ fn print_scores(rows: &[Row]) {
             .found
             .hypotheses
             .iter()
-            .filter(|one| group(one.effect) == group(top.effect))
+            .filter(|one| one.effect.is_like(top.effect))
             .map(|one| one.probability)
             .sum();
         let bin = ((together * 5.0) as usize).min(4);

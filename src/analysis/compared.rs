@@ -50,7 +50,9 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
     let modulus = tolerances.modulus.unwrap_or(0.0);
     let density = tolerances.density.unwrap_or(0.0);
     let length = tolerances.length.unwrap_or(0.0);
-    let common = 0.5 * modulus.hypot(density);
+    let thickness = tolerances.thickness.unwrap_or(0.0);
+    // f is in proportion to h sqrt(E/rho)/L^2.
+    let common = (0.5 * modulus.hypot(density)).hypot(thickness);
     let modes = analysis.modes.iter().filter_map(|mode| {
         let half_line = mode.half_line.unwrap_or(0.0);
         Some(MeasuredMode {

@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     Ok(Outcome::Answered)
 }
 
-/// Reads and analyses one test. Its warnings get the name of its file.
+/// Reads and analyses one test, and adds its doubts about the readings to `warnings`.
 fn read_side(
     path: &Path,
     template: Option<&TestFile>,

@@ -64,13 +64,17 @@ impl CauseKind {
         }
     }
 
-    /// Returns the group whose members data of frequencies hardly separate.
-    pub(crate) fn group(self) -> usize {
-        match self {
-            Self::LostMass | Self::AddedMass | Self::SensorPosition => 1,
-            Self::Length | Self::Modulus => 2,
-            other => 10 + other as usize,
-        }
+    /// Returns true for a cause that frequencies hardly separate from this one, and for itself: masses that came, went or
+    /// moved are alike, and so are length and modulus.
+    pub fn is_like(self, other: Self) -> bool {
+        let groups = [
+            &[Self::LostMass, Self::AddedMass, Self::SensorPosition][..],
+            &[Self::Length, Self::Modulus],
+        ];
+        self == other
+            || groups
+                .iter()
+                .any(|group| group.contains(&self) && group.contains(&other))
     }
 }
 
@@ -106,6 +110,18 @@ impl SizePrior {
             }
         }
     }
+
+    /// Returns the logarithm of the probability of a range about zero.
+    fn log_share(self, [low, high]: [f64; 2]) -> f64 {
+        match self {
+            Self::Cauchy { half_width, below } => {
+                let share = |size: f64| 2.0 / PI * (size.abs() / half_width).atan();
+                (below * share(low) + (1.0 - below) * share(high)).ln()
+            }
+            // Four standard deviations to either side.
+            Self::Normal { .. } => 0.0,
+        }
+    }
 }
 
 /// A cause with one size, and a place where it needs one.
@@ -136,20 +152,6 @@ const REPAIRED: f64 = 0.1;
 const MOST_WAY: f64 = 0.15;
 /// Standard uncertainty of the mass of an item (1). Items are cut and weighed as a batch.
 const ITEM_MASS: f64 = 0.15;
-
-impl SizePrior {
-    /// Returns the logarithm of the probability of a range about zero.
-    fn log_share(self, [low, high]: [f64; 2]) -> f64 {
-        match self {
-            Self::Cauchy { half_width, below } => {
-                let share = |size: f64| 2.0 / PI * (size.abs() / half_width).atan();
-                (below * share(low) + (1.0 - below) * share(high)).ln()
-            }
-            // Four standard deviations to either side.
-            Self::Normal { .. } => 0.0,
-        }
-    }
-}
 
 impl Cause {
     /// Returns the logarithm of the prior density of a size within its range.

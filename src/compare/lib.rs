@@ -61,31 +61,11 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
     let data = Data::new(&models, settings);
     let nothing: Vec<Predicted> = models.iter().map(Predicted::nothing).collect();
     let no_change_goodness = data.goodness(&nothing, 0);
+    let log_nothing = data.log_density(&nothing);
+    let log_unknown = unknown::log_evidence(&data);
     let mut candidates = vec![
-        Candidate {
-            kind: CauseKind::NoChange,
-            item: None,
-            log_evidence: data.log_density(&nothing),
-            posterior: None,
-            names: Vec::new(),
-            goodness: Some(no_change_goodness),
-            place_std: 0.0,
-            known_place: None,
-            length: 0.0,
-            unit: 1.0,
-        },
-        Candidate {
-            kind: CauseKind::Unknown,
-            item: None,
-            log_evidence: unknown::log_evidence(&data),
-            posterior: None,
-            names: Vec::new(),
-            goodness: None,
-            place_std: 0.0,
-            known_place: None,
-            length: 0.0,
-            unit: 1.0,
-        },
+        Candidate::without_size(CauseKind::NoChange, log_nothing, Some(no_change_goodness)),
+        Candidate::without_size(CauseKind::Unknown, log_unknown, None),
     ];
     let first = &pairs[0].before[0];
     // An item that a pair lacks did not change in all of them.
@@ -98,25 +78,14 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
     let items: Vec<Item> = items.cloned().collect();
     for cause in Cause::all(models[0].structure(), &items) {
         if let Some(found) = search::posterior(&data, &cause) {
-            candidates.push(verdict::candidate_of(&data, &cause, found));
+            candidates.push(Candidate::of_one_size(&data, &cause, &found));
         }
     }
     let joint = JointChange::new(&models);
     if let Some(joint) = &joint
         && let Some(found) = joint.posterior(&data)
     {
-        candidates.push(Candidate {
-            kind: CauseKind::JointChange,
-            item: None,
-            log_evidence: found.log_evidence,
-            goodness: Some(data.goodness(&found.best, joint.directions.len())),
-            names: joint.names(&models[0]),
-            place_std: 0.0,
-            known_place: None,
-            length: 0.0,
-            unit: 1.0,
-            posterior: Some(found),
-        });
+        candidates.push(Candidate::of_joint(&data, joint, &found));
     }
     let probabilities = verdict::probabilities(&candidates);
     let order = verdict::order(&probabilities);
@@ -134,7 +103,7 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
             percent: 100.0 * data.mean_scatter(),
             origin: match settings.repeatability {
                 Some(_) => RepeatabilityOrigin::Stated,
-                None if models.iter().any(|pair| pair.repeats.1 > 0.0) => {
+                None if models.iter().any(|pair| pair.repeat_freedom > 0.0) => {
                     RepeatabilityOrigin::Repeats
                 }
                 None => RepeatabilityOrigin::Assumed,
@@ -148,11 +117,13 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
 fn mode_changes(data: &Data<'_>, settings: &Settings) -> Vec<ModeChange> {
     let mut all = Vec::new();
     for (index, pair) in data.pairs.iter().enumerate() {
-        let variances =
-            likelihood::variances(pair, data.mean_scatter(), settings.repeatability.is_some());
+        let is_stated = settings.repeatability.is_some();
+        let variances = likelihood::variances(pair, data.mean_scatter(), is_stated);
+        // What the descriptions tell is uncertain, too.
+        let covariance = likelihood::covariance(pair, &variances, &Predicted::nothing(pair));
         for (k, &mode) in pair.modes.iter().enumerate() {
             let [before, after] = pair.frequencies[k];
-            let std = variances[k].sqrt();
+            let std = covariance[(k, k)].sqrt();
             all.push(ModeChange {
                 pair: index,
                 mode,

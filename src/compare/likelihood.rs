@@ -39,8 +39,8 @@ pub(crate) fn scatters(pairs: &[PairModel], settings: &Settings) -> Vec<Scatter>
         }];
     }
     // The grid lies about what prior and repeats say together.
-    let squares: f64 = pairs.iter().map(|pair| pair.repeats.0).sum();
-    let freedom: f64 = pairs.iter().map(|pair| pair.repeats.1).sum();
+    let squares: f64 = pairs.iter().map(|pair| pair.repeat_squares).sum();
+    let freedom: f64 = pairs.iter().map(|pair| pair.repeat_freedom).sum();
     let (mut centre, mut spread) = (USUAL_REPEATABILITY.ln(), USUAL_SPREAD);
     if freedom > 0.0 && squares > 0.0 {
         // The difference of two tests has twice the variance of one.
@@ -82,7 +82,7 @@ pub(crate) fn variances(pair: &PairModel, std: f64, is_stated: bool) -> Vec<f64>
     let scatter = std * std * pair.scatter_share;
     let of_reading = pair.reading.iter();
     // A stated repeatability and the scatter of repeats hold the readings' own noise. An assumed one does not.
-    let holds_readings = is_stated || pair.repeats.1 > 0.0;
+    let holds_readings = is_stated || pair.repeat_freedom > 0.0;
     of_reading
         .map(|reading| match holds_readings {
             true => scatter.max(*reading),

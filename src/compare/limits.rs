@@ -58,7 +58,7 @@ fn is_seen(
     for pair in &mut planned {
         pair.measured = pair.predict_joint(&change.directions, &steps)?.change;
     }
-    // The scatter that the tests showed is kept: `repeats` are the same.
+    // What the repeats showed of the scatter is kept.
     let nothing: Vec<Predicted> = planned.iter().map(Predicted::nothing).collect();
     let visible = Data::new(&planned, settings)
         .mean_chi_square(&nothing)

@@ -45,8 +45,7 @@ struct Structures {
 impl Structures {
     /// Returns the described change of each frequency (logarithm).
     fn described(&self) -> Vec<f64> {
-        let pairs = self.log_after.iter().zip(&self.log_before);
-        pairs.map(|(after, before)| after - before).collect()
+        difference(&self.log_after, &self.log_before)
     }
 }
 
@@ -61,8 +60,10 @@ pub(crate) struct PairModel {
     pub(crate) reading: Vec<f64>,
     /// Variance of the change over that of a difference of two tests: less where there are repeats.
     pub(crate) scatter_share: f64,
-    /// Sum of squares of the scatter between repeats, in units of one test, and its degrees of freedom.
-    pub(crate) repeats: (f64, f64),
+    /// Sum of squares of the scatter between repeats, each against the mean of its side (logarithm).
+    pub(crate) repeat_squares: f64,
+    /// Degrees of freedom of that sum; 0 without repeats.
+    pub(crate) repeat_freedom: f64,
     /// Mean frequency before and after (Hz).
     pub(crate) frequencies: Vec<[f64; 2]>,
     /// Described change of each frequency (logarithm).
@@ -97,6 +98,12 @@ impl Predicted {
             aside: Vec::new(),
         }
     }
+}
+
+/// Returns the differences of two lists, value by value.
+fn difference(one: &[f64], other: &[f64]) -> Vec<f64> {
+    let pairs = one.iter().zip(other);
+    pairs.map(|(one, other)| one - other).collect()
 }
 
 /// Returns the modes of a structure up to the highest of these.
@@ -310,16 +317,14 @@ impl PairModel {
             modes: modes.to_vec(),
             described_aside: aside
                 .iter()
-                .map(|moved| {
-                    let own = moved.described().into_iter().zip(centre.described());
-                    own.map(|(moved, own)| moved - own).collect()
-                })
+                .map(|moved| difference(&moved.described(), &centre.described()))
                 .collect(),
             described: centre.described(),
             measured: differences.measured,
             reading: differences.reading,
             scatter_share: differences.scatter_share,
-            repeats: differences.repeats,
+            repeat_squares: differences.repeat_squares,
+            repeat_freedom: differences.repeat_freedom,
             frequencies: differences.frequencies,
             shape_error: (SHAPE_ERROR * misfit).min(MOST_SHAPE_ERROR),
             is_symmetric: centre.before == centre.after,
@@ -347,13 +352,7 @@ impl PairModel {
         let mut aside = Vec::with_capacity(self.aside.len());
         for structures in &self.aside {
             let moved = self.shifted(structures, near.as_ref(), cause, size, place)?;
-            aside.push(
-                moved
-                    .iter()
-                    .zip(&change)
-                    .map(|(moved, own)| moved - own)
-                    .collect(),
-            );
+            aside.push(difference(&moved, &change));
         }
         Some(Predicted { change, aside })
     }
@@ -442,17 +441,10 @@ impl PairModel {
         }
         let with = cause.applied(structure, item, size, place)?;
         let with = logs_near(near, &with, &self.modes)?;
-        let sign = if backwards || cause.kind == CauseKind::LostMass {
-            -1.0
-        } else {
-            1.0
-        };
-        Some(
-            with.iter()
-                .zip(&without)
-                .map(|(with, without)| sign * (with - without))
-                .collect(),
-        )
+        Some(match backwards || cause.kind == CauseKind::LostMass {
+            true => difference(&without, &with),
+            false => difference(&with, &without),
+        })
     }
 
     /// Returns the directions in which the joint may change.
@@ -472,13 +464,7 @@ impl PairModel {
         let mut aside = Vec::with_capacity(self.aside.len());
         for structures in &self.aside {
             let moved = self.joint_shifted(structures, directions, steps)?;
-            aside.push(
-                moved
-                    .iter()
-                    .zip(&change)
-                    .map(|(moved, own)| moved - own)
-                    .collect(),
-            );
+            aside.push(difference(&moved, &change));
         }
         Some(Predicted { change, aside })
     }
@@ -505,9 +491,11 @@ impl PairModel {
             let held = with_joint(&structures.before, directions, &backward);
             before = log_frequencies(&held, &self.modes).ok()?;
         }
-        let changes = (0..after.len())
-            .map(|k| after[k] - structures.log_after[k] - (before[k] - structures.log_before[k]));
-        Some(changes.collect())
+        let softer_before = difference(&before, &structures.log_before);
+        Some(difference(
+            &difference(&after, &structures.log_after),
+            &softer_before,
+        ))
     }
 
     /// Returns the joint before and after as the descriptions have it, fitted where they state nothing.
@@ -545,7 +533,8 @@ struct Differences {
     measured: Vec<f64>,
     reading: Vec<f64>,
     scatter_share: f64,
-    repeats: (f64, f64),
+    repeat_squares: f64,
+    repeat_freedom: f64,
     frequencies: Vec<[f64; 2]>,
 }
 
@@ -598,7 +587,8 @@ impl Differences {
             measured,
             reading,
             scatter_share: share,
-            repeats: (squares, freedom),
+            repeat_squares: squares,
+            repeat_freedom: freedom,
             frequencies,
         })
     }

@@ -104,17 +104,23 @@ impl Curve {
                 positive: None,
             };
         }
-        let positive = Branch::new(pair, cause, place, &NODES.map(|share| share * high));
-        let negative = match pair.is_odd(cause) {
-            true => None,
-            false => Branch::new(pair, cause, place, &NODES.map(|share| share * low)),
-        };
+        let (mut negative, mut positive) = (None, None);
+        // A sensor at an end of the beam moves to one side only.
+        if high > 0.0 {
+            positive = Branch::new(pair, cause, place, &NODES.map(|share| share * high));
+        }
+        if low < 0.0 && !pair.is_odd(cause) {
+            negative = Branch::new(pair, cause, place, &NODES.map(|share| share * low));
+        }
         Self { negative, positive }
     }
 
     /// Returns the change at a size; `None` where there is no such structure.
-    fn at(&self, size: f64, is_odd: bool) -> Option<Predicted> {
-        if size >= 0.0 || !is_odd {
+    fn at(&self, size: f64, pair: &PairModel, is_odd: bool) -> Option<Predicted> {
+        if size == 0.0 {
+            return Some(Predicted::nothing(pair));
+        }
+        if size > 0.0 || !is_odd {
             let branch = if size < 0.0 {
                 &self.negative
             } else {
@@ -161,7 +167,7 @@ fn at_place(data: &Data<'_>, cause: &Cause, place: f64) -> AtPlace {
     let log_posterior = |size: f64| {
         let mut predicted = Vec::with_capacity(curves.len());
         for (curve, pair) in curves.iter().zip(data.pairs) {
-            match curve.at(size, pair.is_odd(cause)) {
+            match curve.at(size, pair, pair.is_odd(cause)) {
                 Some(one) => predicted.push(one),
                 None => return f64::NEG_INFINITY,
             }
@@ -185,6 +191,7 @@ fn at_place(data: &Data<'_>, cause: &Cause, place: f64) -> AtPlace {
         .map(|&size| (size, log_posterior(size)))
         .collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    known.dedup_by(|a, b| a.0 == b.0);
     // A second look about the most probable size, as wide as the first look's parabola.
     if let Some((most, std)) = peak(&known) {
         for k in -SECOND_SIZES..=SECOND_SIZES {

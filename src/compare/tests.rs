@@ -193,7 +193,10 @@ fn prop_a_described_change_that_is_off_by_some_percent_is_no_change() {
     );
     let found = compare(&[pair], &stated(2e-4)).unwrap();
     assert_eq!(found.verdict.kind, VerdictKind::NoChange);
-    assert!(found.modes.iter().any(|mode| mode.z.abs() > 5.0));
+    // Scatter alone would have seen it.
+    let beyond = |mode: &crate::ModeChange| (mode.change_percent - mode.described_percent).abs();
+    assert!(found.modes.iter().any(|mode| beyond(mode) > 5.0 * 0.02));
+    assert!(found.modes.iter().all(|mode| mode.z.abs() < 2.0));
 }
 
 #[test]
@@ -215,7 +218,11 @@ fn prop_a_rigid_joint_that_gives_is_found_on_either_side() {
             .unwrap();
         let size = joint.parameters["kr_compliance"];
         assert!((size.value - truth).abs() < 0.002, "{size:?} {truth}");
-        assert!(found.hypotheses[0].probability > joint.probability - 1e-12);
+        // It need not be the first: a crack at the clamp is the same structure, and another length, another modulus and a mass
+        // at the end lower all frequencies of a clamped beam nearly alike.
+        assert!(joint.goodness_of_fit > Some(0.9), "{joint:?}");
+        assert!(probability(&found, CauseKind::NoChange) < 1e-3);
+        assert!(probability(&found, CauseKind::Unknown) < 0.05);
         assert_eq!(found.joint.unwrap().kr, None);
     }
 }
@@ -288,6 +295,30 @@ fn prop_a_lost_item_is_named_before_a_mass_anywhere() {
     assert_eq!(found.hypotheses[0].item.as_deref(), Some("L1"));
     assert!(found.verdict.effects.contains(&CauseKind::LostMass));
     assert!(!found.verdict.effects.contains(&CauseKind::JointChange));
+}
+
+#[test]
+fn prop_a_sensor_at_the_end_that_was_moved_is_found() {
+    let sensor = Item {
+        name: "A".to_owned(),
+        point: PointMass::new(BEAM.length, 0.015),
+        kind: ItemKind::Sensor,
+    };
+    let mut before = cantilever(springs());
+    let mut after = before.clone();
+    before.masses.push(sensor.point);
+    // 20 mm inwards: outwards there is no beam.
+    after.masses.push(PointMass::new(BEAM.length - 0.02, 0.015));
+    let items = [sensor];
+    let [first, second] = [&before, &after].map(|one| test(&before, &items, &frequencies(one)));
+    let found = compare(&[pair(first, second)], &stated(3e-4)).unwrap();
+    let mut all = found.hypotheses.iter();
+    let moved = all
+        .find(|one| one.effect == CauseKind::SensorPosition)
+        .unwrap();
+    let shift = moved.parameters["sensor_shift"];
+    assert!((shift.value + 0.02).abs() < 0.002, "{shift:?}");
+    assert!(shift.high < 0.0);
 }
 
 #[test]

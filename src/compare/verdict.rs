@@ -1,6 +1,7 @@
 //! Probabilities of all causes, and the answer that follows from them.
 
 use crate::cause::{Cause, CauseKind};
+use crate::joint::JointChange;
 use crate::likelihood::{Data, log_sum};
 use crate::result::{CauseResult, ChangeVerdict, Interval, VerdictKind};
 use crate::search::Posterior;
@@ -13,19 +14,14 @@ pub(crate) struct Candidate {
     pub(crate) item: Option<String>,
     /// Logarithm of its evidence.
     pub(crate) log_evidence: f64,
-    /// `None` where it has no size: no change, and an unknown one.
-    pub(crate) posterior: Option<Posterior>,
-    /// Names of the values of the posterior's points.
-    pub(crate) names: Vec<&'static str>,
+    /// Goodness of fit; `None` for an unknown change.
     pub(crate) goodness: Option<f64>,
-    /// Standard uncertainty of its place by errors of the shapes (m).
-    pub(crate) place_std: f64,
-    /// Place of the item that is gone (m).
-    pub(crate) known_place: Option<f64>,
-    /// Length of the structure (m).
-    pub(crate) length: f64,
-    /// Unit of its size (SI).
-    pub(crate) unit: f64,
+    /// Its sizes and its place; empty for no change and an unknown one.
+    parameters: BTreeMap<&'static str, Interval>,
+    /// What it changes each frequency by (%), in the order of the compared modes.
+    explains: Vec<f64>,
+    /// One of its sizes is clearly not zero.
+    has_clear_size: bool,
 }
 
 impl Interval {
@@ -69,6 +65,11 @@ pub(crate) fn probabilities(candidates: &[Candidate]) -> Vec<f64> {
     logs.iter().map(|log| (log - total).exp()).collect()
 }
 
+/// Returns true for a size that is clearly not zero.
+fn is_clear(size: Interval) -> bool {
+    size.value.abs() > CLEAR * size.std
+}
+
 /// Returns the median of a posterior's values with their 95 % interval.
 fn interval(posterior: &Posterior, index: usize, transformed: impl Fn(f64) -> f64) -> Interval {
     let mut values: Vec<(f64, f64)> = posterior
@@ -110,57 +111,107 @@ fn interval(posterior: &Posterior, index: usize, transformed: impl Fn(f64) -> f6
 }
 
 impl Candidate {
+    /// A cause without a size.
+    pub(crate) fn without_size(kind: CauseKind, log_evidence: f64, goodness: Option<f64>) -> Self {
+        Self {
+            kind,
+            item: None,
+            log_evidence,
+            goodness,
+            parameters: BTreeMap::new(),
+            explains: Vec::new(),
+            has_clear_size: false,
+        }
+    }
+
+    /// A change of the joint.
+    pub(crate) fn of_joint(data: &Data<'_>, joint: &JointChange, posterior: &Posterior) -> Self {
+        let mut candidate = Self::without_size(
+            CauseKind::JointChange,
+            posterior.log_evidence,
+            Some(data.goodness(&posterior.best, joint.directions.len())),
+        );
+        candidate.explain(posterior);
+        for (index, name) in joint.names(&data.pairs[0]).into_iter().enumerate() {
+            let step = interval(posterior, index, |step| step);
+            candidate.has_clear_size |= is_clear(step);
+            let found = match name {
+                "kt" | "kr" => interval(posterior, index, f64::exp_m1),
+                _ => step,
+            };
+            candidate.parameters.insert(name, found);
+        }
+        candidate
+    }
+
+    /// A cause of one size, and perhaps with a place. Places and masses of items are those of the first pair.
+    pub(crate) fn of_one_size(data: &Data<'_>, cause: &Cause, posterior: &Posterior) -> Self {
+        let pair = &data.pairs[0];
+        let lost = pair
+            .item(cause, 0)
+            .filter(|_| cause.kind == CauseKind::LostMass);
+        // A stated size was not fitted.
+        let fitted = match lost {
+            Some(_) => 0,
+            None => 1 + usize::from(cause.is_placed),
+        };
+        let mut candidate = Self::without_size(
+            cause.kind,
+            posterior.log_evidence,
+            Some(data.goodness(&posterior.best, fitted)),
+        );
+        candidate.item.clone_from(&cause.item);
+        candidate.explain(posterior);
+        let name = match cause.kind {
+            CauseKind::LostMass | CauseKind::AddedMass => "mass",
+            CauseKind::LocalCrack => "compliance",
+            CauseKind::AxialLoad => "force",
+            CauseKind::SensorPosition => "sensor_shift",
+            _ => "relative",
+        };
+        // A lost mass is in masses of its item.
+        let unit = lost.map_or(1.0, |item| item.mass);
+        let size = interval(posterior, 0, |size| size * unit);
+        candidate.has_clear_size = is_clear(size);
+        candidate.parameters.insert(name, size);
+        if cause.is_placed {
+            let length = pair.structure().body.length();
+            let place = interval(posterior, 1, |place| place * length);
+            let place = place.widened(pair.place_std());
+            let within = Interval {
+                low: place.low.max(0.0),
+                high: place.high.min(length),
+                ..place
+            };
+            candidate.parameters.insert("position", within);
+        }
+        if let Some(item) = lost {
+            let stated = Interval {
+                value: item.position,
+                std: 0.0,
+                low: item.position,
+                high: item.position,
+            };
+            candidate.parameters.insert("position", stated);
+        }
+        candidate
+    }
+
+    fn explain(&mut self, posterior: &Posterior) {
+        let changes = posterior.best.iter().flat_map(|pair| &pair.change);
+        self.explains = changes.map(|one| 100.0 * one.exp_m1()).collect();
+    }
+
     /// Returns its result.
     pub(crate) fn result(&self, probability: f64) -> CauseResult {
-        let mut parameters = BTreeMap::new();
-        let mut explains = Vec::new();
-        if let Some(place) = self.known_place {
-            let known = Interval {
-                value: place,
-                std: 0.0,
-                low: place,
-                high: place,
-            };
-            parameters.insert("position", known);
-        }
-        if let Some(posterior) = &self.posterior {
-            for (index, name) in self.names.iter().enumerate() {
-                let found = match *name {
-                    "kt" | "kr" => interval(posterior, index, f64::exp_m1),
-                    "position" => {
-                        let own = interval(posterior, index, |place| place * self.length);
-                        let wide = own.widened(self.place_std);
-                        Interval {
-                            low: wide.low.max(0.0),
-                            high: wide.high.min(self.length),
-                            ..wide
-                        }
-                    }
-                    _ => interval(posterior, index, |value| value * self.unit),
-                };
-                parameters.insert(*name, found);
-            }
-            let changes = posterior.best.iter().flat_map(|pair| &pair.change);
-            explains = changes.map(|one| 100.0 * one.exp_m1()).collect();
-        }
         CauseResult {
             effect: self.kind,
             item: self.item.clone(),
             probability,
-            parameters,
+            parameters: self.parameters.clone(),
             goodness_of_fit: self.goodness,
-            explains_percent: explains,
+            explains_percent: self.explains.clone(),
         }
-    }
-
-    /// Returns true where one of its sizes is clearly not zero.
-    fn has_clear_size(&self) -> bool {
-        let Some(posterior) = &self.posterior else {
-            return false;
-        };
-        let sizes = (0..self.names.len()).filter(|index| self.names[*index] != "position");
-        let mut sizes = sizes.map(|index| interval(posterior, index, |value| value));
-        sizes.any(|size| size.value.abs() > CLEAR * size.std)
     }
 
     /// Returns true where it explains the changes.
@@ -203,7 +254,7 @@ pub(crate) fn verdict(candidates: &[Candidate], probabilities: &[f64]) -> Change
     let explained: Vec<usize> = order
         .iter()
         .copied()
-        .filter(|index| candidates[*index].posterior.is_some())
+        .filter(|index| !candidates[*index].parameters.is_empty())
         .collect();
     if nothing <= PERHAPS_NOTHING {
         let unknown = of_kind(CauseKind::Unknown);
@@ -214,16 +265,16 @@ pub(crate) fn verdict(candidates: &[Candidate], probabilities: &[f64]) -> Change
         if let Some(&index) = explained.first() {
             let leads = order[0] == index;
             let own = &candidates[index];
-            if leads && probabilities[index] >= SURE && own.has_clear_size() {
+            if leads && probabilities[index] >= SURE && own.has_clear_size {
                 return answer(VerdictKind::Named, &[index], probabilities[index]);
             }
             let members: Vec<usize> = explained
                 .iter()
                 .copied()
-                .filter(|one| candidates[*one].kind.group() == own.kind.group())
+                .filter(|one| candidates[*one].kind.is_like(own.kind))
                 .collect();
             let together: f64 = members.iter().map(|one| probabilities[*one]).sum();
-            if leads && together >= SURE && own.has_clear_size() {
+            if leads && together >= SURE && own.has_clear_size {
                 // Those without which it would be no group are enough.
                 let mut chosen = Vec::new();
                 let mut sum = 0.0;
@@ -248,40 +299,4 @@ pub(crate) fn verdict(candidates: &[Candidate], probabilities: &[f64]) -> Change
         }
     }
     answer(VerdictKind::Set, &chosen, sum)
-}
-
-/// Returns what a cause of one size is made into.
-pub(crate) fn candidate_of(data: &Data<'_>, cause: &Cause, posterior: Posterior) -> Candidate {
-    let size = match cause.kind {
-        CauseKind::LostMass | CauseKind::AddedMass => "mass",
-        CauseKind::LocalCrack => "compliance",
-        CauseKind::AxialLoad => "force",
-        CauseKind::SensorPosition => "sensor_shift",
-        _ => "relative",
-    };
-    let mut names = vec![size];
-    if cause.is_placed {
-        names.push("position");
-    }
-    // A stated size was not fitted.
-    let fitted = if cause.kind == CauseKind::LostMass {
-        0
-    } else {
-        names.len()
-    };
-    let lost = data.pairs[0]
-        .item(cause, 0)
-        .filter(|_| cause.kind == CauseKind::LostMass);
-    Candidate {
-        kind: cause.kind,
-        item: cause.item.clone(),
-        log_evidence: posterior.log_evidence,
-        goodness: Some(data.goodness(&posterior.best, fitted)),
-        names,
-        posterior: Some(posterior),
-        place_std: data.pairs[0].place_std(),
-        known_place: lost.map(|item| item.position),
-        length: data.pairs[0].structure().body.length(),
-        unit: lost.map_or(1.0, |item| item.mass),
-    }
 }

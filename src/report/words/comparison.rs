@@ -14,7 +14,7 @@ pub fn cause(kind: CauseKind, item: Option<&str>) -> String {
         CauseKind::JointChange => "the joint changed".to_owned(),
         CauseKind::LostMass => format!("{item} is gone"),
         CauseKind::AddedMass => "a mass came or went".to_owned(),
-        CauseKind::LocalCrack => "a crack, or one repaired".to_owned(),
+        CauseKind::LocalCrack => "a crack opened or closed".to_owned(),
         CauseKind::Length => "the free length changed".to_owned(),
         CauseKind::Modulus => "the modulus changed (temperature?)".to_owned(),
         CauseKind::SensorPosition => format!("sensor {item} was moved"),
@@ -50,15 +50,13 @@ pub fn size(found: &CauseResult) -> String {
 fn in_unit(found: &Interval, factor: f64, unit: &str) -> String {
     let [value, low, high] =
         [found.value, found.low, found.high].map(|one| significant(factor * one, 3));
-    if found.std == 0.0 {
-        return format!("{value} {unit}");
+    let value = format!("{value} {unit}");
+    let value = value.trim_end();
+    // What a description states has no interval.
+    match found.low == found.high {
+        true => value.to_owned(),
+        false => format!("{value} ({low} to {high})"),
     }
-    let unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
-    format!("{value}{unit} ({low} to {high})")
 }
 
 /// Returns the answer in a few sentences, the shortest first.

@@ -1,8 +1,11 @@
 //! Probability of the measured changes, given a predicted one.
 //!
 //! The measured change of each mode is the predicted one, plus scatter between set-ups. Its covariance is
-//! r^2 I (the repeatability r, or the readings where they are worse) + sum of g g' (the joint before the change is
-//! uncertain) + (e d)^2 + (e/2)^2 d d' (a predicted change d has the relative error e in each mode, and half of it in all).
+//! r^2 I + sum of g g' + (e d)^2 + (e/2)^2 d d':
+//!
+//! - r: the repeatability, or the readings where they are worse
+//! - g: change of the prediction with the joint one standard deviation aside, for each of its axes
+//! - d: predicted and described change together. It has the relative error e in each mode, and half of it in all
 
 use crate::model::{PairModel, Predicted};
 use crate::test::Settings;

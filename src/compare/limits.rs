@@ -15,8 +15,8 @@ const PRECISION: f64 = 1.12;
 /// Probability of no change below which a change is seen.
 const SEEN: f64 = 0.05;
 
-/// Returns the smallest rise and fall (1, relative) of the stiffness in one direction that nine of ten comparisons with these
-/// uncertainties would see; `None` where not even a factor of 20 would be seen.
+/// Returns the smallest rise and fall (1, relative) of the stiffness in one direction that would be seen in nine of ten
+/// comparisons with these uncertainties. `None` where not even a factor of 20 would be.
 ///
 /// Data with exactly this change are made, less what chance takes away in one case of ten. They are seen where `no change`
 /// has at most 5 % beside a change of the joint.

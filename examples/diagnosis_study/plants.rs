@@ -343,27 +343,41 @@ fn draw_set_up(
         true => 0,
         false => random.random_range(1..=recordings),
     };
+    let is_off = |k: usize| recording == 0 || k + 1 == recording;
+    let off = (0..recordings)
+        .filter(|k| is_off(*k))
+        .map(|k| &test.stated[k]);
     // A slip of the tape, a place mixed up: some millimetres to a tenth of the beam, in the direction that has room.
-    let mut offset = |place: f64| {
+    let mut offset = |places: Vec<f64>| {
         let size = log_triangular(random, 5e-4, 8e-3, 0.08).min(0.15 * length);
         let side = sign(random, 0.5);
-        match (0.02 * length..=0.99 * length).contains(&(place + side * size)) {
-            true => side * size,
-            false => -side * size,
+        let mut room = [side, -side].map(|side| {
+            let own = places.iter().map(|place| match side > 0.0 {
+                true => length - place,
+                false => place - 0.01 * length,
+            });
+            own.fold(f64::INFINITY, f64::min)
+        });
+        room.iter_mut().for_each(|room| *room = room.max(0.0));
+        match room[0] >= size || room[0] >= room[1] {
+            true => side * size.min(room[0]),
+            false => -side * size.min(room[1]),
         }
     };
     match id {
         EffectId::SensorPosition => {
-            let place = test.stated[recording.saturating_sub(1)].sensors[sensor].1;
             vec![
-                ("offset", offset(place)),
+                (
+                    "offset",
+                    offset(off.map(|one| one.sensors[sensor].1).collect()),
+                ),
                 ("sensor", number),
                 ("recording", recording as f64),
             ]
         }
         EffectId::TapPosition => {
-            let place = test.stated[recording.saturating_sub(1)].tap;
-            vec![("offset", offset(place)), ("recording", recording as f64)]
+            let offset = offset(off.map(|one| one.tap).collect());
+            vec![("offset", offset), ("recording", recording as f64)]
         }
         EffectId::SensorPolarity => vec![("sensor", number)],
         EffectId::SensorSwap => {

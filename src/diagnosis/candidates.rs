@@ -169,8 +169,20 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
                 all.push(CandidateEffect::of_set_up(
                     effect,
                     Target::Place { position },
-                    Size::offset(*stated, length),
+                    Size::offset(&[*stated], length),
                 ));
+            }
+            // The scale's zero is off: the sensor is as far off wherever it is put.
+            for name in names {
+                let own = inventory.positions.iter().filter(|one| one.0 == name);
+                let stated: Vec<f64> = own.map(|one| one.1).collect();
+                if stated.len() > 1 {
+                    all.push(CandidateEffect::of_set_up(
+                        effect,
+                        Target::Sensor { name },
+                        Size::offset(&stated, length),
+                    ));
+                }
             }
         }
         EffectId::TapPosition if has_constants => {
@@ -178,7 +190,14 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
                 all.push(CandidateEffect::of_set_up(
                     effect,
                     Target::Taps { tap },
-                    Size::offset(*stated, length),
+                    Size::offset(&[*stated], length),
+                ));
+            }
+            if inventory.taps.len() > 1 {
+                all.push(CandidateEffect::of_set_up(
+                    effect,
+                    Target::All,
+                    Size::offset(&inventory.taps, length),
                 ));
             }
         }
@@ -259,7 +278,7 @@ mod tests {
         for size in [
             Size::positive("mass", 0.01, 0.25),
             Size::signed("relative", 0.02, 0.3),
-            Size::offset(0.338, 0.423),
+            Size::offset(&[0.338], 0.423),
         ] {
             let [all, below] = integrals(&size, size.scale);
             // The midpoint rule over a peak as wide as a thousandth of the range.
@@ -283,7 +302,7 @@ mod tests {
         for stated in [0.423, 0.419] {
             let beside = Size {
                 known: size.known,
-                ..Size::offset(stated, 0.423)
+                ..Size::offset(&[stated], 0.423)
             };
             let [all, _] = integrals(&beside, 0.01);
             assert!((all - 1.0).abs() < 1e-5, "{stated}: {all}");

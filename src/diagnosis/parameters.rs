@@ -145,9 +145,9 @@ impl Prior {
 /// Part of the set-up on which an effect acts. Indices are those of the dataset's inventory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
-    /// The structure, or all sensors alike.
+    /// The structure, or all sensors or all taps alike.
     All,
-    /// A sensor, by the index of its name.
+    /// A sensor wherever it is, by the index of its name.
     Sensor { name: usize },
     /// A sensor at one of its stated positions, by the index of the position.
     Place { position: usize },
@@ -379,12 +379,13 @@ impl Size {
         }
     }
 
-    /// Returns the prior of an offset (m) from the stated place, on a beam of this length (m). Half of the offsets are
+    /// Returns the prior of an offset (m) from the stated places, on a beam of this length (m). Half of the offsets are
     /// below 5 mm.
-    pub fn offset(stated: f64, length: f64) -> Self {
+    pub fn offset(stated: &[f64], length: f64) -> Self {
+        let room = stated.iter().map(|place| (length - place).max(0.0));
         Size {
-            low: -stated,
-            high: (length - stated).max(0.0),
+            low: -stated.iter().copied().fold(length, f64::min),
+            high: room.fold(length, f64::min),
             ..Size::signed("offset", 0.005, length)
         }
     }

@@ -101,6 +101,14 @@ impl SetUp {
             (EffectId::SensorPosition, Target::Place { position }) => {
                 self.move_sensors(position, size, arrangement);
             }
+            (EffectId::SensorPosition, Target::Sensor { name }) => {
+                for (sensor, own) in self.sensors.iter_mut().zip(&arrangement.names) {
+                    if *own == name {
+                        sensor.position += size;
+                    }
+                }
+            }
+            (EffectId::TapPosition, Target::All) => self.tap = self.tap.map(|x| x + size),
             (EffectId::TapPosition, Target::Taps { tap }) if arrangement.tap_index == Some(tap) => {
                 self.tap = self.tap.map(|x| x + size);
             }

@@ -93,6 +93,15 @@ fn recover_errors_of_the_set_up_and_their_sizes() {
             EffectId::TapPosition,
             &[("recording", 2.0), ("offset", 0.02)],
         ),
+        // The scale's zero is off, so that all places of one sensor or all taps are.
+        (
+            EffectId::SensorPosition,
+            &[("sensor", 1.0), ("offset", -0.012), ("recording", 0.0)],
+        ),
+        (
+            EffectId::TapPosition,
+            &[("recording", 0.0), ("offset", -0.015)],
+        ),
     ] {
         let right = named(id, pairs);
         assert!(right >= 3, "{id:?} {pairs:?}: {right} of 4");

@@ -280,7 +280,11 @@ fn numbers_of(dataset: &Dataset, candidate: &CandidateEffect) -> Vec<(&'static s
     let mut arrangements = dataset.arrangements.iter();
     match candidate.target {
         Target::All if candidate.is(EffectId::SensorScale) => vec![("sensor", 0)],
+        Target::All if candidate.is(EffectId::TapPosition) => vec![("recording", 0)],
         Target::All => Vec::new(),
+        Target::Sensor { name } if candidate.is(EffectId::SensorPosition) => {
+            vec![("sensor", number_of(dataset, name)), ("recording", 0)]
+        }
         Target::Sensor { name } => vec![("sensor", number_of(dataset, name))],
         Target::Pair { names } => vec![
             ("sensor", number_of(dataset, names[0])),

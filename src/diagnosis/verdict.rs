@@ -3,6 +3,7 @@
 use crate::dataset::Dataset;
 use crate::evidence::{Fit, log_sum};
 use crate::fixture;
+use crate::parameters::CandidateEffect;
 use crate::result::{Block, Closure, Hypothesis, LocationProbabilities, Verdict};
 use crate::settings::SMALLEST_P_VALUE;
 use crate::structure::Arrangement;
@@ -38,6 +39,8 @@ pub struct GoodnessOfFit {
     pub closure: Option<Closure>,
     /// The size of each effect differs from zero by two standard deviations.
     is_sized: bool,
+    /// Whether all effects are errors of the set-up.
+    is_of_set_up: bool,
     /// The gap on hold-out data exceeds what the prediction leaves open, so that the closure can be certain.
     pub is_decisive: bool,
     /// Thresholds of the tests.
@@ -112,6 +115,8 @@ impl GoodnessOfFit {
             freedom: None,
             closure: None,
             is_sized: is_sized(dataset, fit),
+            is_of_set_up: !fit.effects.is_empty()
+                && fit.effects.iter().all(CandidateEffect::is_of_set_up),
             is_decisive: false,
             thresholds: thresholds.clone(),
         })
@@ -145,7 +150,8 @@ impl GoodnessOfFit {
 
     /// Returns whether the hold-out data leave the hypothesis its name: it closes half of the gap, and some of it for
     /// certain or predicts them within its uncertainty. If they cannot decide, closing some suffices, or predicting
-    /// without making their errors much worse.
+    /// without making their errors much worse. These data are frequencies, which an error of the set-up hardly moves:
+    /// predicting them suffices for it.
     fn passes_holdout(&self) -> bool {
         let Some(closure) = self.closure else {
             return true;
@@ -154,7 +160,8 @@ impl GoodnessOfFit {
         if self.is_decisive {
             closure.value >= self.thresholds.closed_share && (closure.low > 0.0 || predicts)
         } else {
-            closure.value > 0.0 || predicts && closure.value > self.thresholds.doubled_errors
+            let is_no_worse = closure.value > self.thresholds.doubled_errors;
+            closure.value > 0.0 || predicts && (self.is_of_set_up || is_no_worse)
         }
     }
 }

@@ -15,6 +15,7 @@ fn tested(holdout: f64, is_decisive: bool, [value, low]: [f64; 2]) -> GoodnessOf
         freedom: None,
         closure: Some(closure),
         is_sized: true,
+        is_of_set_up: false,
         is_decisive,
         thresholds: Thresholds::DEFAULT,
     }
@@ -52,6 +53,24 @@ fn limit_what_makes_holdout_data_worse_has_to_predict_them() {
     ] {
         let found = tested(withheld, decides, closure).passes_holdout();
         assert_eq!(found, holds, "{withheld} {decides} {closure:?}");
+    }
+}
+
+/// An error of the set-up hardly moves frequencies: these may be predicted worse than before, but within the
+/// uncertainty of the prediction.
+#[test]
+fn limit_frequencies_cannot_refute_an_error_of_the_set_up_that_does_not_move_them() {
+    for (withheld, is_of_set_up, holds) in [
+        (0.5, false, false),
+        (0.5, true, true),
+        // Below the least probability of a prediction.
+        (0.01, true, false),
+    ] {
+        let found = GoodnessOfFit {
+            is_of_set_up,
+            ..tested(withheld, false, [-17.0, -17.0])
+        };
+        assert_eq!(found.passes_holdout(), holds, "{withheld} {is_of_set_up}");
     }
 }
 

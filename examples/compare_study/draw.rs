@@ -8,7 +8,7 @@ use tapjoint::compare::{
 };
 use tapjoint::effects::{Circumstances, Effect, EffectId, apply};
 use tapjoint::structure::specimen::{
-    BeamSection, Joint, LapLayout, LapOverlap, Mesh, PointMass, PointSpring, Specimen,
+    BeamSection, Body, Joint, LapLayout, LapOverlap, Mesh, PointMass, PointSpring, Specimen,
 };
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
 
@@ -114,11 +114,11 @@ const SINGLE: [Cell; 5] = [
     Cell::Axial,
 ];
 
-fn log_uniform(draw: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+pub fn log_uniform(draw: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (high / low).powf(draw.random::<f64>())
 }
 
-fn normal(draw: &mut ChaCha8Rng) -> f64 {
+pub fn normal(draw: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(draw)
 }
 
@@ -226,7 +226,7 @@ impl Drawn {
 }
 
 /// Draws a described structure and its items.
-fn structure(draw: &mut ChaCha8Rng, cell: Cell) -> Option<(Specimen, Vec<Item>)> {
+pub fn structure(draw: &mut ChaCha8Rng, cell: Cell) -> Option<(Specimen, Vec<Item>)> {
     let kind = match draw.random_range(0..10) {
         0..6 => Assembly::Cantilever,
         6..8 => Assembly::Lap,
@@ -408,6 +408,10 @@ fn changed(
             (EffectId::Modulus, vec![("relative", size)])
         }
         Cell::Axial => {
+            // Nothing else holds the load.
+            if before.joint.is_none() || matches!(before.body, Body::Joined(_)) {
+                return None;
+            }
             let euler = before.body.beams()[0].bending_stiffness() * 9.87 / (length * length);
             let size = sign(draw) * euler * log_uniform(draw, 0.002, 0.05);
             sizes.push(("force", size));

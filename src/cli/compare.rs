@@ -9,9 +9,14 @@ use super::terminal::Terminal;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use std::path::{Path, PathBuf, absolute};
-use tapjoint::compare::{MOST_PAIRS, Pair, Settings, Test, compare};
+use tapjoint::compare::{
+    LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
+};
 use tapjoint::pipeline::{IdentifySettings, TestedStructure, Warning, compared_test};
-use tapjoint::report::{comparison_of, render_comparison, render_comparison_picture};
+use tapjoint::report::{
+    comparison_of, render_comparison, render_comparison_picture, render_series, render_series_csv,
+    render_series_picture, series_of,
+};
 
 /// Say what changed between two tests of one structure.
 ///
@@ -20,7 +25,7 @@ use tapjoint::report::{comparison_of, render_comparison, render_comparison_pictu
 /// what is compared is the change of each frequency.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  tapjoint compare before.toml after.toml\n  tapjoint compare monday.wav friday.wav --test test.toml --repeatability \"0.1 %\"\n  tapjoint compare --before 1.toml 2.toml --after 3.toml 4.toml\n  tapjoint compare --pair a1.toml a2.toml --pair b1.toml b2.toml"
+    after_help = "Examples:\n  tapjoint compare before.toml after.toml\n  tapjoint compare monday.wav friday.wav --test test.toml --repeatability \"0.1 %\"\n  tapjoint compare --before 1.toml 2.toml --after 3.toml 4.toml\n  tapjoint compare --pair a1.toml a2.toml --pair b1.toml b2.toml\n  tapjoint compare --series week1.toml week2.toml week3.toml --png charts.png"
 )]
 pub(super) struct CompareArguments {
     /// Test before the change
@@ -41,17 +46,21 @@ pub(super) struct CompareArguments {
     /// Test before and test after; several pairs share one change
     #[arg(long, value_name = "FILE", num_args = 2)]
     pair: Vec<PathBuf>,
+    /// Tests in the order of time: which is the first that differs from those before it, and what changed
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["first", "before", "after", "pair"])]
+    series: Vec<PathBuf>,
     /// Standard deviation of the difference of a frequency between two tests of one state, such as "0.1 %"; default: from
     /// repeats, else about 0.1 % is assumed
     #[arg(long, value_name = "R", value_parser = repeatability)]
     repeatability: Option<f64>,
-    /// Draw the changes of the frequencies and the causes into this file (PNG, or SVG if its name ends in .svg)
+    /// Draw the changes of the frequencies and the causes, or the control charts of a series, into this file (PNG, or SVG if its
+    /// name ends in .svg)
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Write a row for each test and chart of a series into this file (CSV)
+    #[arg(long, value_name = "FILE", requires = "series")]
+    csv: Option<PathBuf>,
 }
-
-/// Most repeats on one side.
-const MOST_REPEATS: usize = 100;
 
 /// A test that was read and analysed.
 struct Side {
@@ -75,7 +84,12 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
             );
         }
     }
+    let count = arguments.series.len();
+    if !arguments.series.is_empty() && !(LEAST_SERIES..=MOST_SERIES).contains(&count) {
+        bail!("--series: {count} tests, but a series has between {LEAST_SERIES} and {MOST_SERIES}");
+    }
     let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
+    let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
     let template = arguments
         .test
         .as_deref()
@@ -94,6 +108,31 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         }
         Ok(sides)
     };
+    let settings = Settings {
+        repeatability: arguments.repeatability,
+    };
+    if !arguments.series.is_empty() {
+        let sides = read(&arguments.series)?;
+        let (name, structure) = (sides[0].name.clone(), sides[0].structure);
+        let tests: Vec<Test> = sides.into_iter().map(|side| side.compared).collect();
+        let files = arguments
+            .series
+            .iter()
+            .map(|file| file.display().to_string());
+        let found = watch(&tests, &settings)?;
+        let document = series_of(&name, &structure, files.collect(), found, warnings);
+        if let Some(file) = png
+            && let Some(bytes) = render_series_picture(&document, file.picture_format())?
+        {
+            file.write(&bytes)?;
+        }
+        if let Some(file) = csv {
+            file.write(render_series_csv(&document)?.as_bytes())?;
+        }
+        terminal.say(&render_series(&document))?;
+        terminal.write_document(&document)?;
+        return Ok(Outcome::Answered);
+    }
     let mut groups = Vec::new();
     match (&arguments.first, &arguments.second) {
         (Some(before), Some(after)) => {
@@ -113,7 +152,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     }
     let Some(first) = groups.first().and_then(|group| group[0].first()) else {
         bail!(
-            "there is nothing to compare; give BEFORE and AFTER, --before and --after, or --pair"
+            "there is nothing to compare; give BEFORE and AFTER, --before and --after, --pair, or --series"
         );
     };
     let (name, structure) = (first.name.clone(), first.structure);
@@ -124,9 +163,6 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
             after: after.into_iter().map(|side| side.compared).collect(),
         });
     }
-    let settings = Settings {
-        repeatability: arguments.repeatability,
-    };
     let found = compare(&pairs, &settings)?;
     let document = comparison_of(&name, &structure, found, warnings);
     if let Some(file) = png

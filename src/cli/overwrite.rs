@@ -26,7 +26,7 @@ const OUTPUTS: [&str; 8] = [
 ];
 
 /// Arguments of `compare` that name tests.
-const COMPARED: [&str; 5] = ["first", "second", "before", "after", "pair"];
+const COMPARED: [&str; 6] = ["first", "second", "before", "after", "pair", "series"];
 
 /// An option with all files that it writes.
 pub(super) type Expanded = (&'static str, Vec<PathBuf>);

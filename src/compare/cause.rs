@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::PI;
 use tapjoint_beam::effects::{Circumstances, Effect, EffectId, apply};
-use tapjoint_beam::specimen::{PointMass, Specimen};
+use tapjoint_beam::specimen::{Body, PointMass, Specimen};
 
 /// Kind of a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -181,8 +181,8 @@ impl Cause {
             Self::signed(CauseKind::Length, 0.002, MOST_STRETCH),
             Self::signed(CauseKind::Modulus, 0.004, MOST_SOFTENING),
         ];
-        // Nothing holds the load of a free beam.
-        if structure.joint.is_some() || !structure.springs.is_empty() {
+        // Nothing holds the load of a free beam, nor of the halves of a lap joint.
+        if structure.joint.is_some() && matches!(structure.body, Body::One(_)) {
             all.push(Self::signed(
                 CauseKind::AxialLoad,
                 0.01 * euler,

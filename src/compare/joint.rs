@@ -1,10 +1,13 @@
 //! A change of the joint: translation, rotation and coupling at once.
 //!
+//! Often only one of them changes: then the others do not pay for being free. The evidence is the mean of that of each
+//! stiffness alone and that of all together. Sizes are those of all together, which is the wider answer.
+//!
 //! The most probable change is searched by least squares. The posterior is summed over a grid about it, which is fine near
 //! the centre and reaches to the largest changes.
 
 use crate::cause::SizePrior;
-use crate::likelihood::{Data, Gaussian};
+use crate::likelihood::{Data, Gaussian, log_sum};
 use crate::model::{PairModel, Predicted};
 use crate::search::{Point, Posterior, normalised};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -147,7 +150,7 @@ impl JointChange {
     }
 
     /// Returns the logarithm of the evidence by the parabola at its peak, searched from one start.
-    pub(crate) fn log_evidence_near(&self, data: &Data<'_>, start: Vec<f64>) -> Option<f64> {
+    fn log_evidence_near(&self, data: &Data<'_>, start: Vec<f64>) -> Option<f64> {
         let (centre, curvature) = self.peak(data, &[start])?;
         let log_determinant = curvature.cholesky()?.determinant().ln();
         let half_count = 0.5 * centre.len() as f64;
@@ -155,8 +158,48 @@ impl JointChange {
         Some(log + half_count * (2.0 * PI).ln() - 0.5 * log_determinant)
     }
 
+    /// Returns the change of one stiffness alone.
+    fn alone(&self, index: usize) -> Self {
+        Self {
+            directions: vec![self.directions[index]],
+            half_widths: vec![self.half_widths[index]],
+            most: vec![self.most[index]],
+        }
+    }
+
+    /// Returns the number of ways in which the joint may change: each stiffness alone, and all together.
+    fn ways(&self) -> f64 {
+        match self.directions.len() {
+            1 => 1.0,
+            _ => self.directions.iter().filter(|one| **one < 2).count() as f64 + 1.0,
+        }
+    }
+
+    /// Returns the logarithm of the evidence of a change of one stiffness, near this size.
+    pub(crate) fn log_evidence_alone(
+        &self,
+        data: &Data<'_>,
+        index: usize,
+        size: f64,
+    ) -> Option<f64> {
+        let evidence = self.alone(index).log_evidence_near(data, vec![size])?;
+        Some(evidence - self.ways().ln())
+    }
+
     /// Returns the posterior of a change; `None` where the search fails.
     pub(crate) fn posterior(&self, data: &Data<'_>) -> Option<Posterior> {
+        let mut found = self.posterior_of_all(data)?;
+        if self.directions.len() > 1 {
+            let single = (0..self.directions.len()).filter(|index| self.directions[*index] < 2);
+            let alone = single.filter_map(|index| self.alone(index).posterior_of_all(data));
+            let mut logs: Vec<f64> = alone.map(|one| one.log_evidence).collect();
+            logs.push(found.log_evidence);
+            found.log_evidence = log_sum(logs.into_iter()) - self.ways().ln();
+        }
+        Some(found)
+    }
+
+    fn posterior_of_all(&self, data: &Data<'_>) -> Option<Posterior> {
         // The prior's long tails may leave two optima: one near no change, and one beyond.
         let starts = [0.0, 1.0, -1.0].map(|share| {
             let widths = self.half_widths.iter();

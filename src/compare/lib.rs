@@ -11,12 +11,15 @@
 //!               limits      the smallest change of the joint that would be seen
 //!               verdict     probabilities and the answer
 //!               result      the answer
+//! Test, ..   -> series      control charts of many tests, and the first that differs from those before
+//!               change_point  how much the last tests differ from those before, and may by chance
 //! ```
 //!
 //! A model misses many small things of a real structure. Both tests share them, so that they cancel in the ratio of two
 //! frequencies; what is left is what changed between the tests. This crate sees no recording.
 
 mod cause;
+mod change_point;
 mod joint;
 mod likelihood;
 mod limits;
@@ -24,6 +27,7 @@ mod matching;
 mod model;
 mod result;
 mod search;
+mod series;
 mod test;
 #[cfg(test)]
 mod tests;
@@ -35,7 +39,12 @@ pub use result::{
     CauseResult, ChangeVerdict, Comparison, Interval, JointResult, MatchedMode, ModeChange,
     RepeatabilityOrigin, RepeatabilityResult, StiffnessChange, VerdictKind,
 };
-pub use test::{CompareError, Item, ItemKind, MOST_PAIRS, MeasuredMode, Pair, Settings, Test};
+pub use series::{
+    ChartPoint, Charted, ControlChart, Departure, LEAST_SERIES, MOST_SERIES, Series, Watched, watch,
+};
+pub use test::{
+    CompareError, Item, ItemKind, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Settings, Test,
+};
 
 use cause::Cause;
 use joint::JointChange;

@@ -73,7 +73,8 @@ fn is_seen(
     }
     let data = Data::new(&planned, settings);
     let log_nothing = data.log_density(&nothing) + CauseKind::NoChange.prior().ln();
-    let log_joint = change.log_evidence_near(&data, steps)? + CauseKind::JointChange.prior().ln();
+    let log_joint =
+        change.log_evidence_alone(&data, index, step)? + CauseKind::JointChange.prior().ln();
     let probability = 1.0 / (1.0 + (log_joint - log_nothing).exp());
     Some(probability <= SEEN)
 }

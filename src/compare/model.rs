@@ -122,10 +122,13 @@ fn logs_of(solved: &BeamModes, modes: &[usize]) -> Vec<f64> {
 
 /// Returns logarithms of the frequencies of these modes (Hz) of a structure near to one whose modes are known.
 fn logs_near(near: &BeamModes, structure: &Specimen, modes: &[usize]) -> Option<Vec<f64>> {
-    match near.perturbed(structure).ok()? {
-        Some(moved) => Some(logs_of(&moved, modes)),
-        None => Some(logs_of(&solved(structure, modes).ok()?, modes)),
-    }
+    let moved = match near.perturbed(structure).ok()? {
+        Some(moved) => moved,
+        None => solved(structure, modes).ok()?,
+    };
+    let logs = logs_of(&moved, modes);
+    // A beam that a load buckles has no lowest frequency.
+    logs.iter().all(|log| log.is_finite()).then_some(logs)
 }
 
 /// Returns logarithms of the frequencies of these modes (Hz).
@@ -447,6 +450,24 @@ impl PairModel {
         })
     }
 
+    /// Returns the measured change (logarithm) beyond the described one and its variance by the readings, from the first test
+    /// before to another test.
+    ///
+    /// # Errors
+    /// The described structure of the other test has no modes.
+    pub(crate) fn beyond(
+        &self,
+        first: &Test,
+        other: &Test,
+    ) -> Result<[Vec<f64>; 2], StructureError> {
+        let pair = Pair {
+            before: vec![first.clone()],
+            after: vec![other.clone()],
+        };
+        let found = Differences::new(&pair, &self.modes, &self.centre)?;
+        Ok([found.measured, found.reading])
+    }
+
     /// Returns the directions in which the joint may change.
     pub(crate) fn joint_directions(&self) -> Vec<usize> {
         let mut directions = finite_directions(&self.centre.after);
@@ -460,13 +481,18 @@ impl PairModel {
 
     /// Returns the change that a change of the joint makes; in a rigid direction a negative one is a joint that gave before.
     pub(crate) fn predict_joint(&self, directions: &[usize], steps: &[f64]) -> Option<Predicted> {
-        let change = self.joint_shifted(&self.centre, directions, steps)?;
+        let change = self.joint_change(directions, steps)?;
         let mut aside = Vec::with_capacity(self.aside.len());
         for structures in &self.aside {
             let moved = self.joint_shifted(structures, directions, steps)?;
             aside.push(difference(&moved, &change));
         }
         Some(Predicted { change, aside })
+    }
+
+    /// Returns the change that a change of the joint makes, without its uncertainty.
+    pub(crate) fn joint_change(&self, directions: &[usize], steps: &[f64]) -> Option<Vec<f64>> {
+        self.joint_shifted(&self.centre, directions, steps)
     }
 
     fn joint_shifted(

@@ -3,7 +3,7 @@
 //! A change is nearly proportional to its size. Its ratio to the size is solved at a few sizes and interpolated, so that
 //! sums over many sizes need few solutions.
 
-use crate::cause::Cause;
+use crate::cause::{Cause, CauseKind};
 use crate::likelihood::{Data, log_sum};
 use crate::model::{PairModel, Predicted};
 use rayon::prelude::*;
@@ -30,6 +30,10 @@ pub(crate) struct Posterior {
 
 /// Sizes at which a change is solved, over the largest one.
 const NODES: [f64; 4] = [0.01, 0.15, 0.5, 1.0];
+
+/// Safety of the largest load against buckling (1), and the smallest share of the range to which it is lowered.
+const FROM_BUCKLING: f64 = 1.5;
+const LEAST_SHARE: f64 = 0.01;
 
 /// Change over size at some sizes of one sign.
 struct Branch {
@@ -110,6 +114,14 @@ impl Curve {
             positive = Branch::new(pair, cause, place, &NODES.map(|share| share * high));
         }
         if low < 0.0 && !pair.is_odd(cause) {
+            let mut low = low;
+            // Near the load that buckles the beam no polynomial follows the frequencies.
+            while cause.kind == CauseKind::AxialLoad
+                && low < LEAST_SHARE * cause.range[0]
+                && pair.predict(cause, FROM_BUCKLING * low, place).is_none()
+            {
+                low *= 0.7;
+            }
             negative = Branch::new(pair, cause, place, &NODES.map(|share| share * low));
         }
         Self { negative, positive }

@@ -97,6 +97,18 @@ pub enum CompareError {
         /// Most pairs.
         most: usize,
     },
+    /// Too few or too many tests of a series.
+    #[error(
+        "a series of {count} tests: between {least} and {most} are needed, in the order of time"
+    )]
+    Series {
+        /// Number of tests.
+        count: usize,
+        /// Least number.
+        least: usize,
+        /// Largest number.
+        most: usize,
+    },
     /// A repeatability that no measurement has.
     #[error("the repeatability is {value}, but must lie between {least} and {most}")]
     Repeatability {
@@ -126,6 +138,8 @@ pub enum CompareError {
 const LEAST_MODES: usize = 3;
 /// Most pairs that share one change: their residuals are compared together.
 pub const MOST_PAIRS: usize = 16;
+/// Most repeats on one side of a change.
+pub const MOST_REPEATS: usize = 100;
 /// Limits of a stated repeatability (1).
 const REPEATABILITY: [f64; 2] = [1e-6, 0.1];
 

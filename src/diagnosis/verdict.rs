@@ -51,7 +51,7 @@ pub struct GoodnessOfFit {
 #[derive(Debug, Clone, Copy)]
 pub struct DegreesOfFreedom {
     /// Frequencies of different modes and arrangements. Slopes along decays count for a nonlinear joint, damping
-    /// ratios for a lossy one.
+    /// ratios for a lossy one, shapes for an error of the set-up.
     pub data: usize,
     /// Parameters of joint and effects.
     pub parameters: usize,
@@ -59,12 +59,13 @@ pub struct DegreesOfFreedom {
 
 impl DegreesOfFreedom {
     /// Counts each fitted mode once for every set of sensor positions and added
-    /// masses, since these see other shapes and load other positions; slopes along decays, other levels and damping
-    /// ratios count for the effects that make them.
+    /// masses, since these see other shapes and load other positions; slopes along decays, other levels, damping
+    /// ratios and shapes count for the effects that make them.
     pub fn of(dataset: &Dataset, fit: &Fit) -> Self {
         let another_level = dataset.settings.thresholds.another_level;
         let [slips, damps] = [EffectId::JointNonlinearity, EffectId::JointDamping]
             .map(|wanted| fit.effects.iter().any(|one| one.is(wanted)));
+        let misplaces = fit.effects.iter().any(CandidateEffect::is_of_set_up);
         let mut seen: Vec<(usize, &Arrangement)> = Vec::new();
         let mut others = 0;
         for observable in &dataset.observables {
@@ -77,6 +78,7 @@ impl DegreesOfFreedom {
             }
             others += usize::from(slips && observable.is_slope());
             others += usize::from(damps && observable.is_damping());
+            others += usize::from(misplaces && observable.is_shape());
         }
         DegreesOfFreedom {
             data: seen.len() + others,

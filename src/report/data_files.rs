@@ -4,6 +4,7 @@
 use crate::ReportError;
 use crate::document::{Document, EstimateMethod, Uncertain, method_name};
 use crate::tables::estimated;
+use crate::words::series::quantity;
 use tapjoint_analysis::Frf;
 use tapjoint_signal::recording::{
     FrequencyResponse, FrequencyResponses, Point, RecordingError, UffFormat,
@@ -22,6 +23,9 @@ const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fal
 /// were changed alike, and `mode` the mode that was changed alone. `statistic` says how `kx`, `ky` and `kz`
 /// (values without unit, or percent) follow from the estimates.
 const PERTURBATION: &str = "method,kind,percent,mode,statistic,kx,ky,kz";
+/// Heads of the rows of a series of tests.
+const SERIES: &str =
+    "test,file,quantity,change_percent,score,last_tests,limit,low_percent,high_percent,differs";
 /// Heads of the table of frequency response functions.
 const FUNCTIONS: &str = "recording,response,form,unit,frequency_Hz,h1_real,h1_imaginary,h2_real,h2_imaginary,\
      hv_real,hv_imaginary,coherence,random_error";
@@ -143,6 +147,39 @@ pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
         }
     }
     write(TAPS, rows)
+}
+
+/// Returns a row for each test and chart of a series; only the header without one.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_series_csv(document: &Document) -> Result<String, ReportError> {
+    let mut rows = Vec::new();
+    if let Some(section) = &document.series {
+        for (test, file) in section.tests.iter().enumerate() {
+            for chart in &section.series.charts {
+                let point = &chart.points[test];
+                let [low, high] = match point.single_limits_percent {
+                    Some(ends) => ends.map(Some),
+                    None => [None; 2],
+                };
+                let differs = chart.departure.is_some_and(|one| test >= one.since);
+                rows.push(vec![
+                    (test + 1).to_string(),
+                    file.clone(),
+                    quantity(chart.quantity),
+                    number(Some(point.percent)),
+                    number(point.limit.map(|_| point.score)),
+                    point.last.to_string(),
+                    number(point.limit),
+                    number(low),
+                    number(high),
+                    differs.to_string(),
+                ]);
+            }
+        }
+    }
+    write(SERIES, rows)
 }
 
 /// Returns `perturbation.csv`; only its header where nothing was perturbed.

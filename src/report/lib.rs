@@ -21,6 +21,7 @@ pub mod charts {
     pub mod diagnosis;
     pub mod joint;
     pub mod modes;
+    pub mod series;
     pub mod spectra;
 }
 
@@ -29,25 +30,26 @@ pub mod words {
     pub mod comparison;
     pub mod diagnosis;
     pub mod findings;
+    pub mod series;
     pub(crate) mod sizes;
 }
 
 pub use data_files::{
     render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
-    render_perturbation_csv, render_taps_csv,
+    render_perturbation_csv, render_series_csv, render_taps_csv,
 };
 pub use document::{
     comparison_of, datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of,
-    prediction_of,
+    prediction_of, series_of,
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     MODEL_FILE, earlier_files, render_cloud_picture, render_comparison_picture, render_frf_picture,
-    render_json, render_run, render_schema, render_spectrum_picture,
+    render_json, render_run, render_schema, render_series_picture, render_spectrum_picture,
 };
 pub use text::{
-    render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,
-    render_text, wrapped,
+    render_comparison, render_gap_text, render_readings, render_reproduction, render_series,
+    render_stages, render_text, wrapped,
 };
 
 /// A finished file.

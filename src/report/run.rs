@@ -7,11 +7,11 @@ use serde_json::Value;
 use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint_signal::spectral::FrfEstimator;
 
-use crate::charts::comparison;
 use crate::charts::diagnosis::{gap, place_map};
 use crate::charts::joint::{cloud, frequencies, shapes};
 use crate::charts::modes::{amplitude, stabilisation};
 use crate::charts::spectra::{frf, spectrum, taps};
+use crate::charts::{comparison, series};
 use crate::document::Document;
 use crate::html::{InlineFigure, render_html};
 use crate::picture::{Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
@@ -119,6 +119,19 @@ pub fn render_comparison_picture(
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
     comparison::changes(document)
+        .map(|chart| chart.render(format))
+        .transpose()
+}
+
+/// The control charts of a series of tests as a picture; `None` without one.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_series_picture(
+    document: &Document,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    series::control_charts(document)
         .map(|chart| chart.render(format))
         .transpose()
 }

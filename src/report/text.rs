@@ -9,6 +9,7 @@ use crate::tables::{self, Column, Place, Table, listed};
 use crate::words::comparison::answer;
 use crate::words::diagnosis::gap_story;
 use crate::words::findings::{brief, no_estimate};
+use crate::words::series;
 use tapjoint_study::publication::{Agreement, Reproduction};
 
 /// Most taps listed one by one.
@@ -208,6 +209,18 @@ pub fn render_comparison(document: &Document) -> String {
         ),
     };
     joined([sentences.join(""), joined(tables.map(noted)), doubts])
+}
+
+/// Returns the answer of a series of tests and its charts as a table; then what changed, if anything did.
+pub fn render_series(document: &Document) -> String {
+    let sentences = document.series.iter().flat_map(series::answer);
+    let sentences: Vec<String> = sentences.map(|one| wrapped(&one, 2)).collect();
+    let charts = noted(tables::control_charts(document));
+    let change = match document.compare {
+        Some(_) => format!("Before and after:\n{}", render_comparison(document)),
+        None => String::new(),
+    };
+    joined([sentences.join(""), charts, change])
 }
 
 /// The story of the gap and the hypotheses; empty without a diagnosis.

@@ -38,7 +38,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
-use tapjoint_compare::Comparison;
+use tapjoint_compare::{Comparison, Series, Watched};
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::QualityVerdict;
@@ -103,9 +103,12 @@ pub struct Document {
     /// The gap between model and measurement: where, which effect, how far it closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<GapSection>,
-    /// What changed between two tests.
+    /// What changed between two tests, or in a series of tests.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compare: Option<Comparison>,
+    /// Control charts of a series of tests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub series: Option<SeriesSection>,
     /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<QualityVerdict>>,
@@ -256,6 +259,16 @@ pub fn prediction_of(name: &str, structure: &TestedStructure, modes: &[Predicted
     }
 }
 
+/// Control charts of a series of tests.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SeriesSection {
+    /// Files of the tests, in order.
+    pub tests: Vec<String>,
+    /// The charts.
+    #[serde(flatten)]
+    pub series: Series,
+}
+
 /// Returns the document of a comparison. `name` is that of the first test, `warnings` are those of all tests.
 pub fn comparison_of(
     name: &str,
@@ -271,6 +284,28 @@ pub fn comparison_of(
             .iter()
             .map(|warning| WarningSection::of(warning, false))
             .collect(),
+        ..Document::default()
+    }
+}
+
+/// Returns the document of a series of tests, whose files these are.
+pub fn series_of(
+    name: &str,
+    structure: &TestedStructure,
+    tests: Vec<String>,
+    found: Watched,
+    warnings: Vec<Warning>,
+) -> Document {
+    let warnings = warnings.iter();
+    Document {
+        version: VERSION,
+        test: Some(test_section(name, Some(structure))),
+        compare: found.change,
+        series: Some(SeriesSection {
+            tests,
+            series: found.series,
+        }),
+        warnings: warnings.map(|one| WarningSection::of(one, false)).collect(),
         ..Document::default()
     }
 }

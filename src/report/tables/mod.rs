@@ -5,6 +5,7 @@ mod diagnosis;
 mod joint;
 mod modes;
 mod recordings;
+mod series;
 
 pub use comparison::{changed_modes, changes};
 pub use diagnosis::{hypotheses, next_tests};
@@ -21,6 +22,7 @@ pub use recordings::{
     channels, conditions, datasets, hammer, quality, quality_all, quality_count, quality_doubts,
     recordings, rejected_taps, taps, taps_used,
 };
+pub use series::control_charts;
 
 use crate::document::{Document, ModeSection, ReadBy};
 use crate::format::MISSING;

@@ -50,6 +50,7 @@ pub fn document() -> Document {
         resolution_span: Some(vec![span()]),
         gap: None,
         compare: None,
+        series: None,
         quality: Some(quality()),
         warnings: vec![
             WarningSection {

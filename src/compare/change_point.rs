@@ -1,0 +1,238 @@
+//! Whether the last tests of a series differ from those before them, and by how much they may by chance.
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+/// Probability that any chart leaves its limit at a test although nothing changed (1). Real tests have somewhat longer tails
+/// than the drawn ones: one in 200 remains.
+const FALSE_ALARM: f64 = 1.0 / 250.0;
+/// Numbers of last tests that are compared with those before.
+const WINDOWS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 11, 15, 20, 28, 40];
+/// Least degrees of freedom of a scatter that the tests themselves tell.
+const LEAST_FREEDOM: usize = 3;
+/// Degrees of freedom of the scatter of tests, Student's distribution: it has longer tails than the normal one.
+const TAILS: usize = 5;
+/// Drawn series, and tests of each. Later limits are the mean of the last ones.
+const DRAWN: usize = 2000;
+const DRAWN_TESTS: usize = 60;
+const LAST_LIMITS: usize = 20;
+/// Seed of the drawn series: the limits are the same every time.
+const SEED: u64 = 0x5e41e5;
+
+/// Sums over the tests so far.
+#[derive(Debug, Clone)]
+pub(crate) struct Moments {
+    /// Sum of the first n values, and of their squares, from n = 0.
+    sums: Vec<[f64; 2]>,
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        Self {
+            sums: vec![[0.0; 2]],
+        }
+    }
+}
+
+impl Moments {
+    /// Adds the value of the next test.
+    pub(crate) fn add(&mut self, value: f64) {
+        let [sum, squares] = self.sums[self.sums.len() - 1];
+        self.sums.push([sum + value, squares + value * value]);
+    }
+}
+
+/// The last tests that differ most from those before.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Unlike {
+    /// Difference of the means.
+    pub(crate) difference: f64,
+    /// The difference as a normal variable with standard deviation 1.
+    pub(crate) score: f64,
+    /// Number of last tests.
+    pub(crate) last: usize,
+    /// Standard deviation of one test.
+    pub(crate) std: f64,
+}
+
+/// Standard deviation of one test.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Scatter {
+    /// It is known.
+    Known(f64),
+    /// The scatter about both means tells it; it is not less than this.
+    AtLeast(f64),
+}
+
+/// Scatter of a test about the means, and how many degrees of freedom the difference of the means has.
+struct Judged {
+    std: f64,
+    freedom: f64,
+    /// Standard deviation of the difference of the means, over that of Student's t.
+    unit: f64,
+}
+
+/// Returns how the mean of `last` tests is judged against that of the `first` ones, with this sum of squares about both means.
+fn judged(scatter: Scatter, first: usize, last: usize, squares: f64) -> Judged {
+    let (std, freedom) = match scatter {
+        Scatter::Known(std) => (std, f64::INFINITY),
+        Scatter::AtLeast(least) => {
+            let freedom = (first + last - 2) as f64;
+            ((squares / freedom).max(0.0).sqrt().max(least), freedom)
+        }
+    };
+    let share = (1.0 / first as f64 + 1.0 / last as f64).sqrt();
+    // A mean of several tests has shorter tails than one: the excess of a sum falls as one over their number.
+    let tails = (4 + (TAILS - 4) * last.min(first)) as f64;
+    Judged {
+        std,
+        freedom: (freedom.recip() + tails.recip()).recip(),
+        unit: std * share * ((tails - 2.0) / tails).sqrt(),
+    }
+}
+
+/// Returns true where the scatter is known or can be told by so many tests.
+fn is_known(scatter: Scatter, count: usize) -> bool {
+    matches!(scatter, Scatter::Known(_)) || count >= LEAST_FREEDOM + 2
+}
+
+/// Returns the last tests that differ most from those before; `None` where too few tests are known.
+pub(crate) fn most_unlike(moments: &Moments, scatter: Scatter) -> Option<Unlike> {
+    let count = moments.sums.len() - 1;
+    let [total, squares] = moments.sums[count];
+    let mut best: Option<Unlike> = None;
+    if !is_known(scatter, count) {
+        return None;
+    }
+    for last in WINDOWS.into_iter().filter(|last| *last < count) {
+        let first = count - last;
+        let [sum, _] = moments.sums[first];
+        let before = sum / first as f64;
+        let after = (total - sum) / last as f64;
+        let about_means = squares - first as f64 * before * before - last as f64 * after * after;
+        let own = judged(scatter, first, last, about_means);
+        let ratio = (after - before) / own.unit;
+        let highest = best.map_or(0.0, |best| best.score.abs());
+        // A score is smaller than its t: this saves most logarithms.
+        if ratio.abs() <= highest {
+            continue;
+        }
+        let score = normal_score(ratio, own.freedom);
+        if score.abs() > highest {
+            best = Some(Unlike {
+                difference: after - before,
+                score,
+                last,
+                std: own.std,
+            });
+        }
+    }
+    best
+}
+
+/// Returns the ends between which a single next test has a score within a limit; `None` where too few tests are known.
+pub(crate) fn single_limits(moments: &Moments, scatter: Scatter, limit: f64) -> Option<[f64; 2]> {
+    let first = moments.sums.len() - 1;
+    if first == 0 || !is_known(scatter, first + 1) {
+        return None;
+    }
+    let [sum, squares] = moments.sums[first];
+    let before = sum / first as f64;
+    let own = judged(scatter, first, 1, squares - first as f64 * before * before);
+    let size = limit * (8.0 * own.freedom + 3.0) / (8.0 * own.freedom + 1.0);
+    let t = (own.freedom * (size * size / own.freedom).exp_m1()).sqrt();
+    Some([-t, t].map(|t| before + t * own.unit))
+}
+
+/// Returns the normal variable that is as improbable as Student's t (Wallace 1959, "Bounds on normal approximations to
+/// Student's and the chi-square distributions", Ann. Math. Statist. 30, 1121).
+fn normal_score(t: f64, freedom: f64) -> f64 {
+    let size = (freedom * (t * t / freedom).ln_1p()).sqrt();
+    size.copysign(t) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)
+}
+
+/// Limits of the score after each number of tests.
+pub(crate) struct Limits {
+    /// Limit after n + 1 tests.
+    by_count: Vec<Option<f64>>,
+}
+
+impl Limits {
+    /// Draws series in which nothing changes, and takes the limits that one in 250 leaves at each test, of those that did
+    /// not leave them before. `levers` has a row for each chart: how it follows from the frequencies. The scatter of the first
+    /// `known` charts is known.
+    pub(crate) fn new(levers: &DMatrix<f64>, known: usize, tests: usize) -> Self {
+        let drawn = tests.min(DRAWN_TESTS);
+        let scatters = levers.row_iter().enumerate();
+        let scatters = scatters.map(|(chart, row)| match chart < known {
+            true => Scatter::Known(row.norm()),
+            false => Scatter::AtLeast(f64::MIN_POSITIVE),
+        });
+        let scatters: Vec<Scatter> = scatters.collect();
+        let most: Vec<Vec<f64>> = (0..DRAWN)
+            .into_par_iter()
+            .map(|series| highest_scores(levers, &scatters, drawn, series))
+            .collect();
+        let mut remaining: Vec<usize> = (0..DRAWN).collect();
+        let mut by_count: Vec<Option<f64>> = Vec::with_capacity(drawn);
+        for test in 0..drawn {
+            if most[0][test] == 0.0 {
+                by_count.push(None);
+                continue;
+            }
+            let mut scores: Vec<f64> = remaining.iter().map(|one| most[*one][test]).collect();
+            let rank = ((1.0 - FALSE_ALARM) * scores.len() as f64) as usize;
+            let rank = rank.min(scores.len() - 1);
+            let (_, limit, _) = scores.select_nth_unstable_by(rank, f64::total_cmp);
+            let limit = *limit;
+            remaining.retain(|one| most[*one][test] <= limit);
+            by_count.push(Some(limit));
+        }
+        Self { by_count }
+    }
+
+    /// Returns the limit after this number of tests; `None` where too few are known.
+    pub(crate) fn at(&self, tests: usize) -> Option<f64> {
+        if let Some(limit) = self.by_count.get(tests - 1) {
+            return *limit;
+        }
+        let last = self.by_count.len().saturating_sub(LAST_LIMITS);
+        let known: Vec<f64> = self.by_count[last..].iter().flatten().copied().collect();
+        (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    }
+}
+
+/// Returns the highest score of all charts after each test of a drawn series; 0 where too few are known.
+fn highest_scores(
+    levers: &DMatrix<f64>,
+    scatters: &[Scatter],
+    tests: usize,
+    series: usize,
+) -> Vec<f64> {
+    let mut draw = ChaCha8Rng::seed_from_u64(SEED);
+    draw.set_stream(series as u64);
+    let mut moments = vec![Moments::default(); scatters.len()];
+    let mut all = Vec::with_capacity(tests);
+    for _ in 0..tests {
+        let errors = DVector::from_fn(levers.ncols(), |_, _| scatter(&mut draw));
+        let values = levers * errors;
+        let mut highest = 0.0_f64;
+        for ((moments, value), scatter) in moments.iter_mut().zip(values.iter()).zip(scatters) {
+            moments.add(*value);
+            let found = most_unlike(moments, *scatter);
+            highest = highest.max(found.map_or(0.0, |found| found.score.abs()));
+        }
+        all.push(highest);
+    }
+    all
+}
+
+/// Draws the scatter of a test with standard deviation 1: Student's t with [`TAILS`] degrees of freedom.
+fn scatter(draw: &mut ChaCha8Rng) -> f64 {
+    let mut normal = || -> f64 { StandardNormal.sample(draw) };
+    let squares: f64 = (0..TAILS).map(|_| normal().powi(2)).sum();
+    normal() * ((TAILS - 2) as f64 / squares).sqrt()
+}

@@ -1,0 +1,46 @@
+//! Table of a series of tests.
+
+use super::{Table, number, words};
+use crate::document::Document;
+use crate::format::{MISSING, capital, or_missing, signed_percent, significant};
+use crate::words::series::quantity;
+
+/// The control charts, a row each; `None` without a series.
+pub fn control_charts(document: &Document) -> Option<Table> {
+    let section = document.series.as_ref()?;
+    let rows = section.series.charts.iter().map(|chart| {
+        let last = chart.points.last();
+        let departure = chart.departure;
+        let limit = last.and_then(|last| last.limit);
+        [
+            words("Chart", capital(&quantity(chart.quantity))),
+            number("Scatter (%)", significant(chart.scatter_percent, 2)),
+            number("Last test (%)", percent(last.map(|last| last.percent))),
+            number(
+                "Score",
+                or_missing(last.map(|last| significant(last.score, 2))),
+            ),
+            number(
+                "Limit",
+                or_missing(limit.map(|limit| significant(limit, 2))),
+            ),
+            words(
+                "Differs",
+                departure.map_or(MISSING.to_owned(), |one| {
+                    format!("from test {}, seen at test {}", one.since + 1, one.test + 1)
+                }),
+            ),
+            number("By (%)", percent(departure.map(|one| one.percent))),
+        ]
+    });
+    Some(Table::of(
+        "Control charts",
+        rows,
+        "Score: how much the last tests differ from those before, in standard deviations. By chance it exceeds the limit \
+         once in 200 tests or less often, all charts together.",
+    ))
+}
+
+fn percent(value: Option<f64>) -> String {
+    or_missing(value.map(|value| signed_percent(Some(value)).replace(" %", "")))
+}

@@ -48,9 +48,7 @@ impl Moments {
 /// The last tests that differ most from those before.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Unlike {
-    /// Difference of the means.
-    pub(crate) difference: f64,
-    /// The difference as a normal variable with standard deviation 1.
+    /// Difference of the means as a normal variable with standard deviation 1.
     pub(crate) score: f64,
     /// Number of last tests.
     pub(crate) last: usize,
@@ -99,34 +97,76 @@ fn is_known(scatter: Scatter, count: usize) -> bool {
     matches!(scatter, Scatter::Known(_)) || count >= LEAST_FREEDOM + 2
 }
 
+/// Means of the first and the last tests, and how they are judged.
+struct Parted {
+    difference: f64,
+    judged: Judged,
+}
+
+/// Parts the tests before the last ones.
+fn parted(moments: &Moments, scatter: Scatter, last: usize) -> Parted {
+    let count = moments.sums.len() - 1;
+    let [total, squares] = moments.sums[count];
+    let first = count - last;
+    let [sum, _] = moments.sums[first];
+    let before = sum / first as f64;
+    let after = (total - sum) / last as f64;
+    let about_means = squares - first as f64 * before * before - last as f64 * after * after;
+    Parted {
+        difference: after - before,
+        judged: judged(scatter, first, last, about_means),
+    }
+}
+
+/// A step to which the last tests belong.
+pub(crate) struct Step {
+    /// Number of tests after it.
+    pub(crate) last: usize,
+    /// Difference of the means.
+    pub(crate) difference: f64,
+}
+
+/// Returns the most probable step: that with the least sum of squares about the means before and after.
+pub(crate) fn most_probable_step(moments: &Moments) -> Step {
+    let count = moments.sums.len() - 1;
+    let mut best = Step {
+        last: 1,
+        difference: 0.0,
+    };
+    let mut most = f64::NEG_INFINITY;
+    for last in 1..count.min(WINDOWS[WINDOWS.len() - 1] + 1) {
+        let difference = parted(moments, Scatter::Known(1.0), last).difference;
+        // By this much a step lowers the sum of squares.
+        let explained = difference * difference * (count - last) as f64 * last as f64;
+        if explained > most {
+            most = explained;
+            best = Step { last, difference };
+        }
+    }
+    best
+}
+
 /// Returns the last tests that differ most from those before; `None` where too few tests are known.
 pub(crate) fn most_unlike(moments: &Moments, scatter: Scatter) -> Option<Unlike> {
     let count = moments.sums.len() - 1;
-    let [total, squares] = moments.sums[count];
     let mut best: Option<Unlike> = None;
     if !is_known(scatter, count) {
         return None;
     }
     for last in WINDOWS.into_iter().filter(|last| *last < count) {
-        let first = count - last;
-        let [sum, _] = moments.sums[first];
-        let before = sum / first as f64;
-        let after = (total - sum) / last as f64;
-        let about_means = squares - first as f64 * before * before - last as f64 * after * after;
-        let own = judged(scatter, first, last, about_means);
-        let ratio = (after - before) / own.unit;
+        let own = parted(moments, scatter, last);
+        let ratio = own.difference / own.judged.unit;
         let highest = best.map_or(0.0, |best| best.score.abs());
         // A score is smaller than its t: this saves most logarithms.
         if ratio.abs() <= highest {
             continue;
         }
-        let score = normal_score(ratio, own.freedom);
+        let score = normal_score(ratio, own.judged.freedom);
         if score.abs() > highest {
             best = Some(Unlike {
-                difference: after - before,
                 score,
                 last,
-                std: own.std,
+                std: own.judged.std,
             });
         }
     }
@@ -236,3 +276,6 @@ fn scatter(draw: &mut ChaCha8Rng) -> f64 {
     let squares: f64 = (0..TAILS).map(|_| normal().powi(2)).sum();
     normal() * ((TAILS - 2) as f64 / squares).sqrt()
 }
+
+#[cfg(test)]
+mod tests;

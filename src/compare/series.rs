@@ -5,7 +5,9 @@
 //! for statistical process control"). One test far off is seen at once, and a slow drift after some tests. No test has to be
 //! declared healthy.
 
-use crate::change_point::{Limits, Moments, Scatter, most_unlike, single_limits};
+use crate::change_point::{
+    Limits, Moments, Scatter, most_probable_step, most_unlike, single_limits,
+};
 use crate::joint::JointChange;
 use crate::matching::match_modes;
 use crate::model::PairModel;
@@ -265,10 +267,11 @@ fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -
                 std = found.std;
             }
             if departure.is_none() && found.score.abs() > limit {
+                let step = most_probable_step(&moments);
                 departure = Some(Departure {
                     test,
-                    since: test + 1 - found.last,
-                    percent: percent(found.difference),
+                    since: test + 1 - step.last,
+                    percent: percent(step.difference),
                 });
             }
         }

@@ -14,6 +14,8 @@ pub(crate) struct Candidate {
     pub(crate) item: Option<String>,
     /// Logarithm of its evidence.
     pub(crate) log_evidence: f64,
+    /// Logarithm of the density of the data at its most probable size and place.
+    log_best: f64,
     /// Goodness of fit; `None` for an unknown change.
     pub(crate) goodness: Option<f64>,
     /// Its sizes and its place; empty for no change and an unknown one.
@@ -43,6 +45,10 @@ const SURE: f64 = 0.9;
 const PERHAPS_NOTHING: f64 = 0.05;
 /// Probability of no change from which on it is the answer.
 const PROBABLY_NOTHING: f64 = 0.5;
+/// Probability from which on a cause of another kind that fits as well as the first is listed with it, and by how much the
+/// logarithm of its density may be lower: two standard deviations.
+const LEAST_RIVAL: f64 = 0.001;
+const SEPARATE: f64 = 2.0;
 /// Goodness of fit below which a cause does not explain the changes.
 const NO_FIT: f64 = 0.01;
 /// Standard deviations that a size must be away from zero.
@@ -117,6 +123,7 @@ impl Candidate {
             kind,
             item: None,
             log_evidence,
+            log_best: log_evidence,
             goodness,
             parameters: BTreeMap::new(),
             explains: Vec::new(),
@@ -131,7 +138,7 @@ impl Candidate {
             posterior.log_evidence,
             Some(data.goodness(&posterior.best, joint.directions.len())),
         );
-        candidate.explain(posterior);
+        candidate.explain(data, posterior);
         for (index, name) in joint.names(&data.pairs[0]).into_iter().enumerate() {
             let step = interval(posterior, index, |step| step);
             candidate.has_clear_size |= is_clear(step);
@@ -161,7 +168,7 @@ impl Candidate {
             Some(data.goodness(&posterior.best, fitted)),
         );
         candidate.item.clone_from(&cause.item);
-        candidate.explain(posterior);
+        candidate.explain(data, posterior);
         let name = match cause.kind {
             CauseKind::LostMass | CauseKind::AddedMass => "mass",
             CauseKind::LocalCrack => "compliance",
@@ -197,7 +204,8 @@ impl Candidate {
         candidate
     }
 
-    fn explain(&mut self, posterior: &Posterior) {
+    fn explain(&mut self, data: &Data<'_>, posterior: &Posterior) {
+        self.log_best = data.log_density(&posterior.best);
         let changes = posterior.best.iter().flat_map(|pair| &pair.change);
         self.explains = changes.map(|one| 100.0 * one.exp_m1()).collect();
     }
@@ -263,29 +271,30 @@ pub(crate) fn verdict(candidates: &[Candidate], probabilities: &[f64]) -> Change
             return answer(VerdictKind::Unknown, &[], 1.0 - nothing);
         }
         if let Some(&index) = explained.first() {
-            let leads = order[0] == index;
             let own = &candidates[index];
-            if leads && probabilities[index] >= SURE && own.has_clear_size {
-                return answer(VerdictKind::Named, &[index], probabilities[index]);
-            }
-            let members: Vec<usize> = explained
-                .iter()
-                .copied()
-                .filter(|one| candidates[*one].kind.is_like(own.kind))
-                .collect();
-            let together: f64 = members.iter().map(|one| probabilities[*one]).sum();
-            if leads && together >= SURE && own.has_clear_size {
-                // Those without which it would be no group are enough.
+            // A place or a size that is improbable beforehand is no reason to leave out what fits as well.
+            let is_rival = |one: usize| {
+                !candidates[one].kind.is_like(own.kind)
+                    && probabilities[one] >= LEAST_RIVAL
+                    && candidates[one].log_best > own.log_best - SEPARATE
+            };
+            let is_alike = |one: usize| candidates[one].kind.is_like(own.kind);
+            let alike = explained.iter().filter(|one| is_alike(**one));
+            let together: f64 = alike.map(|one| probabilities[*one]).sum();
+            if order[0] == index && together >= SURE && own.has_clear_size {
+                // Of those that are alike, enough to be sure.
                 let mut chosen = Vec::new();
                 let mut sum = 0.0;
-                for member in members {
-                    chosen.push(member);
-                    sum += probabilities[member];
-                    if sum >= SURE {
-                        break;
+                for one in explained {
+                    if is_alike(one) && sum < SURE || is_rival(one) {
+                        chosen.push(one);
+                        sum += probabilities[one];
                     }
                 }
-                return answer(VerdictKind::Group, &chosen, together);
+                return match chosen.len() {
+                    1 => answer(VerdictKind::Named, &chosen, probabilities[index]),
+                    _ => answer(VerdictKind::Group, &chosen, sum),
+                };
             }
         }
     }

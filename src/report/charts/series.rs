@@ -50,7 +50,7 @@ fn panel(chart: &ControlChart, section: &SeriesSection) -> Panel {
         own.push(at, point.percent);
         own.words
             .push(format!("test {}: {}", test + 1, section.tests[test]));
-        own.said.push(signed_percent(Some(point.percent)));
+        own.said.push(signed_percent(Some(point.percent)) + " %");
     }
     band.x = Places::Each(places);
     let x = Axis::linear(0.5, count as f64 + 0.5).of("test", "");

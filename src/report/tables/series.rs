@@ -2,7 +2,7 @@
 
 use super::{Table, number, words};
 use crate::document::Document;
-use crate::format::{MISSING, capital, or_missing, signed_percent, significant};
+use crate::format::{capital, or_missing, signed_percent, significant};
 use crate::words::series::quantity;
 
 /// The control charts, a row each; `None` without a series.
@@ -15,7 +15,7 @@ pub fn control_charts(document: &Document) -> Option<Table> {
         [
             words("Chart", capital(&quantity(chart.quantity))),
             number("Scatter (%)", significant(chart.scatter_percent, 2)),
-            number("Last test (%)", percent(last.map(|last| last.percent))),
+            number("Last (%)", percent(last.map(|last| last.percent))),
             number(
                 "Score",
                 or_missing(last.map(|last| significant(last.score, 2))),
@@ -24,21 +24,21 @@ pub fn control_charts(document: &Document) -> Option<Table> {
                 "Limit",
                 or_missing(limit.map(|limit| significant(limit, 2))),
             ),
-            words(
-                "Differs",
-                departure.map_or(MISSING.to_owned(), |one| {
-                    format!("from test {}, seen at test {}", one.since + 1, one.test + 1)
-                }),
-            ),
+            number("Since test", one_based(departure.map(|one| one.since))),
+            number("Seen at test", one_based(departure.map(|one| one.test))),
             number("By (%)", percent(departure.map(|one| one.percent))),
         ]
     });
     Some(Table::of(
         "Control charts",
         rows,
-        "Score: how much the last tests differ from those before, in standard deviations. By chance it exceeds the limit \
-         once in 200 tests or less often, all charts together.",
+        "Last: change of the last test since the first. Score: how much the last tests differ from those before, in standard \
+         deviations. By chance any score exceeds its limit once in 200 tests.",
     ))
+}
+
+fn one_based(index: Option<usize>) -> String {
+    or_missing(index.map(|index| index + 1))
 }
 
 fn percent(value: Option<f64>) -> String {

@@ -1,8 +1,9 @@
 //! Sentences about a series of tests.
 
 use crate::document::SeriesSection;
-use crate::format::{signed_percent, significant};
+use crate::format::signed_percent;
 use tapjoint_compare::Charted;
+use tapjoint_numerics::stats::times;
 
 /// Returns what a chart shows, in words.
 pub fn quantity(charted: Charted) -> String {
@@ -20,7 +21,7 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
     let count = section.tests.len();
     let mut sentences = Vec::new();
     match series.departure() {
-        None => sentences.push(format!("No change: the {count} tests agree on all charts.")),
+        None => sentences.push(format!("No change: the {count} tests agree.")),
         Some((chart, departure)) => {
             let of_chart = quantity(chart.quantity);
             sentences.push(format!(
@@ -29,17 +30,16 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
                 section.tests[departure.test]
             ));
             sentences.push(format!(
-                "The chart of {of_chart} shows it first: {} from test {} on, {} scatters of one test.",
+                "The chart of {of_chart} shows it first: {} % from test {} on, {} standard deviations of one test.",
                 signed_percent(Some(departure.percent)),
                 departure.since + 1,
-                significant((departure.percent / chart.scatter_percent).abs(), 2)
+                times(departure.percent / chart.scatter_percent)
             ));
         }
     }
     sentences.push(match series.is_stated {
         true => "Repeatability: as stated.".to_owned(),
-        false => "Repeatability: by the scatter of the tests themselves. --repeatability makes the first charts sharper."
-            .to_owned(),
+        false => "Repeatability: by the scatter of the tests themselves.".to_owned(),
     });
     let known = series.charts.iter().flat_map(|chart| &chart.points);
     if known.clone().all(|point| point.limit.is_none()) {

@@ -8,22 +8,24 @@
 //! "Visible" are the pairs in which the change alone has a chi square of 14.9 or more: one in a hundred false alarms and one
 //! in ten misses, for an observer who knows what to look for. A first cause is right where its group is.
 //!
-//! `cargo run --release --example compare_study -- [--pairs N | --series N] [--seed S] [--cell NAME] [--list]`
+//! `cargo run --release --example compare_study -- [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--list]`
 //!
 //! `--series N`: series of tests in the order of time instead, N for each delay and ten times as many in which nothing changes.
+//!
+//! `--smallest N`: the smallest change of the joint that is seen, on about N cantilevers.
 //!
 //! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
 //! of threads.
 
 mod draw;
 mod series;
+mod smallest;
 
 use draw::{Cell, Drawn};
 use rayon::prelude::*;
 use tapjoint::compare::{CauseKind, Comparison, VerdictKind, compare};
 
-const USAGE: &str =
-    "usage: compare_study [--pairs N | --series N] [--seed S] [--cell NAME] [--list]";
+const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--list]";
 /// Structures drawn for one pair until one of them can be.
 const ATTEMPTS: u64 = 50;
 /// Chi square of a visible change.
@@ -93,7 +95,7 @@ impl Row {
 
 fn main() -> Result<(), String> {
     let (mut pairs, mut seed, mut cells, mut list) = (20_usize, 1_u64, Vec::new(), false);
-    let mut series = None;
+    let (mut series, mut smallest) = (None, None);
     let mut given = std::env::args().skip(1);
     while let Some(name) = given.next() {
         if name == "--list" {
@@ -104,6 +106,7 @@ fn main() -> Result<(), String> {
         match name.as_str() {
             "--pairs" => pairs = value.parse().map_err(|_| USAGE)?,
             "--series" => series = Some(value.parse().map_err(|_| USAGE)?),
+            "--smallest" => smallest = Some(value.parse().map_err(|_| USAGE)?),
             "--seed" => seed = value.parse().map_err(|_| USAGE)?,
             "--cell" => cells.push(value),
             _ => return Err(USAGE.to_owned()),
@@ -111,6 +114,10 @@ fn main() -> Result<(), String> {
     }
     if let Some(series) = series {
         series::print_series(series, seed);
+        return Ok(());
+    }
+    if let Some(structures) = smallest {
+        smallest::print_smallest(structures, seed);
         return Ok(());
     }
     let mut tasks = Vec::new();

@@ -216,20 +216,17 @@ impl Limits {
             .into_par_iter()
             .map(|series| highest_scores(levers, &scatters, drawn, series))
             .collect();
-        let mut remaining: Vec<usize> = (0..DRAWN).collect();
+        let mut remaining = most;
         let mut by_count: Vec<Option<f64>> = Vec::with_capacity(drawn);
         for test in 0..drawn {
-            if most[0][test] == 0.0 {
-                by_count.push(None);
-                continue;
-            }
-            let mut scores: Vec<f64> = remaining.iter().map(|one| most[*one][test]).collect();
+            let mut scores: Vec<f64> = remaining.iter().map(|series| series[test]).collect();
             let rank = ((1.0 - FALSE_ALARM) * scores.len() as f64) as usize;
             let rank = rank.min(scores.len() - 1);
             let (_, limit, _) = scores.select_nth_unstable_by(rank, f64::total_cmp);
             let limit = *limit;
-            remaining.retain(|one| most[*one][test] <= limit);
-            by_count.push(Some(limit));
+            remaining.retain(|series| series[test] <= limit);
+            // Too few tests are known where no score exceeds 0.
+            by_count.push((limit > 0.0).then_some(limit));
         }
         Self { by_count }
     }

@@ -258,10 +258,11 @@ fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -
             percent: percent(*value),
             score: 0.0,
             last: 0,
-            limit,
+            limit: None,
             single_limits_percent: single,
         };
-        if let Some((found, limit)) = most_unlike(&moments, scatter).zip(point.limit) {
+        if let Some((found, limit)) = most_unlike(&moments, scatter).zip(limit) {
+            point.limit = Some(limit);
             (point.score, point.last) = (found.score, found.last);
             if departure.is_none() {
                 std = found.std;

@@ -382,6 +382,22 @@ fn frozen_compare() {
     ];
     text.push_str(&readable(&put_out(folder.path(), &json)));
     assert_snapshot("compare", &text);
+    let series = [
+        "compare",
+        "--series",
+        tests[0],
+        tests[0],
+        tests[0],
+        tests[1],
+        tests[1],
+        "--repeatability",
+        "0.1 %",
+    ];
+    let mut text = put_out(folder.path(), &series);
+    text.push('\n');
+    let agreeing = [&series[..5], &series[7..]].concat();
+    text.push_str(&put_out(folder.path(), &agreeing));
+    assert_snapshot("compare_series", &text);
 }
 
 #[test]

@@ -170,6 +170,22 @@ const TABLE: &[Row] = &[
         &[],
     ),
     row(
+        &[
+            "compare",
+            "--series",
+            "cantilever/test.toml",
+            "cantilever/test.toml",
+            "cantilever/test.toml",
+        ],
+        &[
+            "cantilever/test.toml",
+            "cantilever/low.wav",
+            "cantilever/high.wav",
+        ],
+        &["--png", "--csv"],
+        &[],
+    ),
+    row(
         &["blind-check", "--folder", "tests", "--truth", "truths.json"],
         &["truths.json", "tests/a/test.toml", "tests/a/taps.wav"],
         &[],
@@ -607,7 +623,7 @@ fn prop_the_table_has_every_option_with_a_file() {
         let command = row.arguments[0];
         let given = row.arguments.iter().filter(|argument| {
             [
-                "--report", "--folder", "--truth", "--before", "--after", "--pair",
+                "--report", "--folder", "--truth", "--before", "--after", "--pair", "--series",
             ]
             .contains(argument)
         });

@@ -50,6 +50,7 @@ fn prop_reports_keep_to_the_shipped_schema() {
         &["frf", wav, "--hammer", "1"],
         &["diagnose", cantilever],
         &["compare", cantilever, cantilever],
+        &["compare", "--series", cantilever, cantilever, cantilever],
         &["plan", virtual_test, "--draws", "1"],
         &["export", cantilever],
         &[

@@ -54,13 +54,13 @@ fn panel(chart: &ControlChart, section: &SeriesSection) -> Panel {
     }
     band.x = Places::Each(places);
     let x = Axis::linear(0.5, count as f64 + 0.5).of("test", "");
-    let (low, high) = extent(ends.into_iter()).unwrap_or((-LEAST_SPAN, LEAST_SPAN));
+    let (low, high) = extent(ends).unwrap_or((-LEAST_SPAN, LEAST_SPAN));
     let y = padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1);
-    let y = y.of(&format!("change of {}", quantity(chart.quantity)), "%");
+    let y = y.of(format!("change of {}", quantity(chart.quantity)), "%");
     let mut shown = vec![band, agreeing, departed];
     shown.retain(|series| !series.low.is_empty() || !series.y.is_empty());
     Panel::new(HEIGHT, x, y)
-        .titled(&quantity(chart.quantity))
+        .titled(quantity(chart.quantity))
         .with_zero()
         .with(shown)
 }

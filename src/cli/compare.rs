@@ -50,7 +50,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["first", "before", "after", "pair"])]
     series: Vec<PathBuf>,
     /// Standard deviation of the difference of a frequency between two tests of one state, such as "0.1 %"; default: from
-    /// repeats, else about 0.1 % is assumed
+    /// repeats or the scatter of a series, else about 0.1 % is assumed
     #[arg(long, value_name = "R", value_parser = repeatability)]
     repeatability: Option<f64>,
     /// Draw the changes of the frequencies and the causes, or the control charts of a series, into this file (PNG, or SVG if its

@@ -65,30 +65,34 @@ pub(crate) enum Scatter {
     AtLeast(f64),
 }
 
-/// Scatter of a test about the means, and how many degrees of freedom the difference of the means has.
-struct Judged {
+/// What the difference of two means is measured by.
+struct Scale {
+    /// Standard deviation of one test.
     std: f64,
+    /// Degrees of freedom of the difference over `unit`, which is Student's t.
     freedom: f64,
-    /// Standard deviation of the difference of the means, over that of Student's t.
     unit: f64,
 }
 
-/// Returns how the mean of `last` tests is judged against that of the `first` ones, with this sum of squares about both means.
-fn judged(scatter: Scatter, first: usize, last: usize, squares: f64) -> Judged {
-    let (std, freedom) = match scatter {
-        Scatter::Known(std) => (std, f64::INFINITY),
-        Scatter::AtLeast(least) => {
-            let freedom = (first + last - 2) as f64;
-            ((squares / freedom).max(0.0).sqrt().max(least), freedom)
+impl Scale {
+    /// Returns the scale for the means of `first` and `last` tests with this sum of squares about both means.
+    fn new(scatter: Scatter, first: usize, last: usize, squares: f64) -> Self {
+        let (std, freedom) = match scatter {
+            Scatter::Known(std) => (std, f64::INFINITY),
+            Scatter::AtLeast(least) => {
+                let freedom = (first + last).saturating_sub(2).max(1) as f64;
+                ((squares / freedom).max(0.0).sqrt().max(least), freedom)
+            }
+        };
+        let share = (1.0 / first as f64 + 1.0 / last as f64).sqrt();
+        // A mean of several tests has shorter tails than one: the excess of a sum falls as one over their number.
+        let tails = (4 + (TAILS - 4) * last.min(first)) as f64;
+        Self {
+            std,
+            // An approximation: the limits are drawn with the same one.
+            freedom: (freedom.recip() + tails.recip()).recip(),
+            unit: std * share * ((tails - 2.0) / tails).sqrt(),
         }
-    };
-    let share = (1.0 / first as f64 + 1.0 / last as f64).sqrt();
-    // A mean of several tests has shorter tails than one: the excess of a sum falls as one over their number.
-    let tails = (4 + (TAILS - 4) * last.min(first)) as f64;
-    Judged {
-        std,
-        freedom: (freedom.recip() + tails.recip()).recip(),
-        unit: std * share * ((tails - 2.0) / tails).sqrt(),
     }
 }
 
@@ -97,24 +101,26 @@ fn is_known(scatter: Scatter, count: usize) -> bool {
     matches!(scatter, Scatter::Known(_)) || count >= LEAST_FREEDOM + 2
 }
 
-/// Means of the first and the last tests, and how they are judged.
-struct Parted {
+/// Tests in two parts: those before and the last ones.
+struct Parts {
+    /// Mean of the last tests less that before.
     difference: f64,
-    judged: Judged,
+    /// Sum of squares about both means.
+    squares: f64,
 }
 
-/// Parts the tests before the last ones.
-fn parted(moments: &Moments, scatter: Scatter, last: usize) -> Parted {
-    let count = moments.sums.len() - 1;
-    let [total, squares] = moments.sums[count];
-    let first = count - last;
-    let [sum, _] = moments.sums[first];
-    let before = sum / first as f64;
-    let after = (total - sum) / last as f64;
-    let about_means = squares - first as f64 * before * before - last as f64 * after * after;
-    Parted {
-        difference: after - before,
-        judged: judged(scatter, first, last, about_means),
+impl Parts {
+    fn new(moments: &Moments, last: usize) -> Self {
+        let count = moments.sums.len() - 1;
+        let [total, squares] = moments.sums[count];
+        let first = count - last;
+        let [sum, _] = moments.sums[first];
+        let before = sum / first as f64;
+        let after = (total - sum) / last as f64;
+        Self {
+            difference: after - before,
+            squares: squares - first as f64 * before * before - last as f64 * after * after,
+        }
     }
 }
 
@@ -124,26 +130,26 @@ pub(crate) struct Step {
     pub(crate) last: usize,
     /// Difference of the means.
     pub(crate) difference: f64,
+    /// Standard deviation of one test about the means.
+    pub(crate) std: f64,
 }
 
 /// Returns the most probable step: that with the least sum of squares about the means before and after.
-pub(crate) fn most_probable_step(moments: &Moments) -> Step {
+pub(crate) fn most_probable_step(moments: &Moments, scatter: Scatter) -> Step {
     let count = moments.sums.len() - 1;
-    let mut best = Step {
-        last: 1,
-        difference: 0.0,
-    };
-    let mut most = f64::NEG_INFINITY;
-    for last in 1..count.min(WINDOWS[WINDOWS.len() - 1] + 1) {
-        let difference = parted(moments, Scatter::Known(1.0), last).difference;
-        // By this much a step lowers the sum of squares.
-        let explained = difference * difference * (count - last) as f64 * last as f64;
-        if explained > most {
-            most = explained;
-            best = Step { last, difference };
+    let (mut last, mut least) = (1, f64::INFINITY);
+    for own in 1..count.min(WINDOWS[WINDOWS.len() - 1] + 1) {
+        let squares = Parts::new(moments, own).squares;
+        if squares < least {
+            (last, least) = (own, squares);
         }
     }
-    best
+    let parts = Parts::new(moments, last);
+    Step {
+        last,
+        difference: parts.difference,
+        std: Scale::new(scatter, count - last, last, parts.squares).std,
+    }
 }
 
 /// Returns the last tests that differ most from those before; `None` where too few tests are known.
@@ -154,19 +160,19 @@ pub(crate) fn most_unlike(moments: &Moments, scatter: Scatter) -> Option<Unlike>
         return None;
     }
     for last in WINDOWS.into_iter().filter(|last| *last < count) {
-        let own = parted(moments, scatter, last);
-        let ratio = own.difference / own.judged.unit;
-        let highest = best.map_or(0.0, |best| best.score.abs());
+        let parts = Parts::new(moments, last);
+        let scale = Scale::new(scatter, count - last, last, parts.squares);
+        let ratio = parts.difference / scale.unit;
         // A score is smaller than its t: this saves most logarithms.
-        if ratio.abs() <= highest {
+        if best.is_some_and(|best| ratio.abs() <= best.score.abs()) {
             continue;
         }
-        let score = normal_score(ratio, own.judged.freedom);
-        if score.abs() > highest {
+        let score = normal_score(ratio, scale.freedom);
+        if best.is_none_or(|best| score.abs() > best.score.abs()) {
             best = Some(Unlike {
                 score,
                 last,
-                std: own.judged.std,
+                std: scale.std,
             });
         }
     }
@@ -181,10 +187,11 @@ pub(crate) fn single_limits(moments: &Moments, scatter: Scatter, limit: f64) -> 
     }
     let [sum, squares] = moments.sums[first];
     let before = sum / first as f64;
-    let own = judged(scatter, first, 1, squares - first as f64 * before * before);
-    let size = limit * (8.0 * own.freedom + 3.0) / (8.0 * own.freedom + 1.0);
-    let t = (own.freedom * (size * size / own.freedom).exp_m1()).sqrt();
-    Some([-t, t].map(|t| before + t * own.unit))
+    let scale = Scale::new(scatter, first, 1, squares - first as f64 * before * before);
+    let freedom = scale.freedom;
+    let size = limit * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
+    let t = (freedom * (size * size / freedom).exp_m1()).sqrt();
+    Some([-t, t].map(|t| before + t * scale.unit))
 }
 
 /// Returns the normal variable that is as improbable as Student's t (Wallace 1959, "Bounds on normal approximations to

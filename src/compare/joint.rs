@@ -237,8 +237,10 @@ impl JointChange {
                 }
                 let predicted = self.predict(data, moved.as_slice())?;
                 let log_prior = self.log_prior(moved.as_slice());
+                let log_density = data.log_density(&predicted);
                 Some(Point {
-                    log_weight: data.log_density(&predicted) + log_prior + log_volume,
+                    log_weight: log_density + log_prior + log_volume,
+                    log_density,
                     values: moved.as_slice().to_vec(),
                 })
             })

@@ -40,7 +40,8 @@ pub use result::{
     RepeatabilityOrigin, RepeatabilityResult, StiffnessChange, VerdictKind,
 };
 pub use series::{
-    ChartPoint, Charted, ControlChart, Departure, LEAST_SERIES, MOST_SERIES, Series, Watched, watch,
+    ChartPoint, Charted, ControlChart, Departure, LEAST_SERIES, LeftOutMode, MOST_SERIES, Series,
+    Watched, watch,
 };
 pub use test::{
     CompareError, Item, ItemKind, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Settings, Test,

@@ -584,6 +584,15 @@ impl Differences {
             for (row, test) in tests.iter().enumerate() {
                 let mut own = test.structure.clone();
                 own.joint = described.joint;
+                if let (Some(joint), Some(stated)) = (&mut own.joint, test.structure.joint) {
+                    // A stiffness that this test states is described.
+                    if test.knows_joint[0] {
+                        joint.kt = stated.kt;
+                    }
+                    if test.knows_joint[1] {
+                        joint.kr = stated.kr;
+                    }
+                }
                 let predicted = match own == *described {
                     true => logs.clone(),
                     false => log_frequencies(&own, modes)?,

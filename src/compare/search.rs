@@ -13,6 +13,8 @@ use rayon::prelude::*;
 pub(crate) struct Point {
     /// Logarithm of its weight.
     pub(crate) log_weight: f64,
+    /// Logarithm of the density of the data there.
+    pub(crate) log_density: f64,
     /// Its size or sizes, and then its place (1, lengths of the beam) where it has one.
     pub(crate) values: Vec<f64>,
 }
@@ -22,6 +24,8 @@ pub(crate) struct Point {
 pub(crate) struct Posterior {
     /// Logarithm of the evidence.
     pub(crate) log_evidence: f64,
+    /// Logarithm of the largest density of the data.
+    pub(crate) log_best: f64,
     /// Points, whose weights add up to 1.
     pub(crate) points: Vec<Point>,
     /// Predictions at the most probable point, for each pair.
@@ -159,8 +163,8 @@ impl Curve {
 struct AtPlace {
     place: f64,
     log_sum: f64,
-    /// Logarithm of the weight, and the size.
-    sizes: Vec<(f64, f64)>,
+    /// A point for each size, without the place.
+    sizes: Vec<Point>,
 }
 
 /// Sizes of either sign in the first look, and their span in decades.
@@ -220,11 +224,15 @@ fn at_place(data: &Data<'_>, cause: &Cause, place: f64) -> AtPlace {
         // The trapezoidal rule's share of the range.
         let below = if k > 0 { known[k - 1].0 } else { size };
         let above = known.get(k + 1).map_or(size, |one| one.0);
-        weighted.push((log + (0.5 * (above - below)).ln(), size));
+        weighted.push(Point {
+            log_weight: log + (0.5 * (above - below)).ln(),
+            log_density: log - cause.log_prior(size),
+            values: vec![size],
+        });
     }
     AtPlace {
         place,
-        log_sum: log_sum(weighted.iter().map(|one| one.0)),
+        log_sum: log_sum(weighted.iter().map(|one| one.log_weight)),
         sizes: weighted,
     }
 }
@@ -299,15 +307,13 @@ pub(crate) fn posterior(data: &Data<'_>, cause: &Cause) -> Option<Posterior> {
             let above = all.get(k + 1).map_or(one.place, |next| next.place);
             log_share = (0.5 * (above - below)).ln();
         }
-        for &(log, size) in &one.sizes {
-            let mut values = vec![size];
+        for own in &one.sizes {
+            let mut point = own.clone();
+            point.log_weight += log_share;
             if cause.is_placed {
-                values.push(one.place);
+                point.values.push(one.place);
             }
-            points.push(Point {
-                log_weight: log + log_share,
-                values,
-            });
+            points.push(point);
         }
     }
     normalised(points, |values| {
@@ -328,6 +334,8 @@ pub(crate) fn normalised(
     predict: impl Fn(&[f64]) -> Option<Vec<Predicted>>,
 ) -> Option<Posterior> {
     let log_evidence = log_sum(points.iter().map(|point| point.log_weight));
+    let densities = points.iter().map(|point| point.log_density);
+    let log_best = densities.fold(f64::NEG_INFINITY, f64::max);
     if !log_evidence.is_finite() {
         return None;
     }
@@ -341,6 +349,7 @@ pub(crate) fn normalised(
     let best = predict(&most.values)?;
     Some(Posterior {
         log_evidence,
+        log_best,
         points,
         best,
     })

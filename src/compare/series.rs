@@ -1,6 +1,6 @@
 //! Many tests of one structure in the order of time: which is the first that differs from those before it.
 //!
-//! Every mode has a chart, and so have the stiffnesses of the joint. After each test the mean of the last j tests is compared
+//! Every mode has a chart, and so have all modes together and the stiffnesses of the joint. After each test the mean of the last j tests is compared
 //! with the mean of all before them, for several j (the change-point model of Hawkins, Qiu & Kang 2003, "The changepoint model
 //! for statistical process control"). One test far off is seen at once, and a slow drift after some tests. No test has to be
 //! declared healthy.
@@ -13,10 +13,12 @@ use crate::matching::match_modes;
 use crate::model::PairModel;
 use crate::result::{Comparison, MatchedMode};
 use crate::test::{CompareError, MOST_REPEATS, Pair, Settings, Test, common_modes};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
+use tapjoint_numerics::least_squares::{Linearised, Problem, Settings as SearchSettings, minimise};
+use tapjoint_numerics::stats::median;
 
 /// Least number of tests: two that agree, and one that may differ.
 pub const LEAST_SERIES: usize = 3;
@@ -28,9 +30,8 @@ const LEAST_REPEATABILITY: f64 = 1e-6;
 const STEP: f64 = 0.01;
 /// Largest change of a stiffness (logarithm).
 const MOST_CHANGE: f64 = 3.0;
-/// Turns of the search for a stiffness, and the step at which it ends (logarithm).
-const TURNS: usize = 30;
-const SETTLED: f64 = 1e-7;
+/// Unit of the residuals of the search for stiffnesses (1): the precision of a good reading.
+const RESIDUAL: f64 = 1e-5;
 /// A stiffness whose standard deviation exceeds that of the frequencies by this factor has no chart: the modes do not feel it.
 const MOST_LEVER: f64 = 200.0;
 
@@ -55,7 +56,7 @@ pub struct ChartPoint {
     pub percent: f64,
     /// How much the last tests differ from those before them, in standard deviations (1); 0 where too few tests are known.
     pub score: f64,
-    /// Number of last tests that differ most.
+    /// Number of last tests that differ most; 0 where too few tests are known.
     pub last: usize,
     /// Limit of the score (1); `null` where too few tests are known.
     pub limit: Option<f64>,
@@ -80,18 +81,28 @@ pub struct Departure {
 pub struct ControlChart {
     /// What it shows.
     pub quantity: Charted,
-    /// Standard deviation of one test (%): as stated, or of the tests before the change.
-    pub scatter_percent: f64,
+    /// Standard deviation of one test (%): as stated, or about the means before and after the change. `null` with too few
+    /// tests.
+    pub scatter_percent: Option<f64>,
     /// All tests in order.
     pub points: Vec<ChartPoint>,
     /// The first departure; `null` where all tests agree.
     pub departure: Option<Departure>,
 }
 
+/// A mode without a chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LeftOutMode {
+    /// Its number.
+    pub mode: usize,
+    /// Index of the first test that lacks it, from 0.
+    pub test: usize,
+}
+
 /// A series of tests.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Series {
-    /// A chart for each mode, and for each stiffness of the joint that the modes feel.
+    /// A chart for each mode, for all modes together, and for each stiffness of the joint that the modes feel.
     pub charts: Vec<ControlChart>,
     /// The earliest departure of all charts: index of the chart, from 0; `null` where all tests agree.
     pub first: Option<usize>,
@@ -99,6 +110,8 @@ pub struct Series {
     pub is_stated: bool,
     /// Modes whose numbers differed between the tests.
     pub matched: Vec<MatchedMode>,
+    /// Modes that the first test has and another one lacks.
+    pub left_out: Vec<LeftOutMode>,
 }
 
 impl Series {
@@ -114,8 +127,8 @@ impl Series {
 pub struct Watched {
     /// The charts.
     pub series: Series,
-    /// What changed between the tests before the earliest departure and those from there on; `None` where all tests
-    /// agree.
+    /// What changed between the tests before the earliest departure and those from there to the one that shows it;
+    /// `None` where all tests agree.
     pub change: Option<Comparison>,
 }
 
@@ -149,49 +162,51 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     )?;
     let measured = others.par_iter().map(|test| model.beyond(first, test));
     let measured: Vec<[Vec<f64>; 2]> = measured.collect::<Result<_, _>>()?;
-    let joint = JointLever::new(&model);
     let count = modes.len();
     let quantities = modes.iter().map(|mode| Charted::Mode(*mode));
     let mut quantities: Vec<Charted> = quantities.chain([Charted::AllModes]).collect();
     let mut levers = DMatrix::identity(count, count);
     levers = levers.insert_row(count, 1.0 / count as f64);
-    if let Some(joint) = &joint {
-        quantities.extend(&joint.quantities);
-        levers = stacked(&levers, &joint.lever);
-    }
     // One row for each test: logarithms of all quantities over those of the first test.
-    let rows = measured.par_iter().map(|[changes, _]| {
+    let mut rows = vec![vec![0.0; count + 1]];
+    for [changes, _] in &measured {
         let mut row = changes.clone();
         row.push(changes.iter().sum::<f64>() / count as f64);
-        row.extend(
-            joint
-                .iter()
-                .flat_map(|joint| joint.changes(&model, changes)),
-        );
-        row
-    });
-    let mut rows: Vec<Vec<f64>> = rows.collect();
-    rows.insert(0, vec![0.0; quantities.len()]);
-    // Half of the variance of a difference is that of one test.
-    let reading =
-        |k: usize| measured.iter().map(|one| one[1][k]).sum::<f64>() / measured.len() as f64;
-    let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
-    let variances = (0..count).map(|k| 0.5 * (repeatability.powi(2) + reading(k)));
-    let stds: Vec<f64> = variances.map(f64::sqrt).collect();
+        rows.push(row);
+    }
+    if let Some(joint) = JointLever::new(&model) {
+        let fits = measured.par_iter();
+        let fits = fits.map(|[changes, _]| joint.changes(&model, changes));
+        // Without a fit of every test the stiffnesses have no charts.
+        if let Some(fits) = fits.collect::<Option<Vec<Vec<f64>>>>() {
+            quantities.extend(&joint.quantities);
+            levers = levers.resize_vertically(count + 1 + joint.lever.nrows(), 0.0);
+            let mut below = levers.rows_mut(count + 1, joint.lever.nrows());
+            below.copy_from(&joint.lever);
+            rows[0].resize(quantities.len(), 0.0);
+            for (row, fit) in rows[1..].iter_mut().zip(fits) {
+                row.extend(fit);
+            }
+        }
+    }
+    // A stated repeatability holds the readings' own noise. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
+    let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
+    let stds = (0..count).map(|k| {
+        let mut readings: Vec<f64> = measured.iter().map(|one| one[1][k]).collect();
+        (0.5 * repeatability.powi(2).max(median(&mut readings))).sqrt()
+    });
+    let stds: Vec<f64> = stds.collect();
     let limits = Limits::new(&levers, if is_stated { count } else { 0 }, tests.len());
     let charts = quantities.iter().enumerate().map(|(index, quantity)| {
         let values: Vec<f64> = rows.iter().map(|row| row[index]).collect();
-        let parts = levers
-            .row(index)
-            .iter()
-            .zip(&stds)
-            .map(|(lever, std)| (lever * std).powi(2))
-            .sum::<f64>();
+        let row = levers.row(index);
+        let variances = row.iter().zip(&stds);
+        let variance: f64 = variances.map(|(lever, std)| (lever * std).powi(2)).sum();
         // How much of the scatter all modes share is not stated.
         let scatter = match is_stated && index < count {
             true => Scatter::Known(stds[index]),
-            false => Scatter::AtLeast(parts.sqrt()),
+            false => Scatter::AtLeast(variance.sqrt()),
         };
         chart(*quantity, &values, scatter, &limits)
     });
@@ -201,13 +216,15 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         charts,
         is_stated,
         matched,
+        left_out: left_out(&all, &modes),
     };
     let mut change = None;
     if let Some((_, departure)) = series.departure() {
-        let (before, after) = tests.split_at(departure.since);
+        // What comes later may be another change.
+        let (before, after) = tests[..=departure.test].split_at(departure.since);
         let pair = Pair {
             before: before[before.len().saturating_sub(MOST_REPEATS)..].to_vec(),
-            after: after[..after.len().min(MOST_REPEATS)].to_vec(),
+            after: after.to_vec(),
         };
         change = Some(crate::compare(&[pair], settings)?);
     }
@@ -230,13 +247,19 @@ fn earliest(charts: &[ControlChart]) -> Option<usize> {
     best.map(|one| one.0)
 }
 
-/// Returns one matrix above another.
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut all = above
-        .clone()
-        .resize_vertically(above.nrows() + below.nrows(), 0.0);
-    all.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    all
+/// Returns the modes of the first test that others lack.
+fn left_out(all: &Pair, modes: &[usize]) -> Vec<LeftOutMode> {
+    let first = all.before[0].modes.iter().map(|one| one.mode);
+    let missing = first.filter(|mode| *mode > 0 && !modes.contains(mode));
+    let found = missing.filter_map(|mode| {
+        let mut tests = all.after.iter();
+        let without = tests.position(|test| test.mode(mode).is_none())?;
+        Some(LeftOutMode {
+            mode,
+            test: without + 1,
+        })
+    });
+    found.collect()
 }
 
 /// Charts one quantity by its values (logarithms over the first test).
@@ -245,8 +268,7 @@ fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -
     let mut points = Vec::with_capacity(values.len());
     let mut departure = None;
     let mut moments = Moments::default();
-    let (Scatter::Known(mut std) | Scatter::AtLeast(mut std)) = scatter;
-    let mut single = None;
+    let (mut single, mut std) = (None, None);
     for (test, value) in values.iter().enumerate() {
         let limit = limits.at(test + 1);
         if departure.is_none() {
@@ -265,10 +287,11 @@ fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -
             point.limit = Some(limit);
             (point.score, point.last) = (found.score, found.last);
             if departure.is_none() {
-                std = found.std;
+                std = Some(found.std);
             }
             if departure.is_none() && found.score.abs() > limit {
-                let step = most_probable_step(&moments);
+                let step = most_probable_step(&moments, scatter);
+                std = Some(step.std);
                 departure = Some(Departure {
                     test,
                     since: test + 1 - step.last,
@@ -280,7 +303,7 @@ fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -
     }
     ControlChart {
         quantity,
-        scatter_percent: 100.0 * std,
+        scatter_percent: std.map(|std| 100.0 * std),
         points,
         departure,
     }
@@ -311,7 +334,8 @@ impl JointLever {
             quantities.push(quantity);
         }
         while !directions.is_empty() {
-            let lever = inverse_slopes(model, &directions)?;
+            let slopes = slopes(model, &directions, &vec![0.0; directions.len()])?;
+            let lever = slopes.pseudo_inverse(1e-12).ok()?;
             let norms: Vec<f64> = lever.row_iter().map(|row| row.norm()).collect();
             let worst = (0..norms.len()).max_by(|a, b| norms[*a].total_cmp(&norms[*b]))?;
             if norms[worst] <= MOST_LEVER {
@@ -327,40 +351,70 @@ impl JointLever {
         None
     }
 
-    /// Returns the changes of the stiffnesses (logarithms) that fit the changes of a pair best, by least squares. The slopes at
-    /// no change serve all turns.
-    fn changes(&self, model: &PairModel, measured: &[f64]) -> Vec<f64> {
-        let mut steps = DVector::zeros(self.directions.len());
-        for _ in 0..TURNS {
-            let Some(predicted) = model.joint_change(&self.directions, steps.as_slice()) else {
-                break;
-            };
-            let rest = DVector::from_column_slice(measured) - DVector::from_vec(predicted);
-            let step = &self.lever * rest;
-            steps = (&steps + &step).map(|one| one.clamp(-MOST_CHANGE, MOST_CHANGE));
-            if step.amax() < SETTLED {
-                break;
-            }
-        }
-        steps.as_slice().to_vec()
+    /// Returns the changes of the stiffnesses (logarithms) that fit measured changes of the frequencies (logarithms) best, by
+    /// least squares. `None` where the search fails.
+    fn changes(&self, model: &PairModel, measured: &[f64]) -> Option<Vec<f64>> {
+        let fit = JointFit {
+            model,
+            directions: &self.directions,
+            measured,
+            bounds: vec![[-MOST_CHANGE, MOST_CHANGE]; self.directions.len()],
+        };
+        let start = vec![0.0; self.directions.len()];
+        Some(minimise(&fit, &start, &SearchSettings::default())?.parameters)
     }
 }
 
-/// Returns the pseudo-inverse of the slopes of the frequencies with respect to stiffnesses (logarithms); `None` where the
-/// structure has no modes.
-fn inverse_slopes(model: &PairModel, directions: &[usize]) -> Option<DMatrix<f64>> {
-    let count = model.modes.len();
-    let mut slopes = DMatrix::zeros(count, directions.len());
+/// Fit of stiffnesses (logarithms) to changes of the frequencies.
+struct JointFit<'a> {
+    model: &'a PairModel,
+    directions: &'a [usize],
+    measured: &'a [f64],
+    bounds: Vec<[f64; 2]>,
+}
+
+impl Problem for JointFit<'_> {
+    type State = Vec<f64>;
+
+    /// Returns measured less predicted changes, over [`RESIDUAL`].
+    fn evaluate(&self, parameters: &[f64], _: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let predicted = self.model.joint_change(self.directions, parameters)?;
+        let pairs = self.measured.iter().zip(&predicted);
+        Some(
+            pairs
+                .map(|(measured, predicted)| (measured - predicted) / RESIDUAL)
+                .collect(),
+        )
+    }
+
+    fn cost(&self, residuals: &Vec<f64>) -> f64 {
+        0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
+    }
+
+    fn linearise(&self, parameters: &[f64], residuals: &mut Vec<f64>) -> Option<Linearised> {
+        let slopes = slopes(self.model, self.directions, parameters)?;
+        Some(Linearised::of_rows(-slopes / RESIDUAL, residuals))
+    }
+
+    fn bounds(&self) -> &[[f64; 2]] {
+        &self.bounds
+    }
+}
+
+/// Returns the slopes of the frequencies with respect to stiffnesses (all logarithms), a column for each stiffness; `None` where
+/// the structure has no modes.
+fn slopes(model: &PairModel, directions: &[usize], at: &[f64]) -> Option<DMatrix<f64>> {
+    let mut slopes = DMatrix::zeros(model.modes.len(), directions.len());
     for column in 0..directions.len() {
         let mut sides = Vec::new();
         for step in [STEP, -STEP] {
-            let mut steps = vec![0.0; directions.len()];
-            steps[column] = step;
+            let mut steps = at.to_vec();
+            steps[column] += step;
             sides.push(model.joint_change(directions, &steps)?);
         }
-        for row in 0..count {
+        for row in 0..model.modes.len() {
             slopes[(row, column)] = (sides[0][row] - sides[1][row]) / (2.0 * STEP);
         }
     }
-    slopes.pseudo_inverse(1e-12).ok()
+    Some(slopes)
 }

@@ -522,6 +522,52 @@ fn limit_a_series_of_equal_states_agrees() {
     }
 }
 
+/// A joint that lost most of its stiffness has the right place on the charts: the slopes at no change would not lead there.
+#[test]
+fn recover_a_joint_that_lost_most_of_its_stiffness() {
+    for factor in [0.2, 0.4, 4.0] {
+        let factors = [&[1.0; 6][..], &[factor]].concat();
+        let found = watch(&series(&factors, 1e-6), &stated(1e-4)).unwrap();
+        let mut charts = found.series.charts.iter();
+        let rotation = charts.find(|one| one.quantity == Charted::Kr).unwrap();
+        let percent = rotation.points[6].percent;
+        // Readings to 1e-6, and the errors of two meshes that do not quite cancel.
+        assert!(
+            (percent - 100.0 * (factor - 1.0)).abs() < 0.01 * 100.0 * factor,
+            "{factor}: {percent}"
+        );
+    }
+}
+
+/// A stiffness that a test states is described, whatever the others state. What is described is no change.
+#[test]
+fn prop_stated_stiffnesses_of_each_test_are_taken_out() {
+    let states = [1.0, 1.0, 1.3, 1.0, 0.8];
+    let mut tests = series(&states, 1e-6);
+    for (test, factor) in tests.iter_mut().zip(states) {
+        test.structure.joint.as_mut().unwrap().kr *= factor;
+        test.knows_joint[1] = true;
+    }
+    let found = watch(&tests, &stated(1e-3)).unwrap();
+    assert!(found.series.departure().is_none());
+}
+
+/// A mode that one test lacks has no chart, and the test is told.
+#[test]
+fn prop_a_mode_that_a_test_lacks_is_left_out_and_told() {
+    let mut tests = series(&[1.0; 5], 1e-4);
+    tests[3].modes.remove(4);
+    let found = watch(&tests, &stated(1e-3)).unwrap().series;
+    let lacking = found.left_out.iter().map(|one| [one.mode, one.test]);
+    assert_eq!(lacking.collect::<Vec<_>>(), [[5, 3]]);
+    assert!(
+        found
+            .charts
+            .iter()
+            .all(|one| one.quantity != Charted::Mode(5))
+    );
+}
+
 #[test]
 fn limit_a_series_needs_three_tests() {
     let error = watch(&series(&[1.0; 2], 1e-3), &Settings::default()).unwrap_err();
@@ -531,7 +577,7 @@ fn limit_a_series_needs_three_tests() {
     assert_eq!(found.series.departure().unwrap().1.test, 2);
 }
 
-/// A load that buckles the beam is no candidate: half of that load is found with its sign.
+/// A load that buckles the beam is no candidate: a seventh of that load is found with its sign.
 #[test]
 fn regress_a_load_near_buckling_is_found_with_its_sign() {
     let structure = cantilever(springs());

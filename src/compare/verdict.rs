@@ -14,7 +14,7 @@ pub(crate) struct Candidate {
     pub(crate) item: Option<String>,
     /// Logarithm of its evidence.
     pub(crate) log_evidence: f64,
-    /// Logarithm of the density of the data at its most probable size and place.
+    /// Logarithm of the largest density of the data, at any size and place.
     log_best: f64,
     /// Goodness of fit; `None` for an unknown change.
     pub(crate) goodness: Option<f64>,
@@ -138,7 +138,7 @@ impl Candidate {
             posterior.log_evidence,
             Some(data.goodness(&posterior.best, joint.directions.len())),
         );
-        candidate.explain(data, posterior);
+        candidate.explain(posterior);
         for (index, name) in joint.names(&data.pairs[0]).into_iter().enumerate() {
             let step = interval(posterior, index, |step| step);
             candidate.has_clear_size |= is_clear(step);
@@ -168,7 +168,7 @@ impl Candidate {
             Some(data.goodness(&posterior.best, fitted)),
         );
         candidate.item.clone_from(&cause.item);
-        candidate.explain(data, posterior);
+        candidate.explain(posterior);
         let name = match cause.kind {
             CauseKind::LostMass | CauseKind::AddedMass => "mass",
             CauseKind::LocalCrack => "compliance",
@@ -204,8 +204,8 @@ impl Candidate {
         candidate
     }
 
-    fn explain(&mut self, data: &Data<'_>, posterior: &Posterior) {
-        self.log_best = data.log_density(&posterior.best);
+    fn explain(&mut self, posterior: &Posterior) {
+        self.log_best = posterior.log_best;
         let changes = posterior.best.iter().flat_map(|pair| &pair.change);
         self.explains = changes.map(|one| 100.0 * one.exp_m1()).collect();
     }

@@ -192,13 +192,22 @@ pub fn render_comparison(document: &Document) -> String {
         .map(|sentence| wrapped(sentence, 2))
         .collect();
     let tables = [tables::changed_modes(document), tables::changes(document)];
+    joined([
+        sentences.join(""),
+        joined(tables.map(noted)),
+        doubts(document),
+    ])
+}
+
+/// Returns a line with the doubts about the readings; empty without any.
+fn doubts(document: &Document) -> String {
     let codes: BTreeSet<&str> = document
         .warnings
         .iter()
         .map(|one| one.code.as_str())
         .collect();
     let codes: Vec<&str> = codes.into_iter().collect();
-    let doubts = match codes.as_slice() {
+    match codes.as_slice() {
         [] => String::new(),
         codes => wrapped(
             &format!(
@@ -207,8 +216,7 @@ pub fn render_comparison(document: &Document) -> String {
             ),
             2,
         ),
-    };
-    joined([sentences.join(""), joined(tables.map(noted)), doubts])
+    }
 }
 
 /// Returns the answer of a series of tests and its charts as a table; then what changed, if anything did.
@@ -216,11 +224,11 @@ pub fn render_series(document: &Document) -> String {
     let sentences = document.series.iter().flat_map(series::answer);
     let sentences: Vec<String> = sentences.map(|one| wrapped(&one, 2)).collect();
     let charts = noted(tables::control_charts(document));
-    let change = match document.compare {
+    let rest = match document.compare {
         Some(_) => format!("Before and after:\n{}", render_comparison(document)),
-        None => String::new(),
+        None => doubts(document),
     };
-    joined([sentences.join(""), charts, change])
+    joined([sentences.join(""), charts, rest])
 }
 
 /// The story of the gap and the hypotheses; empty without a diagnosis.

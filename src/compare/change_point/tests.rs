@@ -46,8 +46,8 @@ fn prop_a_test_at_its_limits_has_the_limit_as_score() {
 fn limit_equal_tests_agree() {
     let moments = moments_of(&[0.3; 9]);
     for scatter in [Scatter::Known(0.1), Scatter::AtLeast(1e-6)] {
-        let found = most_unlike(&moments, scatter);
-        assert!(found.is_none_or(|found| found.score.abs() < 1e-9));
+        let found = most_unlike(&moments, scatter).unwrap();
+        assert!(found.score.abs() < 1e-9);
     }
     assert!(most_unlike(&moments_of(&[0.3; 4]), Scatter::AtLeast(1e-6)).is_none());
 }
@@ -60,7 +60,7 @@ fn prop_scores_have_no_unit() {
         .map(|values| most_unlike(&moments_of(values), Scatter::AtLeast(1e-9)).unwrap());
     assert_eq!([one.last, other.last], [3, 3]);
     assert!((one.score + other.score).abs() < 1e-9);
-    let step = most_probable_step(&moments_of(&values));
+    let step = most_probable_step(&moments_of(&values), Scatter::Known(1.0));
     assert_eq!(step.last, 3);
     // 4.1/3 after less 0.4/4 before.
     assert!((step.difference - (4.1 / 3.0 - 0.1)).abs() < 1e-12);
@@ -100,7 +100,7 @@ fn recover_limits_give_few_alarms_and_show_a_step() {
         }
         let found = most_unlike(&chart, Scatter::AtLeast(1e-9)).unwrap();
         let limit = limits.at(change + 3).unwrap();
-        let step = most_probable_step(&chart);
+        let step = most_probable_step(&chart, Scatter::AtLeast(1e-9));
         seen += u64::from(found.score > limit && step.last == 3);
     }
     // One in 250 would be 27 alarms of 6800 tests; normal scatter gives about half.

@@ -37,12 +37,6 @@ fn panel(chart: &ControlChart, section: &SeriesSection) -> Panel {
     for (test, point) in chart.points.iter().enumerate() {
         let at = (test + 1) as f64;
         ends.push(point.percent);
-        if let Some([low, high]) = point.single_limits_percent {
-            places.push(at);
-            band.low.push(low);
-            band.high.push(high);
-            ends.extend([low, high]);
-        }
         let own = match test < since {
             true => &mut agreeing,
             false => &mut departed,
@@ -52,10 +46,26 @@ fn panel(chart: &ControlChart, section: &SeriesSection) -> Panel {
             .push(format!("test {}: {}", test + 1, section.tests[test]));
         own.said.push(signed_percent(Some(point.percent)) + " %");
     }
+    // Limits after few tests are wide: the last ones and the tests decide what is shown.
+    let last = chart
+        .points
+        .last()
+        .and_then(|point| point.single_limits_percent);
+    let (low, high) = extent(ends.into_iter().chain(last.into_iter().flatten()))
+        .unwrap_or((-LEAST_SPAN, LEAST_SPAN));
+    let (low, high) = (low.min(-LEAST_SPAN), high.max(LEAST_SPAN));
+    let margin = 0.1 * (high - low);
+    for (test, point) in chart.points.iter().enumerate() {
+        if let Some(limits) = point.single_limits_percent {
+            let [below, above] = limits.map(|one| one.clamp(low - margin, high + margin));
+            places.push((test + 1) as f64);
+            band.low.push(below);
+            band.high.push(above);
+        }
+    }
     band.x = Places::Each(places);
     let x = Axis::linear(0.5, count as f64 + 0.5).of("test", "");
-    let (low, high) = extent(ends).unwrap_or((-LEAST_SPAN, LEAST_SPAN));
-    let y = padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1);
+    let y = padded((low, high), 0.1);
     let y = y.of(format!("change of {}", quantity(chart.quantity)), "%");
     let mut shown = vec![band, agreeing, departed];
     shown.retain(|series| !series.low.is_empty() || !series.y.is_empty());

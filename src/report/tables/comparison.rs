@@ -45,7 +45,7 @@ pub fn changed_modes(document: &Document) -> Option<Table> {
 }
 
 fn signed(percent: f64) -> String {
-    signed_percent(Some(percent)).replace(" %", "")
+    signed_percent(Some(percent))
 }
 
 /// The causes, the most probable first; `None` without a comparison.

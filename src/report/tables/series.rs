@@ -12,13 +12,17 @@ pub fn control_charts(document: &Document) -> Option<Table> {
         let last = chart.points.last();
         let departure = chart.departure;
         let limit = last.and_then(|last| last.limit);
+        let score = last.filter(|_| limit.is_some()).map(|last| last.score);
         [
             words("Chart", capital(&quantity(chart.quantity))),
-            number("Scatter (%)", significant(chart.scatter_percent, 2)),
+            number(
+                "Scatter (%)",
+                or_missing(chart.scatter_percent.map(|one| significant(one, 2))),
+            ),
             number("Last (%)", percent(last.map(|last| last.percent))),
             number(
                 "Score",
-                or_missing(last.map(|last| significant(last.score, 2))),
+                or_missing(score.map(|score| significant(score, 2))),
             ),
             number(
                 "Limit",
@@ -42,5 +46,5 @@ fn one_based(index: Option<usize>) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    or_missing(value.map(|value| signed_percent(Some(value)).replace(" %", "")))
+    or_missing(value.map(|value| signed_percent(Some(value))))
 }

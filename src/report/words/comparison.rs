@@ -3,7 +3,7 @@
 use crate::document::Document;
 use crate::format::{capital, probability, significant};
 use tapjoint_compare::{
-    CauseKind, CauseResult, Comparison, Interval, RepeatabilityOrigin, VerdictKind,
+    CauseKind, CauseResult, Comparison, Interval, MatchedMode, RepeatabilityOrigin, VerdictKind,
 };
 
 /// Returns what a cause is, in words: "L3 is gone".
@@ -93,7 +93,14 @@ pub fn answer(document: &Document) -> Vec<String> {
     }
     sentences.extend(seen_from(found));
     sentences.push(repeatability(found));
-    for one in &found.matched {
+    sentences.extend(matched(&found.matched));
+    sentences
+}
+
+/// Returns a sentence for each mode whose number differed between tests.
+pub fn matched(all: &[MatchedMode]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for one in all {
         let [first, other] = [one.first, one.other].map(|frequency| significant(frequency, 5));
         sentences.push(match one.taken {
             Some(taken) => format!(

@@ -2,6 +2,7 @@
 
 use crate::document::SeriesSection;
 use crate::format::signed_percent;
+use crate::words::comparison::matched;
 use tapjoint_compare::Charted;
 use tapjoint_numerics::stats::times;
 
@@ -18,22 +19,41 @@ pub fn quantity(charted: Charted) -> String {
 /// Returns the answer in a few sentences, the shortest first.
 pub fn answer(section: &SeriesSection) -> Vec<String> {
     let series = &section.series;
-    let count = section.tests.len();
+    let name = |test: usize| format!("test {} ({})", test + 1, section.tests[test]);
+    let mut points = series.charts.iter().flat_map(|chart| &chart.points);
+    let is_judged = points.any(|point| point.limit.is_some());
     let mut sentences = Vec::new();
     match series.departure() {
-        None => sentences.push(format!("No change: the {count} tests agree.")),
-        Some((chart, departure)) => {
-            let of_chart = quantity(chart.quantity);
+        None if is_judged => {
             sentences.push(format!(
-                "Test {} differs from those before it: {}.",
-                departure.test + 1,
-                section.tests[departure.test]
+                "No change: the {} tests agree.",
+                section.tests.len()
             ));
+        }
+        None => sentences.push(
+            "Too few tests to judge. At least five are needed, or three with --repeatability."
+                .to_owned(),
+        ),
+        Some((chart, departure)) => {
+            let seen = name(departure.test);
+            let since = match departure.since == departure.test {
+                true => "with it".to_owned(),
+                false => format!("with {}", name(departure.since)),
+            };
             sentences.push(format!(
-                "The chart of {of_chart} shows it first: {} % from test {} on, {} standard deviations of one test.",
+                "A change is seen at {seen}. It began most probably {since}."
+            ));
+            let size = match chart.scatter_percent {
+                Some(scatter) => format!(
+                    ", {} standard deviations of one test",
+                    times(departure.percent / scatter)
+                ),
+                None => String::new(),
+            };
+            sentences.push(format!(
+                "The chart of {} shows it first: {} %{size}.",
+                quantity(chart.quantity),
                 signed_percent(Some(departure.percent)),
-                departure.since + 1,
-                times(departure.percent / chart.scatter_percent)
             ));
         }
     }
@@ -41,10 +61,13 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
         true => "Repeatability: as stated.".to_owned(),
         false => "Repeatability: by the scatter of the tests themselves.".to_owned(),
     });
-    let known = series.charts.iter().flat_map(|chart| &chart.points);
-    if known.clone().all(|point| point.limit.is_none()) {
-        sentences
-            .push("Too few tests to judge: without --repeatability five are needed.".to_owned());
+    for one in &series.left_out {
+        sentences.push(format!(
+            "Mode {} has no chart: {} lacks it.",
+            one.mode,
+            name(one.test)
+        ));
     }
+    sentences.extend(matched(&series.matched));
     sentences
 }

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Compares tests of a real cantilever whose change is known, and counts right answers.
 
-    scripts/compare_masses.py PROGRAM [--data DIR] [--pairs N] [--healthy N] [--wrong N] [--choices N] [--seed S]
+    scripts/compare_masses.py PROGRAM [--data DIR] [--pairs N] [--healthy N] [--wrong N] [--choices N] [--series]
+                              [--seed S]
 
 The recordings are those of the folder `masses_beam` (TAPJOINT_DATA): a cantilever with six masses, of which one, two
 and three were taken off. The description has a guessed width and material. `--pairs`: neighbouring states of one
@@ -65,6 +66,23 @@ def compare(program, pairs):
     return json.loads(found.stdout)["compare"]
 
 
+def watch(program, texts, repeatability):
+    """The control charts of a series of descriptions, and what changed."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for number, text in enumerate(texts):
+            path = Path(folder) / f"{number}.toml"
+            path.write_text(text)
+            files.append(str(path))
+        command = [program, "compare", "--series", *files, "--json", "-"]
+        if repeatability:
+            command += ["--repeatability", repeatability]
+        found = subprocess.run(command, capture_output=True, text=True, check=False)
+    if found.returncode != 0:
+        sys.exit(f"{' '.join(command)}\n{found.stderr}")
+    return json.loads(found.stdout)
+
+
 def judged(found, lost, position):
     """What a comparison says of a loss: first cause, place, name, size, intervals."""
     first = found["hypotheses"][0]
@@ -106,6 +124,7 @@ def main():
     for name in ("pairs", "healthy", "wrong", "choices"):
         parser.add_argument(f"--{name}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--series", action="store_true", help="all samples before and after each removal as a series")
     parser.add_argument("--list", action="store_true", help="print every answer")
     given = parser.parse_args()
     if not given.data:
@@ -183,6 +202,24 @@ def main():
                     for one, chosen in zip(answers, all_choices)
                 ]
                 print(f"removal {removed}, four pairs: right {sum(right)} of {len(right)}")
+    if given.series:
+        for removed, repeatability in itertools.product((1, 2, 3), (None, "0.4 %")):
+            gone = LOST[: removed - 1]
+            texts = [
+                description(state(sample, k), positions[sample], gone)
+                for k in (removed - 1, removed)
+                for sample in samples
+            ]
+            found = watch(given.program, texts, repeatability)
+            charts = found["series"]["charts"]
+            alarms = [chart["departure"] for chart in charts if chart["departure"]]
+            seen = min((one["test"] for one in alarms), default=None)
+            first = found["compare"]["hypotheses"][0] if "compare" in found else None
+            print(
+                f"removal {removed}, repeatability {repeatability or 'unknown'}: lost from test {len(samples) + 1} on, "
+                f"seen at test {None if seen is None else seen + 1}, "
+                f"first cause {first and [first['effect'], first['item'], round(first['probability'], 2)]}"
+            )
 
 
 if __name__ == "__main__":

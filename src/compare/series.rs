@@ -163,32 +163,11 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     let measured = others.par_iter().map(|test| model.beyond(first, test));
     let measured: Vec<[Vec<f64>; 2]> = measured.collect::<Result<_, _>>()?;
     let count = modes.len();
-    let quantities = modes.iter().map(|mode| Charted::Mode(*mode));
-    let mut quantities: Vec<Charted> = quantities.chain([Charted::AllModes]).collect();
-    let mut levers = DMatrix::identity(count, count);
-    levers = levers.insert_row(count, 1.0 / count as f64);
-    // One row for each test: logarithms of all quantities over those of the first test.
-    let mut rows = vec![vec![0.0; count + 1]];
-    for [changes, _] in &measured {
-        let mut row = changes.clone();
-        row.push(changes.iter().sum::<f64>() / count as f64);
-        rows.push(row);
-    }
-    if let Some(joint) = JointLever::new(&model) {
-        let fits = measured.par_iter();
-        let fits = fits.map(|[changes, _]| joint.changes(&model, changes));
-        // Without a fit of every test the stiffnesses have no charts.
-        if let Some(fits) = fits.collect::<Option<Vec<Vec<f64>>>>() {
-            quantities.extend(&joint.quantities);
-            levers = levers.resize_vertically(count + 1 + joint.lever.nrows(), 0.0);
-            let mut below = levers.rows_mut(count + 1, joint.lever.nrows());
-            below.copy_from(&joint.lever);
-            rows[0].resize(quantities.len(), 0.0);
-            for (row, fit) in rows[1..].iter_mut().zip(fits) {
-                row.extend(fit);
-            }
-        }
-    }
+    let Changes {
+        quantities,
+        levers,
+        rows,
+    } = Changes::new(&model, &measured);
     // A stated repeatability holds the readings' own noise. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
     let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
@@ -229,6 +208,57 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         change = Some(crate::compare(&[pair], settings)?);
     }
     Ok(Watched { series, change })
+}
+
+/// Changes of all quantities.
+struct Changes {
+    quantities: Vec<Charted>,
+    /// Changes of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
+    levers: DMatrix<f64>,
+    /// Logarithms of all quantities over those of the first test: a row for each test.
+    rows: Vec<Vec<f64>>,
+}
+
+impl Changes {
+    /// Returns the changes from the measured ones of the modes (logarithms), from the second test on.
+    fn new(model: &PairModel, measured: &[[Vec<f64>; 2]]) -> Self {
+        let count = model.modes.len();
+        let modes = model.modes.iter().map(|mode| Charted::Mode(*mode));
+        let levers = DMatrix::identity(count, count);
+        let mut rows = vec![vec![0.0; count + 1]];
+        for [changes, _] in measured {
+            let mut row = changes.clone();
+            row.push(changes.iter().sum::<f64>() / count as f64);
+            rows.push(row);
+        }
+        let mut all = Self {
+            quantities: modes.chain([Charted::AllModes]).collect(),
+            levers: levers.insert_row(count, 1.0 / count as f64),
+            rows,
+        };
+        if let Some(joint) = JointLever::new(model) {
+            let fits = measured.par_iter();
+            let fits = fits.map(|[changes, _]| joint.changes(model, changes));
+            // Without a fit of every test the stiffnesses have no charts.
+            if let Some(fits) = fits.collect::<Option<Vec<Vec<f64>>>>() {
+                all.add_joint(&joint, fits);
+            }
+        }
+        all
+    }
+
+    fn add_joint(&mut self, joint: &JointLever, fits: Vec<Vec<f64>>) {
+        let known = self.quantities.len();
+        self.quantities.extend(&joint.quantities);
+        let levers = self.levers.clone();
+        self.levers = levers.resize_vertically(self.quantities.len(), 0.0);
+        let mut below = self.levers.rows_mut(known, joint.lever.nrows());
+        below.copy_from(&joint.lever);
+        self.rows[0].resize(self.quantities.len(), 0.0);
+        for (row, fit) in self.rows[1..].iter_mut().zip(fits) {
+            row.extend(fit);
+        }
+    }
 }
 
 /// Returns the chart that leaves its limit first; of several that by the largest score over its limit.

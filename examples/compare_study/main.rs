@@ -12,7 +12,7 @@
 //!
 //! `--series N`: series of tests in the order of time instead, N for each delay and ten times as many in which nothing changes.
 //!
-//! `--smallest N`: the smallest change of the joint that is seen, on about N cantilevers.
+//! `--smallest N`: the smallest change of the joint that is seen, on at most 2 N cantilevers.
 //!
 //! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
 //! of threads.

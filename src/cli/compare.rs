@@ -13,12 +13,12 @@ use tapjoint::compare::{
     LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
 };
 use tapjoint::pipeline::{IdentifySettings, TestedStructure, Warning, compared_test};
+use tapjoint::report::document::Document;
 use tapjoint::report::{
-    comparison_of, render_comparison, render_comparison_picture, render_series, render_series_csv,
-    render_series_picture, series_of,
+    comparison_of, render_comparison, render_comparison_picture, render_series_csv, series_of,
 };
 
-/// Say what changed between two tests of one structure.
+/// Say what changed between two tests of one structure, or in a series of tests.
 ///
 /// BEFORE and AFTER are test descriptions. With --test they may also be recordings or files of functions, each read
 /// in the place of the first recording that TEST describes. Errors of the model that both tests share cancel:
@@ -46,7 +46,7 @@ pub(super) struct CompareArguments {
     /// Test before and test after; several pairs share one change
     #[arg(long, value_name = "FILE", num_args = 2)]
     pair: Vec<PathBuf>,
-    /// Tests in the order of time: which is the first that differs from those before it, and what changed
+    /// Tests in the order of time. Finds the first test that differs from those before it, and says what changed
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["first", "before", "after", "pair"])]
     series: Vec<PathBuf>,
     /// Standard deviation of the difference of a frequency between two tests of one state, such as "0.1 %"; default: from
@@ -115,23 +115,11 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         let sides = read(&arguments.series)?;
         let (name, structure) = (sides[0].name.clone(), sides[0].structure);
         let tests: Vec<Test> = sides.into_iter().map(|side| side.compared).collect();
-        let files = arguments
-            .series
-            .iter()
-            .map(|file| file.display().to_string());
+        let files = arguments.series.iter();
+        let files = files.map(|file| file.display().to_string()).collect();
         let found = watch(&tests, &settings)?;
-        let document = series_of(&name, &structure, files.collect(), found, warnings);
-        if let Some(file) = png
-            && let Some(bytes) = render_series_picture(&document, file.picture_format())?
-        {
-            file.write(&bytes)?;
-        }
-        if let Some(file) = csv {
-            file.write(render_series_csv(&document)?.as_bytes())?;
-        }
-        terminal.say(&render_series(&document))?;
-        terminal.write_document(&document)?;
-        return Ok(Outcome::Answered);
+        let document = series_of(&name, &structure, files, found, warnings);
+        return answer(&document, png, csv, terminal);
     }
     let mut groups = Vec::new();
     match (&arguments.first, &arguments.second) {
@@ -165,13 +153,26 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     }
     let found = compare(&pairs, &settings)?;
     let document = comparison_of(&name, &structure, found, warnings);
+    answer(&document, png, csv, terminal)
+}
+
+/// Writes the picture and the rows, and prints the answer.
+fn answer(
+    document: &Document,
+    png: Option<OutputFile>,
+    csv: Option<OutputFile>,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
     if let Some(file) = png
-        && let Some(bytes) = render_comparison_picture(&document, file.picture_format())?
+        && let Some(bytes) = render_comparison_picture(document, file.picture_format())?
     {
         file.write(&bytes)?;
     }
-    terminal.say(&render_comparison(&document))?;
-    terminal.write_document(&document)?;
+    if let Some(file) = csv {
+        file.write(render_series_csv(document)?.as_bytes())?;
+    }
+    terminal.say(&render_comparison(document))?;
+    terminal.write_document(document)?;
     Ok(Outcome::Answered)
 }
 

@@ -166,6 +166,21 @@ pub(crate) fn with_joint(structure: &Specimen, directions: &[usize], steps: &[f6
     moved
 }
 
+/// Returns the described structure of a test on this joint. A stiffness that the test states is described, too.
+fn described_with(test: &Test, joint: Option<Joint>) -> Specimen {
+    let mut described = test.structure.clone();
+    described.joint = joint;
+    if let (Some(joint), Some(stated)) = (&mut described.joint, test.structure.joint) {
+        if test.knows_joint[0] {
+            joint.kt = stated.kt;
+        }
+        if test.knows_joint[1] {
+            joint.kr = stated.kr;
+        }
+    }
+    described
+}
+
 /// Fit of the joint to the frequencies of one test. Its parameters are logarithms of stiffnesses, the coupling, and the
 /// common factor of all frequencies.
 struct Level<'a> {
@@ -280,17 +295,7 @@ impl PairModel {
             });
         let structures = |steps: &[f64]| -> Result<Structures, StructureError> {
             let before = with_joint(&first.structure, &directions, steps);
-            let mut after = last.structure.clone();
-            after.joint = before.joint;
-            if let (Some(joint), Some(stated)) = (&mut after.joint, last.structure.joint) {
-                // A stiffness that is stated for the tests after is no candidate's: it is described.
-                if last.knows_joint[0] {
-                    joint.kt = stated.kt;
-                }
-                if last.knows_joint[1] {
-                    joint.kr = stated.kr;
-                }
-            }
+            let after = described_with(last, before.joint);
             let (modes_before, modes_after) = (solved(&before, modes)?, solved(&after, modes)?);
             Ok(Structures {
                 log_before: logs_of(&modes_before, modes),
@@ -582,17 +587,7 @@ impl Differences {
             let logs = [&centre.log_before, &centre.log_after][side];
             let mut beyond: DMatrix<f64> = DMatrix::zeros(tests.len(), count);
             for (row, test) in tests.iter().enumerate() {
-                let mut own = test.structure.clone();
-                own.joint = described.joint;
-                if let (Some(joint), Some(stated)) = (&mut own.joint, test.structure.joint) {
-                    // A stiffness that this test states is described.
-                    if test.knows_joint[0] {
-                        joint.kt = stated.kt;
-                    }
-                    if test.knows_joint[1] {
-                        joint.kr = stated.kr;
-                    }
-                }
+                let own = described_with(test, described.joint);
                 let predicted = match own == *described {
                     true => logs.clone(),
                     false => log_frequencies(&own, modes)?,

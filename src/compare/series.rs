@@ -6,7 +6,7 @@
 //! declared healthy.
 
 use crate::change_point::{
-    Limits, Moments, Scatter, most_probable_step, most_unlike, single_limits,
+    Limits, Moments, TestScatter, most_probable_step, most_unlike, single_limits,
 };
 use crate::joint::JointChange;
 use crate::matching::match_modes;
@@ -54,7 +54,7 @@ pub enum Charted {
 pub struct ChartPoint {
     /// Change since the first test, beyond what the descriptions explain (%).
     pub percent: f64,
-    /// How much the last tests differ from those before them, in standard deviations (1); 0 where too few tests are known.
+    /// How improbable the difference of the last tests is, as a standard normal variable (1); 0 where too few tests are known.
     pub score: f64,
     /// Number of last tests that differ most; 0 where too few tests are known.
     pub last: usize,
@@ -127,14 +127,14 @@ impl Series {
 pub struct Watched {
     /// The charts.
     pub series: Series,
-    /// What changed between the tests before the earliest departure and those from there to the one that shows it;
-    /// `None` where all tests agree.
+    /// What changed. The tests before the step are compared with those from the step to the test that shows it. `None` where
+    /// all tests agree.
     pub change: Option<Comparison>,
 }
 
 /// Charts a series of tests of one structure.
 ///
-/// The limits are left once in 200 tests by chance or less often, all charts together.
+/// The limits are set for one false alarm in 250 drawn tests, all charts together.
 ///
 /// # Errors
 /// [`CompareError`]: too few or too many tests, too few modes in common, a structure without modes.
@@ -156,7 +156,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     let model = PairModel::new(
         &Pair {
             before: vec![first.clone()],
-            after: vec![others[0].clone()],
+            after: vec![first.clone()],
         },
         &modes,
     )?;
@@ -168,7 +168,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         levers,
         rows,
     } = Changes::new(&model, &measured);
-    // A stated repeatability holds the readings' own noise. Half of the variance of a difference is that of one test.
+    // A stated repeatability holds the readings' own noise, unless these are worse. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
     let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
     let stds = (0..count).map(|k| {
@@ -184,8 +184,8 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         let variance: f64 = variances.map(|(lever, std)| (lever * std).powi(2)).sum();
         // How much of the scatter all modes share is not stated.
         let scatter = match is_stated && index < count {
-            true => Scatter::Known(stds[index]),
-            false => Scatter::AtLeast(variance.sqrt()),
+            true => TestScatter::Known(stds[index]),
+            false => TestScatter::AtLeast(variance.sqrt()),
         };
         chart(*quantity, &values, scatter, &limits)
     });
@@ -200,7 +200,8 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     let mut change = None;
     if let Some((_, departure)) = series.departure() {
         // What comes later may be another change.
-        let (before, after) = tests[..=departure.test].split_at(departure.since);
+        let numbered = [all.before, all.after].concat();
+        let (before, after) = numbered[..=departure.test].split_at(departure.since);
         let pair = Pair {
             before: before[before.len().saturating_sub(MOST_REPEATS)..].to_vec(),
             after: after.to_vec(),
@@ -293,7 +294,7 @@ fn left_out(all: &Pair, modes: &[usize]) -> Vec<LeftOutMode> {
 }
 
 /// Charts one quantity by its values (logarithms over the first test).
-fn chart(quantity: Charted, values: &[f64], scatter: Scatter, limits: &Limits) -> ControlChart {
+fn chart(quantity: Charted, values: &[f64], scatter: TestScatter, limits: &Limits) -> ControlChart {
     let percent = |log: f64| 100.0 * log.exp_m1();
     let mut points = Vec::with_capacity(values.len());
     let mut departure = None;

@@ -552,6 +552,32 @@ fn prop_stated_stiffnesses_of_each_test_are_taken_out() {
     assert!(found.series.departure().is_none());
 }
 
+/// Of several tests one states its stiffness: the others are judged with that of the first.
+#[test]
+fn prop_what_one_test_states_is_not_taken_for_the_others() {
+    let mut tests = series(&[1.0, 1.3, 1.0, 1.0], 1e-6);
+    tests[1].structure.joint.as_mut().unwrap().kr *= 1.3;
+    tests[1].knows_joint[1] = true;
+    let found = watch(&tests, &stated(2e-3)).unwrap().series;
+    let mut charts = found.charts.iter();
+    let first = charts.find(|one| one.quantity == Charted::Mode(1)).unwrap();
+    for point in &first.points[2..] {
+        assert!(point.percent.abs() < 1e-3, "{point:?}");
+    }
+}
+
+/// A free beam has charts of its modes alone.
+#[test]
+fn limit_a_free_beam_has_no_chart_of_a_joint() {
+    let lap = Default::default();
+    let structure = Specimen::jointed(BeamTheory::Euler, &BEAM, Assembly::Free, &lap, None);
+    let measured = frequencies(&structure);
+    let tests = vec![test(&structure, &[], &measured); 4];
+    let found = watch(&tests, &stated(1e-3)).unwrap().series;
+    assert_eq!(found.charts.len(), MODES + 1);
+    assert!(found.departure().is_none());
+}
+
 /// A mode that one test lacks has no chart, and the test is told.
 #[test]
 fn prop_a_mode_that_a_test_lacks_is_left_out_and_told() {

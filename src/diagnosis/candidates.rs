@@ -154,6 +154,11 @@ pub fn candidate_effects(dataset: &Dataset) -> Vec<Vec<CandidateEffect>> {
     all
 }
 
+/// Returns whether places can be off by a usual offset to one side at least. Places at both ends of a beam cannot.
+fn has_room(offset: &Size) -> bool {
+    offset.high.max(-offset.low) >= offset.scale
+}
+
 /// Returns an error of the set-up for each thing that it may act on. It is tried only where shapes or modal constants
 /// were measured.
 fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
@@ -176,11 +181,12 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
             for name in names {
                 let own = inventory.positions.iter().filter(|one| one.0 == name);
                 let stated: Vec<f64> = own.map(|one| one.1).collect();
-                if stated.len() > 1 {
+                let size = Size::offset(&stated, length);
+                if stated.len() > 1 && has_room(&size) {
                     all.push(CandidateEffect::of_set_up(
                         effect,
                         Target::Sensor { name },
-                        Size::offset(&stated, length),
+                        size,
                     ));
                 }
             }
@@ -193,12 +199,9 @@ fn set_up_errors(effect: EffectId, dataset: &Dataset) -> Vec<CandidateEffect> {
                     Size::offset(&[*stated], length),
                 ));
             }
-            if inventory.taps.len() > 1 {
-                all.push(CandidateEffect::of_set_up(
-                    effect,
-                    Target::All,
-                    Size::offset(&inventory.taps, length),
-                ));
+            let size = Size::offset(&inventory.taps, length);
+            if inventory.taps.len() > 1 && has_room(&size) {
+                all.push(CandidateEffect::of_set_up(effect, Target::All, size));
             }
         }
         EffectId::SensorPolarity if has_constants || has_ratios => {
@@ -312,6 +315,15 @@ mod tests {
         assert!((all - 1.0).abs() < 1e-5, "{all}");
         // A step of 2.5e-6 at the median, where the density is 0.5/(0.01 x 0.8): 1e-4 at most.
         assert!((below - 0.5).abs() < 1e-3, "{below}");
+    }
+
+    /// A sensor at both ends in turn can be off alike in neither direction.
+    #[test]
+    fn limit_places_at_both_ends_cannot_be_off_alike() {
+        assert!(!has_room(&Size::offset(&[0.0, 0.4], 0.4)));
+        assert!(!has_room(&Size::offset(&[0.001, 0.398], 0.4)));
+        assert!(has_room(&Size::offset(&[0.02, 0.4], 0.4)));
+        assert!(has_room(&Size::offset(&[0.4], 0.4)));
     }
 
     #[test]

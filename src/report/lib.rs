@@ -45,11 +45,11 @@ pub use document::{
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     MODEL_FILE, earlier_files, render_cloud_picture, render_comparison_picture, render_frf_picture,
-    render_json, render_run, render_schema, render_series_picture, render_spectrum_picture,
+    render_json, render_run, render_schema, render_spectrum_picture,
 };
 pub use text::{
-    render_comparison, render_gap_text, render_readings, render_reproduction, render_series,
-    render_stages, render_text, wrapped,
+    render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,
+    render_text, wrapped,
 };
 
 /// A finished file.

@@ -110,7 +110,7 @@ pub fn render_cloud_picture(
         .transpose()
 }
 
-/// The comparison of two tests as a picture; `None` without one.
+/// The control charts of a series, else the comparison of two tests, as a picture; `None` without either.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
@@ -118,20 +118,8 @@ pub fn render_comparison_picture(
     document: &Document,
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
-    comparison::changes(document)
-        .map(|chart| chart.render(format))
-        .transpose()
-}
-
-/// The control charts of a series of tests as a picture; `None` without one.
-///
-/// # Errors
-/// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_series_picture(
-    document: &Document,
-    format: PictureFormat,
-) -> Result<Option<Vec<u8>>, ReportError> {
     series::control_charts(document)
+        .or_else(|| comparison::changes(document))
         .map(|chart| chart.render(format))
         .transpose()
 }

@@ -184,16 +184,23 @@ pub fn render_gap_text(document: &Document) -> String {
     joined([prediction, gap(document), warnings(document)])
 }
 
-/// Returns what changed between two tests: the answer, the frequencies, and the causes.
+/// Returns the control charts of a series with its answer, and what changed between two tests: the answer, the frequencies, and
+/// the causes.
 pub fn render_comparison(document: &Document) -> String {
-    let sentences = answer(document);
-    let sentences: Vec<String> = sentences
-        .iter()
-        .map(|sentence| wrapped(sentence, 2))
-        .collect();
+    let lines = |sentences: Vec<String>| -> String {
+        let wrapped = sentences.iter().map(|sentence| wrapped(sentence, 2));
+        wrapped.collect()
+    };
+    let series = document.series.iter().flat_map(series::answer);
+    let heading = match (&document.series, &document.compare) {
+        (Some(_), Some(_)) => "Before and after:\n",
+        _ => "",
+    };
     let tables = [tables::changed_modes(document), tables::changes(document)];
     joined([
-        sentences.join(""),
+        lines(series.collect()),
+        noted(tables::control_charts(document)),
+        format!("{heading}{}", lines(answer(document))),
         joined(tables.map(noted)),
         doubts(document),
     ])
@@ -217,18 +224,6 @@ fn doubts(document: &Document) -> String {
             2,
         ),
     }
-}
-
-/// Returns the answer of a series of tests and its charts as a table; then what changed, if anything did.
-pub fn render_series(document: &Document) -> String {
-    let sentences = document.series.iter().flat_map(series::answer);
-    let sentences: Vec<String> = sentences.map(|one| wrapped(&one, 2)).collect();
-    let charts = noted(tables::control_charts(document));
-    let rest = match document.compare {
-        Some(_) => format!("Before and after:\n{}", render_comparison(document)),
-        None => doubts(document),
-    };
-    joined([sentences.join(""), charts, rest])
 }
 
 /// The story of the gap and the hypotheses; empty without a diagnosis.

@@ -29,7 +29,7 @@ fn val_a_score_is_as_improbable_as_students_t() {
 #[test]
 fn prop_a_test_at_its_limits_has_the_limit_as_score() {
     let before = [0.1, -0.2, 0.05, 0.0, -0.1, 0.15, 0.02];
-    for scatter in [Scatter::Known(0.12), Scatter::AtLeast(1e-9)] {
+    for scatter in [TestScatter::Known(0.12), TestScatter::AtLeast(1e-9)] {
         let ends = single_limits(&moments_of(&before), scatter, 3.4).unwrap();
         for end in ends {
             let all = [&before[..], &[end]].concat();
@@ -41,26 +41,27 @@ fn prop_a_test_at_its_limits_has_the_limit_as_score() {
     }
 }
 
-/// Equal values never differ, whatever their scatter is known to be; a shift and a scale change no score.
+/// Equal values never differ, whatever their scatter is known to be.
 #[test]
 fn limit_equal_tests_agree() {
     let moments = moments_of(&[0.3; 9]);
-    for scatter in [Scatter::Known(0.1), Scatter::AtLeast(1e-6)] {
+    for scatter in [TestScatter::Known(0.1), TestScatter::AtLeast(1e-6)] {
         let found = most_unlike(&moments, scatter).unwrap();
         assert!(found.score.abs() < 1e-9);
     }
-    assert!(most_unlike(&moments_of(&[0.3; 4]), Scatter::AtLeast(1e-6)).is_none());
+    assert!(most_unlike(&moments_of(&[0.3; 4]), TestScatter::AtLeast(1e-6)).is_none());
 }
 
+/// A shift and a scale change no score.
 #[test]
 fn prop_scores_have_no_unit() {
     let values = [0.0, 0.3, -0.1, 0.2, 1.4, 1.2, 1.5];
     let other = values.map(|value| 7.0 - 3.0 * value);
     let [one, other] = [&values, &other]
-        .map(|values| most_unlike(&moments_of(values), Scatter::AtLeast(1e-9)).unwrap());
+        .map(|values| most_unlike(&moments_of(values), TestScatter::AtLeast(1e-9)).unwrap());
     assert_eq!([one.last, other.last], [3, 3]);
     assert!((one.score + other.score).abs() < 1e-9);
-    let step = most_probable_step(&moments_of(&values), Scatter::Known(1.0));
+    let step = most_probable_step(&moments_of(&values), TestScatter::Known(1.0));
     assert_eq!(step.last, 3);
     // 4.1/3 after less 0.4/4 before.
     assert!((step.difference - (4.1 / 3.0 - 0.1)).abs() < 1e-12);
@@ -83,7 +84,7 @@ fn recover_limits_give_few_alarms_and_show_a_step() {
             for chart in &mut charts {
                 let value: f64 = StandardNormal.sample(&mut draw);
                 chart.add(value);
-                let found = most_unlike(chart, Scatter::AtLeast(1e-9));
+                let found = most_unlike(chart, TestScatter::AtLeast(1e-9));
                 highest = highest.max(found.map_or(0.0, |found| found.score.abs()));
             }
             at_risk += 1;
@@ -98,9 +99,9 @@ fn recover_limits_give_few_alarms_and_show_a_step() {
             let value: f64 = StandardNormal.sample(&mut draw);
             chart.add(if test < change { value } else { value + 5.0 });
         }
-        let found = most_unlike(&chart, Scatter::AtLeast(1e-9)).unwrap();
+        let found = most_unlike(&chart, TestScatter::AtLeast(1e-9)).unwrap();
         let limit = limits.at(change + 3).unwrap();
-        let step = most_probable_step(&chart, Scatter::AtLeast(1e-9));
+        let step = most_probable_step(&chart, TestScatter::AtLeast(1e-9));
         seen += u64::from(found.score > limit && step.last == 3);
     }
     // One in 250 would be 27 alarms of 6800 tests; normal scatter gives about half.

@@ -5,7 +5,7 @@ use crate::document::Document;
 use crate::format::{probability, signed_percent};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
 use crate::words::comparison::cause;
-use tapjoint_compare::{CauseResult, Comparison, ModeChange};
+use tapjoint_compare::{CauseResult, Comparison};
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Causes shown.
@@ -40,9 +40,9 @@ pub fn changes(document: &Document) -> Option<Chart> {
     })
 }
 
-/// Returns the change beyond the described one (%).
-fn beyond(mode: &ModeChange) -> f64 {
-    mode.z * mode.std_percent
+/// Returns a change (%) from its logarithm (1/100).
+fn percent_of(logarithm: f64) -> f64 {
+    100.0 * (0.01 * logarithm).exp_m1()
 }
 
 fn changes_panel(found: &Comparison, first: Option<&CauseResult>) -> Panel {
@@ -61,11 +61,12 @@ fn changes_panel(found: &Comparison, first: Option<&CauseResult>) -> Panel {
         // Pairs stand beside each other.
         let share = (mode.pair as f64 + 0.5) / pairs as f64;
         let at = mode.mode as f64 + 0.5 * (share - 0.5);
-        let change = beyond(mode);
+        let logarithm = mode.z * mode.std_percent;
+        let change = percent_of(logarithm);
         measured.push(at, change);
         let reach = NORMAL_95 * mode.std_percent;
-        measured.low.push(change - reach);
-        measured.high.push(change + reach);
+        measured.low.push(percent_of(logarithm - reach));
+        measured.high.push(percent_of(logarithm + reach));
         measured.words.push(format!(
             "mode {}, {:.5} to {:.5} Hz",
             mode.mode, mode.before, mode.after
@@ -80,7 +81,8 @@ fn changes_panel(found: &Comparison, first: Option<&CauseResult>) -> Panel {
     }
     let mut series = vec![measured];
     series.extend(predicted);
-    let ends = series[0].low.iter().chain(&series[0].high).copied();
+    let ends = series[0].low.iter().chain(&series[0].high);
+    let ends = ends.chain(series.iter().flat_map(|one| &one.y)).copied();
     let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
     let y = padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1);
     let y = y.of("change of the frequency", "%");

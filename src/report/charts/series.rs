@@ -46,14 +46,17 @@ fn panel(chart: &ControlChart, section: &SeriesSection) -> Panel {
             .push(format!("test {}: {}", test + 1, section.tests[test]));
         own.said.push(signed_percent(Some(point.percent)) + " %");
     }
-    // Limits after few tests are wide: the last ones and the tests decide what is shown.
+    // The tests decide what is shown: limits after few tests may be many times as wide.
+    let (low, high) = extent(ends).unwrap_or((-LEAST_SPAN, LEAST_SPAN));
+    let (low, high) = (low.min(-LEAST_SPAN), high.max(LEAST_SPAN));
+    let span = high - low;
     let last = chart
         .points
         .last()
-        .and_then(|point| point.single_limits_percent);
-    let (low, high) = extent(ends.into_iter().chain(last.into_iter().flatten()))
-        .unwrap_or((-LEAST_SPAN, LEAST_SPAN));
-    let (low, high) = (low.min(-LEAST_SPAN), high.max(LEAST_SPAN));
+        .and_then(|one| one.single_limits_percent);
+    let [below, above] = last.unwrap_or([low, high]);
+    let low = below.clamp(low - span, low);
+    let high = above.clamp(high, high + span);
     let margin = 0.1 * (high - low);
     for (test, point) in chart.points.iter().enumerate() {
         if let Some(limits) = point.single_limits_percent {

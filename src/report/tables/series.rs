@@ -19,7 +19,7 @@ pub fn control_charts(document: &Document) -> Option<Table> {
                 "Scatter (%)",
                 or_missing(chart.scatter_percent.map(|one| significant(one, 2))),
             ),
-            number("Last (%)", percent(last.map(|last| last.percent))),
+            number("Last (%)", signed_percent(last.map(|last| last.percent))),
             number(
                 "Score",
                 or_missing(score.map(|score| significant(score, 2))),
@@ -30,21 +30,17 @@ pub fn control_charts(document: &Document) -> Option<Table> {
             ),
             number("Since test", one_based(departure.map(|one| one.since))),
             number("Seen at test", one_based(departure.map(|one| one.test))),
-            number("By (%)", percent(departure.map(|one| one.percent))),
+            number("By (%)", signed_percent(departure.map(|one| one.percent))),
         ]
     });
     Some(Table::of(
         "Control charts",
         rows,
-        "Last: change of the last test since the first. Score: how much the last tests differ from those before, in standard \
-         deviations. By chance any score exceeds its limit once in 200 tests.",
+        "Last: change of the last test since the first. Score: how improbable the difference between the last tests and those \
+         before is, as a standard normal variable. The limits allow one false alarm in about 250 tests of drawn scatter.",
     ))
 }
 
 fn one_based(index: Option<usize>) -> String {
     or_missing(index.map(|index| index + 1))
-}
-
-fn percent(value: Option<f64>) -> String {
-    or_missing(value.map(|value| signed_percent(Some(value))))
 }

@@ -31,17 +31,17 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
             ));
         }
         None => sentences.push(
-            "Too few tests to judge. At least five are needed, or three with --repeatability."
+            "There are too few tests to judge. Give at least five, or three with --repeatability."
                 .to_owned(),
         ),
         Some((chart, departure)) => {
             let seen = name(departure.test);
             let since = match departure.since == departure.test {
-                true => "with it".to_owned(),
-                false => format!("with {}", name(departure.since)),
+                true => "at this test".to_owned(),
+                false => format!("at {}", name(departure.since)),
             };
             sentences.push(format!(
-                "A change is seen at {seen}. It began most probably {since}."
+                "A change is seen at {seen}. It most probably began {since}."
             ));
             let size = match chart.scatter_percent {
                 Some(scatter) => format!(
@@ -51,7 +51,7 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
                 None => String::new(),
             };
             sentences.push(format!(
-                "The chart of {} shows it first: {} %{size}.",
+                "The chart of {} shows it most clearly: {} %{size}.",
                 quantity(chart.quantity),
                 signed_percent(Some(departure.percent)),
             ));

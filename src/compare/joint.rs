@@ -7,7 +7,7 @@
 //! the centre and reaches to the largest changes.
 
 use crate::cause::SizePrior;
-use crate::likelihood::{Data, Gaussian, log_sum};
+use crate::likelihood::{Data, Likelihood, log_sum};
 use crate::model::{PairModel, Predicted};
 use crate::search::{Point, Posterior, normalised};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -26,6 +26,9 @@ const MOST: [f64; 3] = [3.0, 0.5, 1.0];
 const POINTS: [i32; 3] = [20, 12, 5];
 /// Their distance near the centre, in standard deviations.
 const POINT_STEP: f64 = 0.5;
+/// Most searches, and the change of the prediction (1, standard deviations) at which they end.
+const MOST_TURNS: usize = 6;
+const SETTLED: f64 = 0.1;
 /// Step of differences.
 const STEP: f64 = 0.01;
 
@@ -107,23 +110,24 @@ impl JointChange {
             .collect()
     }
 
-    /// Returns the most probable change by searches from these starts, and the curvature of the logarithm of the posterior
-    /// there; `None` where the search fails.
-    fn peak(&self, data: &Data<'_>, starts: &[Vec<f64>]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    /// Returns the most probable change by searches from these starts; `None` where they fail.
+    ///
+    /// Its covariance depends on the change itself. So each turn takes that of the last turn's answer.
+    fn peak<'a>(&self, data: &'a Data<'a>, starts: &[Vec<f64>]) -> Option<Peak<'a>> {
         let limits = SearchSettings {
             gain: 1e-4,
             polish: false,
             ..SearchSettings::default()
         };
-        let none: Vec<Predicted> = data.pairs.iter().map(Predicted::nothing).collect();
+        let mut reference: Vec<Predicted> = data.pairs.iter().map(Predicted::nothing).collect();
         let mut starts = starts.to_vec();
-        let mut favoured = data.favoured(&none);
-        // The second turn takes the repeatability that the first one's answer leaves.
-        for turn in 0..2 {
+        for turn in 1.. {
+            let likelihood = data.about(&reference)?;
             let search = Search {
                 change: self,
                 data,
-                variances: &data.variances[favoured],
+                scatter: likelihood.favoured(&reference),
+                likelihood: &likelihood,
                 bounds: self.most.iter().map(|most| [-most, *most]).collect(),
             };
             let mut best: Option<(f64, Vec<f64>)> = None;
@@ -137,24 +141,30 @@ impl JointChange {
                 }
             }
             let (_, centre) = best?;
-            let next = data.favoured(&self.predict(data, &centre)?);
-            if turn == 1 || next == favoured {
-                let state = search.evaluate(&centre, None)?;
+            let state = search.evaluate(&centre, None)?;
+            let predicted = self.predict(data, &centre)?;
+            let moved = likelihood.distance(search.scatter, &reference, &predicted)?;
+            if moved < SETTLED || turn == MOST_TURNS {
                 let slopes = search.slopes(&centre, &state)?;
-                return Some((centre, slopes.transpose() * slopes));
+                let curvature = slopes.transpose() * slopes;
+                return Some(Peak {
+                    centre,
+                    predicted,
+                    curvature,
+                    likelihood,
+                });
             }
-            favoured = next;
+            reference = predicted;
             starts = vec![centre];
         }
         None
     }
 
-    /// Returns the logarithm of the evidence by the parabola at its peak, searched from one start.
-    fn log_evidence_near(&self, data: &Data<'_>, start: Vec<f64>) -> Option<f64> {
-        let (centre, curvature) = self.peak(data, &[start])?;
-        let log_determinant = curvature.cholesky()?.determinant().ln();
-        let half_count = 0.5 * centre.len() as f64;
-        let log = data.log_density(&self.predict(data, &centre)?) + self.log_prior(&centre);
+    /// Returns the logarithm of the evidence by the parabola at its peak.
+    fn log_evidence_at(&self, peak: &Peak<'_>) -> Option<f64> {
+        let log_determinant = peak.curvature.clone().cholesky()?.determinant().ln();
+        let half_count = 0.5 * peak.centre.len() as f64;
+        let log = peak.likelihood.log_density(&peak.predicted) + self.log_prior(&peak.centre);
         Some(log + half_count * (2.0 * PI).ln() - 0.5 * log_determinant)
     }
 
@@ -182,8 +192,9 @@ impl JointChange {
         index: usize,
         size: f64,
     ) -> Option<f64> {
-        let evidence = self.alone(index).log_evidence_near(data, vec![size])?;
-        Some(evidence - self.ways().ln())
+        let alone = self.alone(index);
+        let peak = alone.peak(data, &[vec![size]])?;
+        Some(alone.log_evidence_at(&peak)? - self.ways().ln())
     }
 
     /// Returns the posterior of a change; `None` where the search fails.
@@ -205,8 +216,12 @@ impl JointChange {
             let widths = self.half_widths.iter();
             widths.map(|width| share * width).collect()
         });
-        let (centre, curvature) = self.peak(data, &starts)?;
-        let axes = SymmetricEigen::new(curvature);
+        let peak = self.peak(data, &starts)?;
+        // Where the joint does not explain the changes, its sizes are less sure.
+        let excess = peak
+            .likelihood
+            .excess(&peak.predicted, self.directions.len());
+        let axes = SymmetricEigen::new(peak.curvature.clone());
         let count = self.directions.len();
         let each = POINTS[count - 1];
         let mut grids = Vec::with_capacity(count);
@@ -216,14 +231,14 @@ impl JointChange {
                 .zip(&self.most)
                 .map(|(along, most)| most / along.abs());
             let reach = shares.fold(f64::INFINITY, f64::min) * 1.2;
-            grids.push(stretched(each, value.sqrt().recip(), reach));
+            grids.push(stretched(each, (excess / value).sqrt(), reach));
         }
         let steps_each = (2 * each + 1) as usize;
         let indices: Vec<usize> = (0..steps_each.pow(count as u32)).collect();
         let points: Vec<Point> = indices
             .into_par_iter()
             .filter_map(|index| {
-                let mut moved = DVector::from_column_slice(&centre);
+                let mut moved = DVector::from_column_slice(&peak.centre);
                 let (mut rest, mut log_volume) = (index, 0.0);
                 for (axis, grid) in grids.iter().enumerate() {
                     let (away, volume) = grid[rest % steps_each];
@@ -237,16 +252,31 @@ impl JointChange {
                 }
                 let predicted = self.predict(data, moved.as_slice())?;
                 let log_prior = self.log_prior(moved.as_slice());
-                let log_density = data.log_density(&predicted);
+                let log_density = peak.likelihood.log_density(&predicted);
                 Some(Point {
-                    log_weight: log_density + log_prior + log_volume,
+                    log_weight: log_density / excess + log_prior + log_volume,
                     log_density,
                     values: moved.as_slice().to_vec(),
                 })
             })
             .collect();
-        normalised(points, |values| self.predict(data, values))
+        let mut found = normalised(points, |values| self.predict(data, values))?;
+        if excess > 1.0 {
+            found.log_evidence = self.log_evidence_at(&peak)?;
+        }
+        Some(found)
     }
+}
+
+/// The most probable change.
+struct Peak<'a> {
+    centre: Vec<f64>,
+    /// What it predicts.
+    predicted: Vec<Predicted>,
+    /// Curvature of the logarithm of the posterior.
+    curvature: DMatrix<f64>,
+    /// Probability of the measured changes near it.
+    likelihood: Likelihood<'a>,
 }
 
 /// Returns points about zero with the piece of the axis that each stands for: [`POINT_STEP`] standard deviations apart near
@@ -274,7 +304,9 @@ fn stretched(each: i32, std: f64, reach: f64) -> Vec<(f64, f64)> {
 struct Search<'a> {
     change: &'a JointChange,
     data: &'a Data<'a>,
-    variances: &'a [Vec<f64>],
+    likelihood: &'a Likelihood<'a>,
+    /// Index of the repeatability.
+    scatter: usize,
     bounds: Vec<[f64; 2]>,
 }
 
@@ -301,13 +333,7 @@ impl Problem for Search<'_> {
     /// Residuals in standard deviations, and what makes Cauchy's prior a sum of squares.
     fn evaluate(&self, parameters: &[f64], _: Option<&Vec<f64>>) -> Option<Vec<f64>> {
         let predicted = self.change.predict(self.data, parameters)?;
-        let mut residuals = Vec::new();
-        for ((pair, variances), predicted) in
-            self.data.pairs.iter().zip(self.variances).zip(&predicted)
-        {
-            let own = Gaussian::new(pair, variances, predicted)?;
-            residuals.extend(own.whitened()?.iter());
-        }
+        let mut residuals = self.likelihood.whitened(self.scatter, &predicted)?;
         for (step, half_width) in parameters.iter().zip(&self.change.half_widths) {
             let loss = (2.0 * (1.0 + (step / half_width).powi(2)).ln()).sqrt();
             residuals.push(loss.copysign(*step));

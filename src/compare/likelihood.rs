@@ -1,10 +1,12 @@
 //! Probability of the measured changes, given a predicted one.
 //!
 //! The measured change of each mode is the predicted one, plus scatter between set-ups. Its covariance is
-//! r^2 I + sum of g g' + (e d)^2 + (e/2)^2 d d':
+//! r^2 ((1 - c) I + c 1 1') + sum of g g' + (e d)^2 + (e/2)^2 d d':
 //!
 //! - r: the repeatability, or the readings where they are worse
-//! - g: change of the prediction with the joint one standard deviation aside, for each of its axes
+//! - c: correlation of the scatter of two modes
+//! - g: change of the prediction with the joint one standard deviation aside, for each of its axes; of a sensor that was moved
+//!   also with its place aside
 //! - d: predicted and described change together. It has the relative error e in each mode, and half of it in all
 
 use crate::model::{PairModel, Predicted};
@@ -21,6 +23,10 @@ const USUAL_SPREAD: f64 = 0.8;
 const STEPS: i32 = 12;
 const REACH: f64 = 3.5;
 
+/// Goodness of fit below which a cause does not explain the changes.
+pub(crate) const NO_FIT: f64 = 0.01;
+/// Correlation of the scatter of two modes: temperature and a joint that settles move all frequencies in common.
+const SCATTER_CORRELATION: f64 = 0.25;
 /// Error that the predicted changes of all modes have in common, over that of one.
 const COMMON_SHARE: f64 = 0.5;
 
@@ -94,12 +100,6 @@ pub(crate) fn variances(pair: &PairModel, std: f64, is_stated: bool) -> Vec<f64>
         .collect()
 }
 
-/// Measured less predicted changes with their covariance.
-pub(crate) struct Gaussian {
-    residual: DVector<f64>,
-    factor: Cholesky<f64, Dyn>,
-}
-
 /// Returns the covariance of the measured changes: scatter and readings, and the uncertainty of what is predicted and of what
 /// the descriptions tell.
 pub(crate) fn covariance(
@@ -108,7 +108,10 @@ pub(crate) fn covariance(
     predicted: &Predicted,
 ) -> DMatrix<f64> {
     let count = variances.len();
-    let mut covariance = DMatrix::from_diagonal(&DVector::from_column_slice(variances));
+    let mut covariance = DMatrix::from_fn(count, count, |row, column| match row == column {
+        true => variances[row],
+        false => SCATTER_CORRELATION * (variances[row] * variances[column]).sqrt(),
+    });
     let common = (COMMON_SHARE * pair.shape_error).powi(2);
     let both = predicted.change.iter().zip(&pair.described);
     let total: Vec<f64> = both.map(|(change, described)| change + described).collect();
@@ -118,10 +121,12 @@ pub(crate) fn covariance(
             covariance[(i, j)] += common * one * other;
         }
     }
-    for (axis, described) in pair.described_aside.iter().enumerate() {
-        let mut aside = described.clone();
-        if let Some(own) = predicted.aside.get(axis) {
-            aside.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+    for axis in 0..pair.described_aside.len().max(predicted.aside.len()) {
+        let mut aside = vec![0.0; count];
+        for own in [&pair.described_aside, &predicted.aside] {
+            if let Some(own) = own.get(axis) {
+                aside.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            }
         }
         for i in 0..count {
             for j in 0..count {
@@ -132,38 +137,46 @@ pub(crate) fn covariance(
     covariance
 }
 
-impl Gaussian {
-    /// With the prediction's own uncertainty; `None` where the covariance is none.
-    pub(crate) fn new(pair: &PairModel, variances: &[f64], predicted: &Predicted) -> Option<Self> {
-        let residual = pair.measured.iter().zip(&predicted.change);
-        let residual = residual.map(|(measured, predicted)| measured - predicted);
-        let residual = DVector::from_iterator(variances.len(), residual);
-        Self::of(residual, covariance(pair, variances, predicted))
-    }
+/// A covariance and its factor.
+pub(crate) struct Factored {
+    factor: Cholesky<f64, Dyn>,
+    log_determinant: f64,
+}
 
-    /// With this covariance; `None` where it is none.
-    pub(crate) fn of(residual: DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
+impl Factored {
+    /// Factors a covariance; `None` where it is none.
+    pub(crate) fn new(covariance: DMatrix<f64>) -> Option<Self> {
         let factor = covariance.cholesky()?;
-        Some(Self { residual, factor })
+        let diagonal = factor.l_dirty().diagonal();
+        let log_determinant = 2.0 * diagonal.iter().map(|one| one.ln()).sum::<f64>();
+        Some(Self {
+            factor,
+            log_determinant,
+        })
     }
 
     /// Returns residual' covariance^-1 residual.
-    pub(crate) fn chi_square(&self) -> f64 {
-        self.residual.dot(&self.factor.solve(&self.residual))
+    fn chi_square(&self, residual: &DVector<f64>) -> f64 {
+        residual.dot(&self.factor.solve(residual))
     }
 
-    /// Returns the logarithm of the density.
-    pub(crate) fn log_density(&self) -> f64 {
-        let diagonal = self.factor.l_dirty().diagonal();
-        let log_determinant = 2.0 * diagonal.iter().map(|one| one.ln()).sum::<f64>();
-        let count = self.residual.len() as f64;
-        -0.5 * (self.chi_square() + log_determinant + count * (2.0 * PI).ln())
+    /// Returns the logarithm of the density that has this chi square.
+    fn log_density_at(&self, chi_square: f64) -> f64 {
+        let count = self.factor.l_dirty().nrows() as f64;
+        -0.5 * (chi_square + self.log_determinant + count * (2.0 * PI).ln())
     }
 
-    /// Returns residuals in standard deviations, independent of each other.
-    pub(crate) fn whitened(&self) -> Option<DVector<f64>> {
-        self.factor.l().solve_lower_triangular(&self.residual)
+    /// Returns the logarithm of the density of a residual.
+    pub(crate) fn log_density(&self, residual: &DVector<f64>) -> f64 {
+        self.log_density_at(self.chi_square(residual))
     }
+}
+
+/// Returns measured less predicted changes.
+fn residual(pair: &PairModel, predicted: &Predicted) -> DVector<f64> {
+    let both = pair.measured.iter().zip(&predicted.change);
+    let both = both.map(|(measured, predicted)| measured - predicted);
+    DVector::from_iterator(pair.measured.len(), both)
 }
 
 /// All pairs with the values of their repeatability.
@@ -194,28 +207,33 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// Returns the logarithm of the density of all measured changes, the repeatability averaged over.
-    pub(crate) fn log_density(&self, predicted: &[Predicted]) -> f64 {
-        log_sum(self.by_scatter(predicted).iter().map(|one| one.0))
+    /// Returns the probability of changes with the covariance that this prediction has; `None` where it is none.
+    pub(crate) fn about(&self, reference: &[Predicted]) -> Option<Likelihood<'_>> {
+        let mut factors = Vec::with_capacity(self.scatters.len());
+        for variances in &self.variances {
+            let own = self.pairs.iter().zip(variances).zip(reference);
+            let own = own.map(|((pair, variances), reference)| {
+                Factored::new(covariance(pair, variances, reference))
+            });
+            factors.push(own.collect::<Option<Vec<Factored>>>()?);
+        }
+        Some(Likelihood {
+            data: self,
+            factors,
+        })
     }
 
-    /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there.
+    /// Returns the logarithm of the density of all measured changes, the repeatability averaged over.
+    pub(crate) fn log_density(&self, predicted: &[Predicted]) -> f64 {
+        let likelihood = self.about(predicted);
+        likelihood.map_or(f64::NEG_INFINITY, |own| own.log_density(predicted))
+    }
+
+    /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there. Nothing
+    /// where the prediction has no covariance.
     fn by_scatter(&self, predicted: &[Predicted]) -> Vec<(f64, f64)> {
-        let mut all = Vec::with_capacity(self.scatters.len());
-        for (scatter, variances) in self.scatters.iter().zip(&self.variances) {
-            let (mut log, mut chi_square) = (scatter.log_weight, 0.0);
-            for ((pair, variances), predicted) in self.pairs.iter().zip(variances).zip(predicted) {
-                match Gaussian::new(pair, variances, predicted) {
-                    Some(own) => {
-                        log += own.log_density();
-                        chi_square += own.chi_square();
-                    }
-                    None => log = f64::NEG_INFINITY,
-                }
-            }
-            all.push((log, chi_square));
-        }
-        all
+        let likelihood = self.about(predicted);
+        likelihood.map_or(Vec::new(), |own| own.by_scatter(predicted))
     }
 
     /// Returns the probability of a larger chi square, averaged over the repeatability by what the data say of it. `sizes` were
@@ -240,6 +258,46 @@ impl<'a> Data<'a> {
             .sum()
     }
 
+    /// Returns the mean of the repeatability by its weights (1).
+    pub(crate) fn mean_scatter(&self) -> f64 {
+        self.scatters
+            .iter()
+            .map(|one| one.log_weight.exp() * one.std)
+            .sum()
+    }
+}
+
+/// Probability of the measured changes with the covariance that one prediction has.
+pub(crate) struct Likelihood<'a> {
+    data: &'a Data<'a>,
+    /// By value of the repeatability and by pair.
+    factors: Vec<Vec<Factored>>,
+}
+
+impl Likelihood<'_> {
+    /// Returns the logarithm of the density of all measured changes, the repeatability averaged over.
+    pub(crate) fn log_density(&self, predicted: &[Predicted]) -> f64 {
+        log_sum(self.by_scatter(predicted).iter().map(|one| one.0))
+    }
+
+    /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there.
+    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<(f64, f64)> {
+        let pairs = self.data.pairs.iter().zip(predicted);
+        let residuals = pairs.map(|(pair, predicted)| residual(pair, predicted));
+        let residuals: Vec<DVector<f64>> = residuals.collect();
+        let mut all = Vec::with_capacity(self.factors.len());
+        for (scatter, factors) in self.data.scatters.iter().zip(&self.factors) {
+            let (mut log, mut total) = (scatter.log_weight, 0.0);
+            for (factor, residual) in factors.iter().zip(&residuals) {
+                let chi_square = factor.chi_square(residual);
+                log += factor.log_density_at(chi_square);
+                total += chi_square;
+            }
+            all.push((log, total));
+        }
+        all
+    }
+
     /// Returns the index of the repeatability that the data favour, given a prediction.
     pub(crate) fn favoured(&self, predicted: &[Predicted]) -> usize {
         let all = self.by_scatter(predicted).into_iter().enumerate();
@@ -247,11 +305,42 @@ impl<'a> Data<'a> {
         most.map_or(0, |one| one.0)
     }
 
-    /// Returns the mean of the repeatability by its weights (1).
-    pub(crate) fn mean_scatter(&self) -> f64 {
-        self.scatters
-            .iter()
-            .map(|one| one.log_weight.exp() * one.std)
-            .sum()
+    /// Returns residuals in standard deviations, independent of each other, at one value of the repeatability; `None` where they
+    /// have none.
+    pub(crate) fn whitened(&self, scatter: usize, predicted: &[Predicted]) -> Option<Vec<f64>> {
+        let mut all = Vec::new();
+        let pairs = self.data.pairs.iter().zip(predicted);
+        for ((pair, predicted), own) in pairs.zip(&self.factors[scatter]) {
+            let factor = own.factor.l_dirty();
+            let whitened = factor.solve_lower_triangular(&residual(pair, predicted))?;
+            all.extend(whitened.iter());
+        }
+        Some(all)
+    }
+
+    /// Returns the distance of two predictions in standard deviations, at one value of the repeatability.
+    pub(crate) fn distance(
+        &self,
+        scatter: usize,
+        one: &[Predicted],
+        other: &[Predicted],
+    ) -> Option<f64> {
+        let [one, other] = [one, other].map(|predicted| self.whitened(scatter, predicted));
+        let both = one?.into_iter().zip(other?);
+        Some(both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt())
+    }
+
+    /// Returns by how much the variances must grow for a prediction with this many fitted sizes to fit; 1 where it fits.
+    pub(crate) fn excess(&self, predicted: &[Predicted], sizes: usize) -> f64 {
+        let all = self.by_scatter(predicted);
+        let total = log_sum(all.iter().map(|one| one.0));
+        let weighted = all.iter().map(|one| (one.0 - total).exp() * one.1);
+        let chi_square: f64 = weighted.sum();
+        let count: usize = self.data.pairs.iter().map(|pair| pair.measured.len()).sum();
+        let freedom = count.saturating_sub(sizes).max(1) as f64;
+        match chi_square_tail(chi_square, freedom) < NO_FIT {
+            true => (chi_square / freedom).max(1.0),
+            false => 1.0,
+        }
     }
 }

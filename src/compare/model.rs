@@ -362,6 +362,17 @@ impl PairModel {
             let moved = self.shifted(structures, near.as_ref(), cause, size, place)?;
             aside.push(difference(&moved, &change));
         }
+        if cause.kind == CauseKind::SensorPosition {
+            // A point that moves like the sensor's lies elsewhere where shapes are off. Near an end it lies on one side only.
+            let moved = |size: f64| self.shifted(&self.centre, near.as_ref(), cause, size, place);
+            let from = [self.place_std(), -self.place_std()];
+            let elsewhere = from
+                .iter()
+                .find_map(|from| Some([moved(*from)?, moved(from + size)?]));
+            if let Some([start, end]) = elsewhere {
+                aside.push(difference(&difference(&end, &start), &change));
+            }
+        }
         Some(Predicted { change, aside })
     }
 

@@ -624,3 +624,61 @@ fn regress_a_load_near_buckling_is_found_with_its_sign() {
         );
     }
 }
+
+#[test]
+fn prop_a_shift_of_all_modes_is_more_like_scatter_than_shifts_of_either_sign() {
+    let structure = cantilever(springs());
+    let own = frequencies(&structure);
+    let repeatability = 1e-3_f64;
+    let goodness = [[1.0, 1.0], [1.0, -1.0]].map(|signs| {
+        let moved = own.iter().enumerate();
+        let moved: Vec<f64> = moved
+            .map(|(k, one)| one * (1.5 * repeatability * signs[k % 2]).exp())
+            .collect();
+        let tests = pair(test(&structure, &[], &own), test(&structure, &[], &moved));
+        let found = compare(&[tests], &stated(repeatability)).unwrap();
+        found.no_change_goodness
+    });
+    // Chi square over that of independent scatter: 1/(1 + 5 c) and 1/(1 - c), c = 0.25.
+    let chi_square = 6.0 * 1.5_f64.powi(2);
+    let expected = [1.0 / 2.25, 1.0 / 0.75]
+        .map(|factor| tapjoint_numerics::stats::chi_square_tail(factor * chi_square, 6.0));
+    for (one, other) in goodness.iter().zip(expected) {
+        assert!((one - other).abs() < 1e-6, "{goodness:?} {expected:?}");
+    }
+}
+
+#[test]
+fn regress_the_interval_of_a_large_change_holds_it() {
+    // A drawn beam whose description lacks an effect: Kr fell by 11.5 %, Kt rose by 4.7 %. Larger changes are less sure, which must
+    // not draw the answer towards them.
+    let beam = Beam {
+        length: 0.208_92,
+        width: 0.012_364,
+        thickness: 0.002_502_4,
+        ..BEAM
+    };
+    let joint = Joint {
+        kt: 1.318_6e6,
+        kr: 697.28,
+        coupling: 0.0,
+    };
+    let lap = Default::default();
+    let kind = Assembly::Cantilever;
+    let mut structure = Specimen::jointed(BeamTheory::Euler, &beam, kind, &lap, Some(joint));
+    let masses = [
+        (0.111_107, 1.629_9e-3),
+        (0.069_635, 1.009_4e-3),
+        (0.145_425, 2.415_5e-3),
+        (0.141_582, 0.424_2e-3),
+    ];
+    let masses = masses.map(|(position, mass)| PointMass::new(position, mass));
+    structure.masses.extend(masses);
+    let before = test(&structure, &[], &[44.0558, 261.8348, 695.0635, 1294.6980]);
+    let after = test(&structure, &[], &[43.7222, 260.6452, 694.4314, 1300.9413]);
+    let found = compare(&[pair(before, after)], &Settings::default()).unwrap();
+    let joint = found.joint.unwrap();
+    let [kt, kr] = [joint.kt, joint.kr].map(Option::unwrap);
+    assert!(kr.low < -11.5 && -11.5 < kr.high, "{kr:?}");
+    assert!(kt.low < 4.7 && 4.7 < kt.high, "{kt:?}");
+}

@@ -3,7 +3,7 @@
 //! It changes each mode by itself, or one mode alone, or all modes smoothly with their number. Pairs share it. Its size has
 //! a prior of equal weight for each factor.
 
-use crate::likelihood::{self, Data, Gaussian, log_sum};
+use crate::likelihood::{self, Data, Factored, log_sum};
 use crate::model::Predicted;
 use nalgebra::{DMatrix, DVector};
 
@@ -71,11 +71,8 @@ fn log_density(data: &Data<'_>, shape: Shape, size: f64) -> f64 {
         .iter()
         .flat_map(|pair| pair.modes.clone())
         .collect();
-    let measured: Vec<f64> = data
-        .pairs
-        .iter()
-        .flat_map(|pair| pair.measured.clone())
-        .collect();
+    let measured = data.pairs.iter().flat_map(|pair| pair.measured.clone());
+    let measured = DVector::from_iterator(modes.len(), measured);
     let shared = DMatrix::from_fn(modes.len(), modes.len(), |row, column| {
         size * size * shape.correlation(modes[row], modes[column])
     });
@@ -90,8 +87,8 @@ fn log_density(data: &Data<'_>, shape: Shape, size: f64) -> f64 {
                 block += own;
                 first += count;
             }
-            let own = Gaussian::of(DVector::from_column_slice(&measured), covariance);
-            scatter.log_weight + own.map_or(f64::NEG_INFINITY, |own| own.log_density())
+            let own = Factored::new(covariance);
+            scatter.log_weight + own.map_or(f64::NEG_INFINITY, |own| own.log_density(&measured))
         })
         .collect();
     log_sum(logs.iter().copied())

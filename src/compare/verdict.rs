@@ -2,7 +2,7 @@
 
 use crate::cause::{Cause, CauseKind};
 use crate::joint::JointChange;
-use crate::likelihood::{Data, log_sum};
+use crate::likelihood::{Data, NO_FIT, log_sum};
 use crate::result::{CauseResult, ChangeVerdict, Interval, VerdictKind};
 use crate::search::Posterior;
 use std::collections::BTreeMap;
@@ -49,8 +49,6 @@ const PROBABLY_NOTHING: f64 = 0.5;
 /// logarithm of its density may be lower: two standard deviations.
 const LEAST_RIVAL: f64 = 0.001;
 const SEPARATE: f64 = 2.0;
-/// Goodness of fit below which a cause does not explain the changes.
-const NO_FIT: f64 = 0.01;
 /// Standard deviations that a size must be away from zero.
 const CLEAR: f64 = 2.0;
 

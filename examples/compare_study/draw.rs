@@ -171,11 +171,11 @@ impl Drawn {
                         // Student's with four degrees of freedom has the variance 2.
                         let own = (1.0 - share).sqrt() * tail / 2.0_f64.sqrt();
                         let off = repeatability / 2.0_f64.sqrt() * (common + own);
-                        modes.push(MeasuredMode {
-                            mode: index + 1,
-                            frequency: frequency * off.exp(),
-                            std: 0.05 * repeatability * frequency,
-                        });
+                        modes.push(MeasuredMode::of_frequency(
+                            index + 1,
+                            frequency * off.exp(),
+                            0.05 * repeatability * frequency,
+                        ));
                     }
                     Test {
                         structure: described.clone(),

@@ -116,10 +116,12 @@ impl Tested {
     /// Returns the test in which each mode is off by this (logarithm).
     fn test(&self, off: &[f64], noise: Noise) -> Test {
         let modes = self.frequencies.iter().zip(off).enumerate();
-        let modes = modes.map(|(index, (frequency, off))| MeasuredMode {
-            mode: index + 1,
-            frequency: frequency * off.exp(),
-            std: 0.05 * noise.repeatability * frequency,
+        let modes = modes.map(|(index, (frequency, off))| {
+            MeasuredMode::of_frequency(
+                index + 1,
+                frequency * off.exp(),
+                0.05 * noise.repeatability * frequency,
+            )
         });
         Test {
             structure: self.described.clone(),

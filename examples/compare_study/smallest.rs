@@ -22,10 +22,8 @@ fn seen(seed: u64, number: u64, repeatability: f64) -> Option<[f64; 2]> {
     let modes = solved.frequencies()[..MODES].iter().enumerate();
     let test = Test {
         modes: modes
-            .map(|(index, frequency)| MeasuredMode {
-                mode: index + 1,
-                frequency: *frequency,
-                std: 0.05 * repeatability * frequency,
+            .map(|(index, frequency)| {
+                MeasuredMode::of_frequency(index + 1, *frequency, 0.05 * repeatability * frequency)
             })
             .collect(),
         structure: described,

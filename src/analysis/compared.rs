@@ -1,10 +1,12 @@
 //! A finished analysis as one side of a comparison.
 
 use super::Analysis;
+use super::ModeResult;
 use super::observations::nominal_with;
 use tapjoint_beam::specimen::PointMass;
-use tapjoint_compare::{Item, ItemKind, MeasuredMode, Test};
+use tapjoint_compare::{Item, ItemKind, Level, MeasuredMode, Reading, Test};
 use tapjoint_description::{SensorKind, TestDescription};
+use tapjoint_signal::modal::amplitude::AmplitudeVerdict;
 
 /// Least standard uncertainty that a described beam leaves to all frequencies in common (1): its own error cancels between two
 /// tests, and only the joint's stiffness follows it.
@@ -60,6 +62,8 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
             frequency: mode.frequency,
             // A reading on a line is uniform within half a line.
             std: mode.std.unwrap_or(half_line / 3.0_f64.sqrt()),
+            damping: damping_of(mode),
+            level: level_of(mode),
         })
     });
     let modes: Vec<MeasuredMode> = modes
@@ -77,5 +81,41 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
         knows_joint: [test.joint.kt.is_some(), test.joint.kr.is_some()],
         common_std: common.hypot(2.0 * length).max(LEAST_COMMON),
         modes,
+    })
+}
+
+/// Returns the damping ratio of a mode (1).
+fn damping_of(mode: &ModeResult) -> Option<Reading> {
+    let reading = mode.reading.as_ref();
+    let own = reading.and_then(|reading| {
+        Some(Reading {
+            value: reading.damping_ratio?,
+            std: reading.damping_std.unwrap_or(0.0),
+        })
+    });
+    let stated = mode.damping.map(|value| Reading { value, std: 0.0 });
+    own.or(stated)
+}
+
+/// Returns the level at which the frequency of a mode was read, and how it depends on the level; `None` where its decays do not
+/// tell it.
+fn level_of(mode: &ModeResult) -> Option<Level> {
+    let reading = mode.reading.as_ref()?;
+    let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+    let tells = matches!(
+        curve.verdict,
+        AmplitudeVerdict::Changes | AmplitudeVerdict::Steady
+    );
+    let trend = curve.frequency.as_ref().filter(|_| tells)?;
+    let at = reading.at_amplitude.as_ref()?;
+    // From a factor of e to a factor of ten.
+    let factor = std::f64::consts::LN_10 / mode.frequency;
+    Some(Level {
+        slope: Reading {
+            value: factor * trend.slope,
+            std: factor * trend.slope_std,
+        },
+        amplitude: at.value,
+        sensor: at.sensor,
     })
 }

@@ -4,12 +4,14 @@
 //! ```text
 //! Test, Pair -> test        what is compared, and what cannot be
 //!               matching    one numbering of the modes for all tests
+//!               level       one level of the taps for all tests, and changes of how frequencies depend on it
 //!               cause       what may have changed, and how much
 //!               model       the structure with its joint: what a cause changes
 //!               likelihood  how probable the measured changes are
 //!               search      evidence of causes with one size (joint: several sizes; unknown: none)
 //!               limits      the smallest change of the joint that would be seen
 //!               verdict     probabilities and the answer
+//!               dissipation changes of the dampings
 //!               result      the answer
 //! Test, ..   -> series      control charts of many tests, and the first that differs from those before
 //!               change_point  how much the last tests differ from those before, and may by chance
@@ -20,7 +22,9 @@
 
 mod cause;
 mod change_point;
+mod dissipation;
 mod joint;
+mod level;
 mod likelihood;
 mod limits;
 mod matching;
@@ -36,19 +40,22 @@ mod verdict;
 
 pub use cause::CauseKind;
 pub use result::{
-    CauseResult, ChangeVerdict, Comparison, Interval, JointResult, MatchedMode, ModeChange,
-    RepeatabilityOrigin, RepeatabilityResult, StiffnessChange, VerdictKind,
+    CauseResult, ChangeVerdict, Comparison, DampingResult, DampingVerdict, Interval, JointResult,
+    LevelResult, MatchedMode, ModeChange, ModeDamping, ModeLevel, RepeatabilityOrigin,
+    RepeatabilityResult, StiffnessChange, VerdictKind,
 };
 pub use series::{
     ChartPoint, Charted, ControlChart, Departure, LEAST_SERIES, LeftOutMode, MOST_SERIES, Series,
     Watched, watch,
 };
 pub use test::{
-    CompareError, Item, ItemKind, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Settings, Test,
+    CompareError, Item, ItemKind, Level, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Reading,
+    Settings, Test,
 };
 
 use cause::Cause;
 use joint::JointChange;
+use level::Moved;
 use likelihood::Data;
 use model::{PairModel, Predicted};
 use verdict::Candidate;
@@ -59,11 +66,14 @@ use verdict::Candidate;
 /// [`CompareError`]: no test, too few modes in common, a structure without modes.
 pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, CompareError> {
     let mut pairs = pairs.to_vec();
-    let mut matched = Vec::new();
+    let (mut matched, mut moved) = (Vec::new(), Vec::new());
     for (index, pair) in pairs.iter_mut().enumerate() {
         matched.extend(matching::match_modes(pair, index));
     }
     let modes = test::common_modes(&pairs, settings)?;
+    for pair in &mut pairs {
+        moved.push(level::take_one_level(pair));
+    }
     let mut models = Vec::with_capacity(pairs.len());
     for (pair, modes) in pairs.iter().zip(&modes) {
         models.push(PairModel::new(pair, modes)?);
@@ -105,10 +115,12 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
         .collect();
     let verdict = verdict::verdict(&candidates, &probabilities);
     Ok(Comparison {
-        modes: mode_changes(&data, settings),
+        modes: mode_changes(&data, settings, &moved),
         matched,
         joint: joint.map(|joint| joint_result(&models, settings, &joint, &hypotheses, &verdict)),
         verdict,
+        damping: dissipation::dampings(&pairs, &models),
+        level: level::levels(&pairs, &models),
         repeatability: RepeatabilityResult {
             percent: 100.0 * data.mean_scatter(),
             origin: match settings.repeatability {
@@ -124,7 +136,7 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
     })
 }
 
-fn mode_changes(data: &Data<'_>, settings: &Settings) -> Vec<ModeChange> {
+fn mode_changes(data: &Data<'_>, settings: &Settings, moved: &[Vec<Moved>]) -> Vec<ModeChange> {
     let mut all = Vec::new();
     for (index, pair) in data.pairs.iter().enumerate() {
         let is_stated = settings.repeatability.is_some();
@@ -134,6 +146,7 @@ fn mode_changes(data: &Data<'_>, settings: &Settings) -> Vec<ModeChange> {
         for (k, &mode) in pair.modes.iter().enumerate() {
             let [before, after] = pair.frequencies[k];
             let std = covariance[(k, k)].sqrt();
+            let level = moved[index].iter().find(|one| one.mode == mode);
             all.push(ModeChange {
                 pair: index,
                 mode,
@@ -141,6 +154,7 @@ fn mode_changes(data: &Data<'_>, settings: &Settings) -> Vec<ModeChange> {
                 after,
                 change_percent: 100.0 * (after / before - 1.0),
                 described_percent: 100.0 * pair.described[k].exp_m1(),
+                level_percent: level.map_or(0.0, |one| 100.0 * (-one.change).exp_m1()),
                 std_percent: 100.0 * std,
                 z: pair.measured[k] / std,
             });

@@ -6,7 +6,7 @@
 
 use crate::model::log_frequencies;
 use crate::result::MatchedMode;
-use crate::test::{Pair, Test};
+use crate::test::{MeasuredMode, Pair, Test};
 
 /// Change of a frequency from which on another peak may be meant (logarithm).
 const LARGE: f64 = 0.01;
@@ -49,7 +49,8 @@ pub(crate) fn match_modes(pair: &mut Pair, index: usize) -> Vec<MatchedMode> {
     let Some((first, others)) = pair.before.split_first_mut() else {
         return changed;
     };
-    for test in others.iter_mut().chain(&mut pair.after) {
+    let tests = others.iter_mut().chain(&mut pair.after);
+    for (number, test) in tests.enumerate() {
         let modes = first.modes.clone();
         // What the descriptions tell is no sign of another peak.
         let described = described_changes(first, test);
@@ -75,7 +76,8 @@ pub(crate) fn match_modes(pair: &mut Pair, index: usize) -> Vec<MatchedMode> {
             let taken = match (in_test, in_first) {
                 (None, None) => continue,
                 (Some((peak, _)), None) => {
-                    test.modes[position].frequency = peak;
+                    // Nothing else is known of this peak.
+                    test.modes[position] = MeasuredMode::of_frequency(own.mode, peak, there.std);
                     test.unnumbered.retain(|one| *one != peak);
                     test.unnumbered.push(there.frequency);
                     Some(peak)
@@ -88,6 +90,7 @@ pub(crate) fn match_modes(pair: &mut Pair, index: usize) -> Vec<MatchedMode> {
             changed.push(MatchedMode {
                 pair: index,
                 mode: own.mode,
+                test: number + 1,
                 first: own.frequency,
                 other: there.frequency,
                 taken,

@@ -43,12 +43,14 @@ pub struct ModeChange {
     pub pair: usize,
     /// Number of the mode.
     pub mode: usize,
-    /// Frequency before (Hz), the mean of repeats.
+    /// Frequency before (Hz), the mean of repeats, at the level of the first test.
     pub before: f64,
-    /// Frequency after (Hz).
+    /// Frequency after (Hz), likewise.
     pub after: f64,
     /// Change (%).
     pub change_percent: f64,
+    /// Part of the change between the frequencies as they were read that other levels of the taps explain (%). It is taken out.
+    pub level_percent: f64,
     /// Part of it that the two descriptions explain (%).
     pub described_percent: f64,
     /// Standard deviation of the change if nothing changed (%).
@@ -64,6 +66,8 @@ pub struct MatchedMode {
     pub pair: usize,
     /// Number of the mode.
     pub mode: usize,
+    /// Index of the other test among those before and then those after, from 0.
+    pub test: usize,
     /// Frequency in the first test before (Hz).
     pub first: f64,
     /// Frequency that the other test gives this number (Hz).
@@ -166,6 +170,76 @@ pub struct RepeatabilityResult {
     pub origin: RepeatabilityOrigin,
 }
 
+/// What the dampings say of a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DampingVerdict {
+    /// No more than repeating a test changes.
+    NoChange,
+    /// As a change of the joint's loss factor changes them.
+    JointDamping,
+    /// In another way.
+    Other,
+}
+
+/// Change of a damping ratio.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ModeDamping {
+    /// Index of the pair, from 0.
+    pub pair: usize,
+    /// Number of the mode.
+    pub mode: usize,
+    /// Damping ratio before (1), the mean of repeats.
+    pub before: f64,
+    /// Damping ratio after (1).
+    pub after: f64,
+    /// Standard deviation of the difference if nothing changed (1).
+    pub std: f64,
+}
+
+/// Change of the dampings.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DampingResult {
+    /// The modes whose damping all tests have.
+    pub modes: Vec<ModeDamping>,
+    /// What they say.
+    pub verdict: DampingVerdict,
+    /// Change of the joint's loss factor if only this changed (1); `null` where there is no elastic joint, and for one mode.
+    pub loss_factor: Option<Interval>,
+    /// Goodness of fit of no change (1).
+    pub no_change_goodness: f64,
+    /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is none.
+    pub joint_goodness: Option<f64>,
+    /// Standard deviation of the difference of a damping between two tests of one state (%).
+    pub scatter_percent: f64,
+}
+
+/// How much the frequency of a mode depends on the level.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ModeLevel {
+    /// Index of the pair, from 0.
+    pub pair: usize,
+    /// Number of the mode.
+    pub mode: usize,
+    /// Change of the frequency before (%) per factor of ten in amplitude, the mean of repeats.
+    pub before_percent: f64,
+    /// The same after.
+    pub after_percent: f64,
+    /// Standard deviation of the difference if nothing changed (%).
+    pub std_percent: f64,
+}
+
+/// Change of the frequencies' dependence on the level.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LevelResult {
+    /// The modes whose decays tell it in all tests.
+    pub modes: Vec<ModeLevel>,
+    /// True where it changed by more than repeating a test changes.
+    pub has_changed: bool,
+    /// Goodness of fit of no change (1).
+    pub no_change_goodness: f64,
+}
+
 /// Result of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
@@ -179,6 +253,10 @@ pub struct Comparison {
     pub verdict: ChangeVerdict,
     /// All causes, the most probable first.
     pub hypotheses: Vec<CauseResult>,
+    /// The dampings; `null` where the tests have none in common.
+    pub damping: Option<DampingResult>,
+    /// The frequencies' dependence on the level; `null` where the tests have none in common.
+    pub level: Option<LevelResult>,
     /// Scatter between set-ups.
     pub repeatability: RepeatabilityResult,
     /// Goodness of fit of no change (1).

@@ -9,6 +9,7 @@ use crate::change_point::{
     Limits, Moments, TestScatter, most_probable_step, most_unlike, single_limits,
 };
 use crate::joint::JointChange;
+use crate::level::take_one_level;
 use crate::matching::match_modes;
 use crate::model::PairModel;
 use crate::result::{Comparison, MatchedMode};
@@ -152,6 +153,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     };
     let matched = match_modes(&mut all, 0);
     let modes = common_modes(std::slice::from_ref(&all), settings)?.swap_remove(0);
+    take_one_level(&mut all);
     let (first, others) = (&all.before[0], &all.after);
     let model = PairModel::new(
         &Pair {

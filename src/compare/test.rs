@@ -41,7 +41,7 @@ pub enum ItemKind {
     Sensor,
 }
 
-/// Frequency of a mode.
+/// What was measured of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredMode {
     /// Number of the mode (1 = lowest).
@@ -49,6 +49,44 @@ pub struct MeasuredMode {
     /// Frequency (Hz).
     pub frequency: f64,
     /// Standard uncertainty of reading it (Hz); 0 where none is known.
+    pub std: f64,
+    /// Damping ratio (1); `None` where it was not measured.
+    pub damping: Option<Reading>,
+    /// How the frequency depends on the level; `None` without decays that tell it.
+    pub level: Option<Level>,
+}
+
+impl MeasuredMode {
+    /// A frequency (Hz) with the standard uncertainty of reading it (Hz).
+    pub fn of_frequency(mode: usize, frequency: f64, std: f64) -> Self {
+        Self {
+            mode,
+            frequency,
+            std,
+            damping: None,
+            level: None,
+        }
+    }
+}
+
+/// Level of the taps at which a frequency was read, and how it depends on the level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Relative change of the frequency per factor of ten in amplitude (1); negative where the structure is softer at higher
+    /// levels.
+    pub slope: Reading,
+    /// Amplitude at which the frequency holds, in the unit of the sensor.
+    pub amplitude: f64,
+    /// Index of the sensor.
+    pub sensor: usize,
+}
+
+/// A measured value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty of reading it, in the unit of the value; 0 where none is known.
     pub std: f64,
 }
 

@@ -50,11 +50,7 @@ fn test(structure: &Specimen, items: &[Item], frequencies: &[f64]) -> Test {
         knows_joint: [false; 2],
         common_std: 0.01,
         modes: modes
-            .map(|(index, frequency)| MeasuredMode {
-                mode: index + 1,
-                frequency: *frequency,
-                std: 0.0,
-            })
+            .map(|(index, frequency)| MeasuredMode::of_frequency(index + 1, *frequency, 0.0))
             .collect(),
         unnumbered: Vec::new(),
     }

@@ -1,6 +1,6 @@
 //! Small statistics that several stages share; knows nothing of taps or beams.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_964;
@@ -45,6 +45,12 @@ pub fn chi_square_tail(value: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(1.0, |chi_square| chi_square.sf(value))
 }
 
+/// Returns the probability that the ratio of two mean squares, of `above` and `below` degrees of freedom, exceeds a value; 1
+/// without a degree of freedom.
+pub fn fisher_tail(value: f64, above: f64, below: f64) -> f64 {
+    FisherSnedecor::new(above, below).map_or(1.0, |fisher| fisher.sf(value))
+}
+
 /// Student's distribution.
 pub mod student {
     use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -83,6 +89,14 @@ pub mod student {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_fishers_tail_has_its_tabled_values() {
+        // Upper 5 % points F(4, 10) = 3.478 and F(10, 4) = 5.964 (Box, Hunter & Hunter 1978, table D).
+        assert!((fisher_tail(3.478, 4.0, 10.0) - 0.05).abs() < 1e-4);
+        assert!((fisher_tail(5.964, 10.0, 4.0) - 0.05).abs() < 1e-4);
+        assert_eq!(fisher_tail(1.0, 0.0, 4.0), 1.0);
+    }
 
     #[test]
     fn regress_a_ratio_has_the_digits_that_say_something() {

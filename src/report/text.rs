@@ -10,6 +10,7 @@ use crate::words::comparison::answer;
 use crate::words::diagnosis::gap_story;
 use crate::words::findings::{brief, no_estimate};
 use crate::words::series;
+use tapjoint_compare::DampingVerdict;
 use tapjoint_study::publication::{Agreement, Reproduction};
 
 /// Most taps listed one by one.
@@ -196,7 +197,14 @@ pub fn render_comparison(document: &Document) -> String {
         (Some(_), Some(_)) => "Before and after:\n",
         _ => "",
     };
-    let tables = [tables::changed_modes(document), tables::changes(document)];
+    let compared = document.compare.as_ref();
+    let damping = compared.and_then(|found| found.damping.as_ref());
+    let is_damped = damping.is_some_and(|found| found.verdict != DampingVerdict::NoChange);
+    let tables = [
+        tables::changed_modes(document),
+        tables::changed_dampings(document).filter(|_| is_damped),
+        tables::changes(document),
+    ];
     joined([
         lines(series.collect()),
         noted(tables::control_charts(document)),

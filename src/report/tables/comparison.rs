@@ -7,6 +7,8 @@ use crate::words::comparison::{cause, size};
 
 /// Causes below this probability are left out.
 const LEAST_PROBABILITY: f64 = 0.005;
+/// Change by another level of the taps that is shown (%).
+const LEAST_LEVEL: f64 = 1e-3;
 /// Most causes that are listed.
 const MOST_LISTED: usize = 5;
 
@@ -18,6 +20,10 @@ pub fn changed_modes(document: &Document) -> Option<Table> {
         .modes
         .iter()
         .any(|mode| mode.described_percent.abs() > 1e-9);
+    let is_moved = found
+        .modes
+        .iter()
+        .any(|mode| mode.level_percent.abs() > LEAST_LEVEL);
     let mut rows = Vec::new();
     for mode in &found.modes {
         let mut row = Vec::new();
@@ -31,17 +37,44 @@ pub fn changed_modes(document: &Document) -> Option<Table> {
         if is_described {
             row.push(number("Described (%)", signed(mode.described_percent)));
         }
+        if is_moved {
+            row.push(number("Level (%)", signed(mode.level_percent)));
+        }
         row.push(number("Scatter (%)", significant(mode.std_percent, 2)));
         row.push(number("Change/scatter", significant(mode.z, 2)));
         rows.push(row);
     }
-    let note = match is_described {
-        true => {
-            "Described: what the two descriptions explain. The rest is compared with the scatter of repeated tests."
+    let mut note = "Scatter: standard deviation of the change if nothing changed.".to_owned();
+    if is_described {
+        note += " Described: what the two descriptions explain.";
+    }
+    if is_moved {
+        note +=
+            " Level: what other levels of the taps explain; it is taken out of the frequencies.";
+    }
+    Some(Table::of("Frequencies", rows, &note))
+}
+
+/// The dampings; `None` where the tests have none in common.
+pub fn changed_dampings(document: &Document) -> Option<Table> {
+    let found = document.compare.as_ref()?.damping.as_ref()?;
+    let several = found.modes.iter().any(|mode| mode.pair > 0);
+    let mut rows = Vec::new();
+    for mode in &found.modes {
+        let mut row = Vec::new();
+        if several {
+            row.push(number("Pair", (mode.pair + 1).to_string()));
         }
-        false => "Scatter: standard deviation of the change if nothing changed.",
-    };
-    Some(Table::of("Frequencies", rows, note))
+        let change = mode.after - mode.before;
+        row.push(number("Mode", mode.mode.to_string()));
+        row.push(number("Before (%)", significant(100.0 * mode.before, 3)));
+        row.push(number("After (%)", significant(100.0 * mode.after, 3)));
+        row.push(number("Scatter (%)", significant(100.0 * mode.std, 2)));
+        row.push(number("Change/scatter", significant(change / mode.std, 2)));
+        rows.push(row);
+    }
+    let note = "Damping ratios. Scatter: standard deviation of the difference if nothing changed.";
+    Some(Table::of("Damping", rows, note))
 }
 
 fn signed(percent: f64) -> String {

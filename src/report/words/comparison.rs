@@ -1,9 +1,10 @@
 //! Sentences about what changed between two tests.
 
 use crate::document::Document;
-use crate::format::{capital, probability, significant};
+use crate::format::{capital, probability, rounded, significant, with_decimals_of};
 use tapjoint_compare::{
-    CauseKind, CauseResult, Comparison, Interval, MatchedMode, RepeatabilityOrigin, VerdictKind,
+    CauseKind, CauseResult, Comparison, DampingResult, DampingVerdict, Interval, LevelResult,
+    MatchedMode, RepeatabilityOrigin, VerdictKind,
 };
 
 /// Returns what a cause is, in words: "L3 is gone".
@@ -25,38 +26,31 @@ pub fn cause(kind: CauseKind, item: Option<&str>) -> String {
 
 /// Returns the sizes of a cause with their 95 % intervals.
 pub fn size(found: &CauseResult) -> String {
-    let parts = found.parameters.iter().map(|(name, value)| {
-        let percent = |value: f64| significant(100.0 * value, 3);
-        match *name {
-            "mass" => format!("mass {}", in_unit(value, 1e3, "g")),
-            "position" => format!("at {}", in_unit(value, 1e3, "mm")),
-            "sensor_shift" => format!("by {}", in_unit(value, 1e3, "mm")),
-            "force" => format!("force {}", in_unit(value, 1.0, "N")),
-            "kt" | "kr" | "relative" => {
-                let label = match *name {
-                    "kt" => "Kt ",
-                    "kr" => "Kr ",
-                    _ => "",
-                };
-                let [low, high] = [percent(value.low), percent(value.high)];
-                format!("{label}{} % ({low} to {high})", percent(value.value))
-            }
-            name => format!("{} {}", name.replace('_', " "), in_unit(value, 1.0, "")),
-        }
+    let parts = found.parameters.iter().map(|(name, value)| match *name {
+        "mass" => format!("mass {}", in_unit(value, 1e3, "g")),
+        "position" => format!("at {}", in_unit(value, 1e3, "mm")),
+        "sensor_shift" => format!("by {}", in_unit(value, 1e3, "mm")),
+        "force" => format!("force {}", in_unit(value, 1.0, "N")),
+        "kt" => format!("Kt {}", in_unit(value, 100.0, "%")),
+        "kr" => format!("Kr {}", in_unit(value, 100.0, "%")),
+        "relative" => in_unit(value, 100.0, "%"),
+        name => format!("{} {}", name.replace('_', " "), in_unit(value, 1.0, "")),
     });
     parts.collect::<Vec<_>>().join(", ")
 }
 
+/// Returns a value with its interval, all to the second digit of the standard deviation.
 fn in_unit(found: &Interval, factor: f64, unit: &str) -> String {
-    let [value, low, high] =
-        [found.value, found.low, found.high].map(|one| significant(factor * one, 3));
-    let value = format!("{value} {unit}");
+    let std = (found.low < found.high).then_some(factor * found.std);
+    let written = rounded(factor * found.value, std).value;
+    let value = format!("{written} {unit}");
     let value = value.trim_end();
     // What a description states has no interval.
-    match found.low == found.high {
-        true => value.to_owned(),
-        false => format!("{value} ({low} to {high})"),
+    if std.is_none() {
+        return value.to_owned();
     }
+    let [low, high] = [found.low, found.high].map(|one| with_decimals_of(factor * one, &written));
+    format!("{value} ({low} to {high})")
 }
 
 /// Returns the answer in a few sentences, the shortest first.
@@ -92,25 +86,71 @@ pub fn answer(document: &Document) -> Vec<String> {
         sentences.push(format!("If {subject}: {}.", size(own)));
     }
     sentences.extend(seen_from(found));
+    sentences.extend(found.damping.as_ref().map(damping));
+    sentences.extend(found.level.as_ref().and_then(level));
     sentences.push(repeatability(found));
-    sentences.extend(matched(&found.matched));
+    sentences.extend(matched(&found.matched, |_| "Another test".to_owned()));
     sentences
 }
 
-/// Returns a sentence for each mode whose number differed between tests.
-pub fn matched(all: &[MatchedMode]) -> Vec<String> {
+/// Returns what the dampings say.
+fn damping(found: &DampingResult) -> String {
+    let percent = |ratio: f64| significant(100.0 * ratio, 3);
+    let most = found.modes.iter().max_by(|a, b| {
+        let [a, b] = [a, b].map(|one| (one.after - one.before).abs() / one.std);
+        a.total_cmp(&b)
+    });
+    match (found.verdict, &found.loss_factor, most) {
+        (DampingVerdict::JointDamping, Some(loss), _) => {
+            let [value, low, high] =
+                [loss.value, loss.low, loss.high].map(|one| significant(one, 2));
+            format!("The joint's damping changed: its loss factor by {value} ({low} to {high}).")
+        }
+        (DampingVerdict::Other, _, Some(most)) => format!(
+            "The damping changed, but not as a change of the joint's loss factor changes it. Mode {} changed most, from {} to {} %.",
+            most.mode,
+            percent(most.before),
+            percent(most.after)
+        ),
+        _ => "Damping: no change beyond what repeating a test changes.".to_owned(),
+    }
+}
+
+/// Returns where the frequencies depend on the level otherwise than before; nothing without a change.
+fn level(found: &LevelResult) -> Option<String> {
+    let most = found.modes.iter().max_by(|a, b| {
+        let [a, b] =
+            [a, b].map(|one| (one.after_percent - one.before_percent).abs() / one.std_percent);
+        a.total_cmp(&b)
+    });
+    let most = most.filter(|_| found.has_changed)?;
+    let [before, after] = [most.before_percent, most.after_percent].map(|one| significant(one, 2));
+    let cause = match most.after_percent < most.before_percent {
+        true => " A joint that slips more does this.",
+        false => "",
+    };
+    Some(format!(
+        "Frequencies depend on the level in another way. A factor of ten in amplitude changes mode {} by {after} %, before by {before} %.{cause}",
+        most.mode
+    ))
+}
+
+/// Returns a sentence for each mode whose number differed between tests. `name` begins a sentence about a test, by its index.
+pub fn matched(all: &[MatchedMode], name: impl Fn(usize) -> String) -> Vec<String> {
     let mut sentences = Vec::new();
     for one in all {
         let [first, other] = [one.first, one.other].map(|frequency| significant(frequency, 5));
         sentences.push(match one.taken {
             Some(taken) => format!(
-                "Mode {} is {first} Hz in the first test. Another test numbers the peak at {other} Hz; that at {} Hz is taken.",
+                "Mode {} is {first} Hz in the first test. {} numbers the peak at {other} Hz; that at {} Hz is taken.",
                 one.mode,
+                name(one.test),
                 significant(taken, 5)
             ),
             None => format!(
-                "Mode {} is left out: the tests number different peaks, {first} and {other} Hz.",
-                one.mode
+                "Mode {} is left out. It is {first} Hz in the first test. {} numbers the peak at {other} Hz.",
+                one.mode,
+                name(one.test)
             ),
         });
     }

@@ -1,7 +1,7 @@
 //! Sentences about a series of tests.
 
 use crate::document::SeriesSection;
-use crate::format::signed_percent;
+use crate::format::{capital, signed_percent};
 use crate::words::comparison::matched;
 use tapjoint_compare::Charted;
 use tapjoint_numerics::stats::times;
@@ -68,6 +68,6 @@ pub fn answer(section: &SeriesSection) -> Vec<String> {
             name(one.test)
         ));
     }
-    sentences.extend(matched(&series.matched));
+    sentences.extend(matched(&series.matched, |test| capital(&name(test))));
     sentences
 }

@@ -1,0 +1,220 @@
+//! Tests of the change of dampings.
+
+use super::{USUAL_SCATTER, dampings, joint_levers};
+use crate::model::PairModel;
+use crate::result::DampingVerdict;
+use crate::test::{MeasuredMode, Pair, Reading, Test};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use tapjoint_beam::specimen::{Joint, Mesh, Specimen};
+use tapjoint_beam::{Assembly, Beam, BeamTheory};
+
+const BEAM: Beam = Beam {
+    length: 0.4,
+    width: 0.02,
+    thickness: 0.005,
+    modulus: 205e9,
+    density: 7850.0,
+    poisson: 0.3,
+};
+const MODES: [usize; 5] = [1, 2, 3, 4, 5];
+
+fn test(joint: Joint) -> Test {
+    let kind = Assembly::Cantilever;
+    let lap = Default::default();
+    let structure = Specimen::jointed(BeamTheory::Euler, &BEAM, kind, &lap, Some(joint));
+    let solved = structure.modes(MODES.len(), Mesh { elements: 60 }).unwrap();
+    let modes = MODES.iter().zip(solved.frequencies());
+    let modes = modes.map(|(mode, frequency)| MeasuredMode::of_frequency(*mode, *frequency, 0.0));
+    Test {
+        modes: modes.collect(),
+        structure,
+        items: Vec::new(),
+        knows_joint: [true; 2],
+        common_std: 0.01,
+        unnumbered: Vec::new(),
+    }
+}
+
+/// Stiffnesses in those of the beam.
+fn joint(translation: f64, rotation: f64) -> Joint {
+    let stiffness = BEAM.bending_stiffness();
+    Joint {
+        kt: translation * stiffness / BEAM.length.powi(3),
+        kr: rotation * stiffness / BEAM.length,
+        coupling: 0.0,
+    }
+}
+
+fn model(test: &Test) -> PairModel {
+    let pair = Pair {
+        before: vec![test.clone()],
+        after: vec![test.clone()],
+    };
+    PairModel::new(&pair, &MODES).unwrap()
+}
+
+/// Returns the test with these damping ratios, each read to a percent.
+fn damped(test: &Test, dampings: &[f64]) -> Test {
+    let mut damped = test.clone();
+    for (mode, value) in damped.modes.iter_mut().zip(dampings) {
+        mode.damping = Some(Reading {
+            value: *value,
+            std: 0.01 * value,
+        });
+    }
+    damped
+}
+
+#[test]
+fn limit_a_beam_on_a_soft_hinge_has_all_its_energy_in_the_joint() {
+    // The first mode is then a rigid body on a spring: zeta = eta/2, as of one degree of freedom.
+    let soft = model(&test(joint(f64::INFINITY, 1e-3)));
+    let levers = joint_levers(&[soft]).unwrap().swap_remove(0);
+    assert!((levers[0] - 0.5).abs() < 1e-3, "{levers:?}");
+    // Its higher modes bend a beam that a soft spring hardly holds.
+    assert!(levers[1..].iter().all(|lever| *lever < 1e-3), "{levers:?}");
+    let rigid = model(&test(Joint::RIGID));
+    assert!(joint_levers(&[rigid]).is_none());
+}
+
+#[test]
+fn prop_the_lever_is_half_of_the_share_of_the_energy() {
+    // The frequencies of a stiffness that is complex, to first order: K (1 + i eta) moves ln f by i eta d ln f/d ln K, and
+    // zeta is the imaginary part of ln omega.
+    let own = joint(800.0, 6.0);
+    let levers = joint_levers(&[model(&test(own))]).unwrap().swap_remove(0);
+    let moved = |factor: f64| {
+        test(Joint {
+            kt: factor * own.kt,
+            kr: factor * own.kr,
+            ..own
+        })
+    };
+    let [above, below] = [1.001, 0.999].map(moved);
+    for ((lever, above), below) in levers.iter().zip(&above.modes).zip(&below.modes) {
+        let slope = (above.frequency / below.frequency).ln() / (1.001_f64 / 0.999).ln();
+        // The levers are differences over 2 %, and have another mesh.
+        assert!((lever - slope).abs() < 1e-3 * slope, "{lever} {slope}");
+    }
+}
+
+#[test]
+fn limit_equal_dampings_are_no_change_and_a_mode_without_one_is_left_out() {
+    let own = test(joint(800.0, 6.0));
+    let damped = damped(&own, &[0.003, 0.004, 0.002, 0.003]);
+    let pair = Pair {
+        before: vec![damped.clone()],
+        after: vec![damped],
+    };
+    let found = dampings(&[pair], &[model(&own)]).unwrap();
+    assert_eq!(found.verdict, DampingVerdict::NoChange);
+    assert_eq!(found.modes.len(), 4);
+    assert!((found.no_change_goodness - 1.0).abs() < 1e-9);
+    let nothing = Pair {
+        before: vec![own.clone()],
+        after: vec![own.clone()],
+    };
+    assert!(dampings(&[nothing], &[model(&own)]).is_none());
+}
+
+#[test]
+fn prop_a_damping_that_rises_in_one_mode_alone_is_not_the_joints() {
+    let own = test(joint(800.0, 6.0));
+    let side = |fourth: f64| {
+        let ratios = [0.95, 1.0, 1.05]
+            .map(|factor| [0.003, 0.003, 0.003, fourth, 0.003].map(|one| factor * one));
+        ratios.map(|ratios| damped(&own, &ratios)).to_vec()
+    };
+    let pair = Pair {
+        before: side(0.003),
+        after: side(0.009),
+    };
+    let found = dampings(&[pair], &[model(&own)]).unwrap();
+    assert_eq!(found.verdict, DampingVerdict::Other, "{found:?}");
+}
+
+/// How dampings scatter between tests.
+#[derive(Debug, Clone, Copy)]
+enum Scatter {
+    /// Standard deviation of the difference of two tests (1).
+    Of(f64),
+    /// Drawn for each seed between half and twice the usual one.
+    Usual,
+}
+
+/// Returns the share of seeds whose interval holds the loss factor, of those that say no change without one, and of those that
+/// find the joint's damping with one.
+fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
+    let own = test(joint(800.0, 6.0));
+    let model = model(&own);
+    let levers = joint_levers(std::slice::from_ref(&model))
+        .unwrap()
+        .swap_remove(0);
+    let loss = 0.02;
+    let seeds = 1000;
+    let mut counts = [0.0; 3];
+    for seed in 0..seeds {
+        let mut draw = ChaCha8Rng::seed_from_u64(seed);
+        let scatter = match scatter {
+            Scatter::Of(scatter) => scatter,
+            Scatter::Usual => USUAL_SCATTER * 2.0_f64.powf(draw.random_range(-1.0..1.0)),
+        };
+        // The difference of two tests has the variance of both.
+        let spread = Normal::new(1.0, scatter / 2.0_f64.sqrt()).unwrap();
+        let mut side = |loss: f64| -> Vec<Test> {
+            let tests = 0..repeats;
+            tests
+                .map(|_| {
+                    let ratios = levers.iter().map(|lever| 0.002 + lever * loss);
+                    let ratios: Vec<f64> =
+                        ratios.map(|one| one * spread.sample(&mut draw)).collect();
+                    damped(&own, &ratios)
+                })
+                .collect()
+        };
+        let (before, after, again) = (side(0.005), side(0.005 + loss), side(0.005));
+        let changed = Pair {
+            before: before.clone(),
+            after,
+        };
+        let same = Pair {
+            before,
+            after: again,
+        };
+        let [changed, same] =
+            [changed, same].map(|pair| dampings(&[pair], std::slice::from_ref(&model)).unwrap());
+        let found = changed.loss_factor.unwrap();
+        counts[0] += f64::from(u8::from((found.low..=found.high).contains(&loss)));
+        counts[1] += f64::from(u8::from(same.verdict == DampingVerdict::NoChange));
+        counts[2] += f64::from(u8::from(changed.verdict == DampingVerdict::JointDamping));
+    }
+    counts.map(|count| count / seeds as f64)
+}
+
+#[test]
+fn recover_a_change_of_the_loss_factor() {
+    let cases = [
+        (Scatter::Usual, 1, [0.93, 0.97]),
+        (Scatter::Of(0.2), 6, [0.93, 0.98]),
+        (Scatter::Of(0.3), 10, [0.93, 0.97]),
+        // The usual scatter keeps its weight beside repeats that scatter less: the interval is wider than it need be.
+        (Scatter::Of(0.05), 10, [0.97, 1.0]),
+    ];
+    for (scatter, repeats, [least, most]) in cases {
+        let [holds, quiet, found] = shares(scatter, repeats);
+        // 1000 seeds tell 95 % to within 2 % (three standard deviations).
+        assert!(
+            holds >= least && holds <= most,
+            "{scatter:?} {repeats}: {holds}"
+        );
+        assert!(quiet > 0.98, "{scatter:?} {repeats}: {quiet}");
+        // One pair knows little of its scatter.
+        assert!(
+            repeats == 1 || found > 0.9,
+            "{scatter:?} {repeats}: {found}"
+        );
+        println!("{scatter:?} {repeats}: {holds} {quiet} {found}");
+    }
+}

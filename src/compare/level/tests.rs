@@ -1,0 +1,114 @@
+//! Tests of the level of the taps.
+
+use crate::test::{Level, MeasuredMode, Pair, Reading, Settings, Test};
+use crate::{Comparison, VerdictKind, compare};
+use tapjoint_beam::specimen::{Joint, Mesh, Specimen};
+use tapjoint_beam::{Assembly, Beam, BeamTheory};
+
+const BEAM: Beam = Beam {
+    length: 0.4,
+    width: 0.02,
+    thickness: 0.005,
+    modulus: 205e9,
+    density: 7850.0,
+    poisson: 0.3,
+};
+const MODES: usize = 5;
+
+/// Returns a test whose frequencies fall by these shares per factor of ten in amplitude, read at an amplitude.
+fn test(slopes: [f64; MODES], amplitude: f64) -> Test {
+    let stiffness = BEAM.bending_stiffness();
+    let joint = Joint {
+        kt: 1500.0 * stiffness / BEAM.length.powi(3),
+        kr: 10.0 * stiffness / BEAM.length,
+        coupling: 0.0,
+    };
+    let kind = Assembly::Cantilever;
+    let lap = Default::default();
+    let structure = Specimen::jointed(BeamTheory::Euler, &BEAM, kind, &lap, Some(joint));
+    let solved = structure.modes(MODES, Mesh { elements: 60 }).unwrap();
+    let modes = solved.frequencies().iter().zip(slopes).enumerate();
+    let modes = modes.map(|(index, (frequency, slope))| MeasuredMode {
+        level: Some(Level {
+            slope: Reading {
+                value: slope,
+                std: 1e-5,
+            },
+            amplitude,
+            sensor: 0,
+        }),
+        ..MeasuredMode::of_frequency(
+            index + 1,
+            frequency * (slope * amplitude.log10()).exp(),
+            0.0,
+        )
+    });
+    Test {
+        modes: modes.collect(),
+        structure,
+        items: Vec::new(),
+        knows_joint: [false; 2],
+        common_std: 0.01,
+        unnumbered: Vec::new(),
+    }
+}
+
+fn compared(before: Test, after: Test) -> Comparison {
+    let pair = Pair {
+        before: vec![before],
+        after: vec![after],
+    };
+    let settings = Settings {
+        repeatability: Some(5e-4),
+    };
+    compare(&[pair], &settings).unwrap()
+}
+
+const SLOPES: [f64; MODES] = [-0.01, -0.006, -0.004, -0.003, -0.002];
+
+#[test]
+fn prop_harder_taps_on_a_joint_that_slips_are_no_change() {
+    let found = compared(test(SLOPES, 1.0), test(SLOPES, 5.0));
+    assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+    assert!(!found.level.unwrap().has_changed);
+    for (mode, slope) in found.modes.iter().zip(SLOPES) {
+        assert!(mode.z.abs() < 1e-6, "{mode:?}");
+        let explained = 100.0 * (slope * 5.0_f64.log10()).exp_m1();
+        assert!(
+            (mode.level_percent - explained).abs() < 1e-3 * explained.abs(),
+            "{mode:?}"
+        );
+    }
+    // Without the slopes it looks like a change.
+    let mut blind = [test(SLOPES, 1.0), test(SLOPES, 5.0)];
+    for mode in blind.iter_mut().flat_map(|test| &mut test.modes) {
+        mode.level = None;
+    }
+    let [before, after] = blind;
+    let found = compared(before, after);
+    assert_ne!(found.verdict.kind, VerdictKind::NoChange);
+    assert!(found.level.is_none());
+}
+
+#[test]
+fn prop_amplitudes_of_two_sensors_or_far_apart_are_not_compared() {
+    let mut other = test(SLOPES, 5.0);
+    for mode in &mut other.modes {
+        mode.level.as_mut().unwrap().sensor = 1;
+    }
+    for after in [other, test(SLOPES, 20.0)] {
+        let found = compared(test(SLOPES, 1.0), after);
+        assert!(found.modes.iter().all(|mode| mode.level_percent == 0.0));
+    }
+}
+
+#[test]
+fn prop_a_joint_that_begins_to_slip_is_told_by_the_slopes() {
+    let found = compared(test([0.0; MODES], 1.0), test(SLOPES, 1.0));
+    assert_eq!(found.verdict.kind, VerdictKind::NoChange);
+    let level = found.level.unwrap();
+    assert!(level.has_changed);
+    assert_eq!(level.modes.len(), MODES);
+    let first = &level.modes[0];
+    assert_eq!([first.before_percent, first.after_percent], [0.0, -1.0]);
+}

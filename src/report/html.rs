@@ -60,6 +60,14 @@ struct Page<'a> {
 struct Method {
     recordings: bool,
     joint: bool,
+    comparison: bool,
+    series: bool,
+}
+
+impl Method {
+    fn is_told(&self) -> bool {
+        self.recordings || self.joint || self.comparison || self.series
+    }
 }
 
 /// A part of the page.
@@ -82,8 +90,15 @@ struct Section<'a> {
 /// # Errors
 /// [`ReportError::Html`] if the template cannot be filled.
 pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<String, ReportError> {
-    let mut sections = model_sections(document);
-    sections.extend(measurement_sections(document));
+    let is_comparison = document.compare.is_some() || document.series.is_some();
+    let mut sections = match is_comparison {
+        true => comparison_sections(document),
+        false => {
+            let mut sections = model_sections(document);
+            sections.extend(measurement_sections(document));
+            sections
+        }
+    };
     for section in &mut sections {
         let own = figures.iter().filter(|figure| figure.section == section.id);
         section.figures = own.collect();
@@ -93,8 +108,13 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     let any_live = figures.iter().any(|figure| figure.live.is_some());
     let name = document.test.as_ref().map(|test| test.name.clone());
     let name = name.filter(|name| !name.is_empty());
+    let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
     let page = Page {
-        title: name.unwrap_or_else(|| "Unnamed test".to_owned()),
+        title: match (&document.series, &document.compare) {
+            (Some(_), _) => format!("{name}: a series of tests"),
+            (None, Some(_)) => format!("{name}: before and after"),
+            (None, None) => name,
+        },
         facts: facts(document),
         warnings: document.main_warnings().collect(),
         findings: sentences(document),
@@ -102,6 +122,8 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
         method: Method {
             recordings: document.recordings.is_some(),
             joint: document.estimate.is_some() || document.prediction.is_some(),
+            comparison: document.compare.is_some(),
+            series: document.series.is_some(),
         },
         live: any_live.then_some(Live {
             library: PLOT_LIBRARY,
@@ -160,7 +182,53 @@ fn facts(document: &Document) -> Vec<(&'static str, String)> {
         }
         _ => {}
     }
+    facts.extend(compared_tests(document));
     facts
+}
+
+/// Returns the files of the compared tests, in pairs of name and value.
+fn compared_tests(document: &Document) -> Vec<(&'static str, String)> {
+    if let Some(series) = &document.series {
+        return vec![("Tests", series.tests.len().to_string())];
+    }
+    let pairs = document.compare.iter().flat_map(|one| &one.tests);
+    let pairs: Vec<[String; 2]> = pairs
+        .map(|pair| [&pair.before, &pair.after].map(|files| files.join(", ")))
+        .collect();
+    match pairs.as_slice() {
+        [[before, after]] => vec![("Before", before.clone()), ("After", after.clone())],
+        several => several
+            .iter()
+            .map(|pair| ("Before and after", pair.join(", ")))
+            .collect(),
+    }
+}
+
+/// Returns the sections on a series of tests, and on what changed.
+fn comparison_sections<'a>(document: &Document) -> Vec<Section<'a>> {
+    let mut sections = Vec::new();
+    if document.series.is_some() {
+        sections.push(Section {
+            id: "series",
+            title: "Tests in the order of time",
+            tables: found([tables::control_charts(document)]),
+            folded: found([tables::tests_of_series(document)]),
+            ..Section::default()
+        });
+    }
+    if document.compare.is_some() {
+        sections.push(Section {
+            id: "compare",
+            title: "What changed",
+            tables: found([
+                tables::changes(document),
+                tables::changed_modes(document),
+                tables::changed_joint(document),
+            ]),
+            ..Section::default()
+        });
+    }
+    sections
 }
 
 /// Returns the sections on the joint, the gap and the uncertainty, as far as they were asked for.

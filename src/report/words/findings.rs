@@ -2,6 +2,7 @@
 
 use super::diagnosis::{gap_in_short, gap_story, listed, missing, shows_gap};
 use super::sizes::stiffness_with_limits;
+use super::{comparison, series};
 use crate::document::{
     Document, EstimateSection, HeadlineSection, HeadlineValue, PredictionSection, ReadBy,
 };
@@ -184,6 +185,18 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
+    if document.compare.is_some() || document.series.is_some() {
+        let mut found: Vec<String> = document.series.iter().flat_map(series::answer).collect();
+        let changes = comparison::answer(document);
+        // A series and its comparison say the same about modes whose numbers differ.
+        found.extend(
+            changes
+                .into_iter()
+                .filter(|one| !found.contains(one))
+                .collect::<Vec<_>>(),
+        );
+        return found;
+    }
     let taps = taps(document).map(|taps| capital(&taps) + ".");
     let first = [taps, channels(document), modes(document)];
     // One sentence for each mode that changes with the amplitude.

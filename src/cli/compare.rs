@@ -148,7 +148,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         .transpose()?;
     let mut warnings = Vec::new();
     // Spectra are large: only those that the report shows are kept, of the first tests before and after.
-    let shows_spectra = arguments.out.is_some() && arguments.series.is_empty();
+    let shows_spectra = outputs.report.is_some() && arguments.series.is_empty();
     let mut shown = Vec::new();
     let mut read = |files: &[PathBuf]| -> anyhow::Result<Vec<Side>> {
         let mut sides = Vec::with_capacity(files.len());
@@ -170,9 +170,22 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         let (name, structure) = (sides[0].name.clone(), sides[0].structure);
         let tests: Vec<Test> = sides.into_iter().map(|side| side.compared).collect();
         let found = watch(&tests, &settings)?;
+        let mut recordings = ComparedRecordings::default();
+        if let Some((_, departure)) = found.series.departure()
+            && outputs.report.is_some()
+        {
+            // Reading two tests again takes less than keeping the spectra of all.
+            let first = departure.since.saturating_sub(MOST_REPEATS);
+            let again = |test: usize| {
+                let file = &arguments.series[test];
+                read_side(file, template.as_ref(), &terminal, &mut Vec::new())
+            };
+            recordings.before = again(first)?.recordings;
+            recordings.after = again(departure.since)?.recordings;
+        }
         let files = names(&arguments.series);
         let document = series_of(&name, &structure, files, found, warnings);
-        return answer(&document, &ComparedRecordings::default(), outputs, terminal);
+        return answer(&document, &recordings, outputs, terminal);
     }
     let (mut first, mut files, mut pairs) = (None, Vec::new(), Vec::new());
     for [before, after] in arguments.pairs() {
@@ -274,8 +287,13 @@ fn read_side(
         .iter()
         .filter(|one| one.code == "ambiguous-pairing");
     for warning in read.chain(numbered) {
-        if !warnings.contains(warning) {
-            warnings.push(warning.clone());
+        // Recordings of two tests often have the same names.
+        let warning = match is_description(path) {
+            true => warning.clone().of_part(&name),
+            false => warning.clone(),
+        };
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
         }
     }
     Ok(Side {

@@ -8,6 +8,7 @@ use super::format::{capital, significant, trimmed};
 use super::tables::{self, Table};
 use super::words::diagnosis::gap_story;
 use super::words::findings::{no_estimate, sentences};
+use super::words::{comparison, series};
 use tapjoint_beam::{Assembly, BeamTheory};
 use tapjoint_description::JointModel;
 
@@ -34,6 +35,9 @@ const PLOT_LICENSE: &str = include_str!("assets/uPlot-LICENSE.txt");
 const SCRIPT: &str = include_str!("templates/report.js");
 const POINTS: &str = include_str!("templates/report_points.js");
 
+/// Warnings of one code that a page on several tests lists: those of two tests with two recordings each.
+const MOST_ALIKE: usize = 4;
+
 /// The scripts that make pictures live; left out where there is no picture.
 struct Live {
     library: &'static str,
@@ -49,6 +53,8 @@ struct Page<'a> {
     title: String,
     facts: Vec<(&'static str, String)>,
     warnings: Vec<&'a WarningSection>,
+    /// Number of further warnings.
+    hidden_warnings: usize,
     findings: Vec<String>,
     sections: Vec<Section<'a>>,
     method: Method,
@@ -90,8 +96,7 @@ struct Section<'a> {
 /// # Errors
 /// [`ReportError::Html`] if the template cannot be filled.
 pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<String, ReportError> {
-    let is_comparison = document.compare.is_some() || document.series.is_some();
-    let mut sections = match is_comparison {
+    let mut sections = match is_comparison(document) {
         true => comparison_sections(document),
         false => {
             let mut sections = model_sections(document);
@@ -109,6 +114,7 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     let name = document.test.as_ref().map(|test| test.name.clone());
     let name = name.filter(|name| !name.is_empty());
     let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
+    let (warnings, hidden_warnings) = listed_warnings(document);
     let page = Page {
         title: match (&document.series, &document.compare) {
             (Some(_), _) => format!("{name}: a series of tests"),
@@ -116,7 +122,8 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
             (None, None) => name,
         },
         facts: facts(document),
-        warnings: document.main_warnings().collect(),
+        warnings,
+        hidden_warnings,
         findings: sentences(document),
         sections,
         method: Method {
@@ -137,10 +144,28 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     page.render().map_err(ReportError::Html)
 }
 
+/// Returns the warnings that are listed, and the number of others. Many tests have many doubts of one kind: a few stand for all.
+fn listed_warnings(document: &Document) -> (Vec<&WarningSection>, usize) {
+    let mut listed: Vec<&WarningSection> = Vec::new();
+    let mut hidden = 0;
+    for warning in document.main_warnings() {
+        let alike = listed.iter().filter(|one| one.code == warning.code).count();
+        match is_comparison(document) && alike >= MOST_ALIKE {
+            true => hidden += 1,
+            false => listed.push(warning),
+        }
+    }
+    (listed, hidden)
+}
+
+fn is_comparison(document: &Document) -> bool {
+    document.compare.is_some() || document.series.is_some()
+}
+
 /// Returns what was tested, in pairs of name and value; of a bare recording what the file says.
 fn facts(document: &Document) -> Vec<(&'static str, String)> {
     let described = document.test.as_ref().filter(|test| test.kind.is_some());
-    let mut facts = Vec::new();
+    let mut facts = compared_tests(document);
     match (described, document.recordings.as_deref()) {
         (Some(test), _) => {
             let kind = test.kind.map(|kind| match kind {
@@ -182,7 +207,6 @@ fn facts(document: &Document) -> Vec<(&'static str, String)> {
         }
         _ => {}
     }
-    facts.extend(compared_tests(document));
     facts
 }
 
@@ -217,9 +241,15 @@ fn comparison_sections<'a>(document: &Document) -> Vec<Section<'a>> {
         });
     }
     if document.compare.is_some() {
+        let mut story = Vec::new();
+        if let Some(section) = &document.series {
+            story.extend(series::compared(section));
+            story.extend(comparison::answer(document));
+        }
         sections.push(Section {
             id: "compare",
             title: "What changed",
+            story,
             tables: found([
                 tables::changes(document),
                 tables::changed_modes(document),

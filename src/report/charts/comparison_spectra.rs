@@ -1,6 +1,5 @@
 //! Spectra of two tests over each other: the whole band, and a close-up of every mode whose shift is too small to be seen there.
 
-use std::cmp::Reverse;
 use std::path::Path;
 
 use super::spectra::{HIGH, decibels, frequency_axis, magnitude_axis, magnitudes, over_lines};
@@ -23,10 +22,12 @@ const COLORS: [Color; 2] = [Color::Blue, Color::Vermilion];
 const NAMES: [&str; 2] = ["before", "after"];
 /// Widths (pixels) in the whole band: the curve after is a thin one over a thick one, so that both are seen where they agree.
 const WIDTHS: [f64; 2] = [3.0, 1.2];
+/// Height of a whole band where there are several (pixels).
+const LOW: f64 = 240.0;
+/// Most recordings of which the whole band is shown.
+const MOST_BANDS: usize = 3;
 /// Most close-ups; higher modes are left to the table.
 const MOST_CLOSE_UPS: usize = 12;
-/// Close-ups beside each other.
-const COLUMNS: usize = 3;
 /// Height of a close-up (pixels).
 const CLOSE_UP: f64 = 190.0;
 /// Half-power widths shown on either side of the two peaks.
@@ -45,6 +46,8 @@ const LEAST_DESCRIBED: f64 = 5e-4;
 /// One sensor in recordings of both tests that match.
 struct Overlay<'a> {
     recordings: [&'a RecordingResult; 2],
+    /// Their files, shortened as far as names stay apart.
+    file: String,
     sensor: &'a str,
     /// Magnitudes on each line, both in one unit.
     curves: [Curve; 2],
@@ -85,29 +88,38 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
     if close_ups.is_empty() {
         return None;
     }
-    // The band that holds most modes, and of several the one where most were read best.
-    let mut best = Vec::new();
-    for (index, overlay) in overlays.iter().enumerate() {
-        let held = modes.iter().filter(|one| overlay.holds(one));
+    // One sensor for each recording: that on which most modes are read best.
+    let mut bands: Vec<(usize, &Overlay)> = Vec::new();
+    for overlay in &overlays {
         let own = close_ups.iter();
-        let own = own.filter(|one| std::ptr::eq(one.overlay, overlay));
-        best.push((held.count(), own.count(), Reverse(index), overlay));
+        let own = own.filter(|one| std::ptr::eq(one.overlay, overlay)).count();
+        let same = |known: &Overlay| std::ptr::eq(known.recordings[0], overlay.recordings[0]);
+        match bands.iter_mut().find(|(_, known)| same(known)) {
+            Some(known) if own > known.0 => *known = (own, overlay),
+            Some(_) => {}
+            None => bands.push((own, overlay)),
+        }
     }
-    let (.., whole) = best.into_iter().max_by_key(|one| (one.0, one.1, one.2))?;
-    let all = close_ups.len();
-    close_ups.truncate(MOST_CLOSE_UPS);
-    let file = whole.file();
-    let sensor = whole.sensor;
-    let quantity = match whole.has_force {
-        true => "Frequency response functions",
-        false => "Spectra",
-    };
-    let level = match close_ups.iter().all(|one| one.overlay.has_force) {
-        true => "below the higher peak",
-        false => "below the peak of each test",
-    };
+    bands.retain(|(own, _)| *own > 0);
+    bands.truncate(MOST_BANDS);
+    let bands: Vec<&Overlay> = bands.into_iter().map(|(_, overlay)| overlay).collect();
+    let mut blocks: Vec<Block> = bands.iter().map(|one| whole_band(one, &modes)).collect();
+    let (mut title, mut shown) = ("Spectra before and after".to_owned(), String::new());
+    match bands.as_slice() {
+        [only] => {
+            title.push_str(&format!(", {}, {}", only.sensor, only.file));
+            shown.push_str(&format!(", {} in {}", only.sensor, only.file));
+            blocks[0].name = "Whole band".to_owned();
+        }
+        _ => {
+            for panel in blocks.iter_mut().flat_map(|block| &mut block.panels) {
+                panel.height = LOW;
+            }
+        }
+    }
     let mut caption = format!(
-        "{quantity} before and after, {sensor} in {file}, and a close-up of every compared mode. Dashed: the frequency as read."
+        "Spectra before and after{shown}, and a close-up of every compared mode. Vertical lines: the frequency as read. Shaded: \
+         where the peak after is in 95 of 100 tests if nothing changed but what is described."
     );
     let mut files = section
         .tests
@@ -118,22 +130,33 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
             " Shown are the first test before and the first after; the changes are those of all tests.",
         );
     }
+    let level = match close_ups.iter().all(|one| one.overlay.has_force) {
+        true => "below the higher peak",
+        false => "below the peak of each test",
+    };
+    let all = close_ups.len();
+    close_ups.truncate(MOST_CLOSE_UPS);
+    // Four fill two rows of two.
+    let columns = match close_ups.len() {
+        1 | 2 | 4 => 2,
+        _ => 3,
+    };
+    blocks.push(Block {
+        name: match all > close_ups.len() {
+            true => format!("Close-ups, the first {MOST_CLOSE_UPS} of {all} modes"),
+            false => "Close-ups".to_owned(),
+        },
+        in_page: InPage::First,
+        ..Block::new(columns, panels(&close_ups))
+    });
     Some(Chart {
         kind: "compare-spectra",
-        title: format!("{quantity} before and after, {sensor}, {file}"),
-        subtitle: format!("close-ups: level {level}; dashed: the frequency as read"),
+        title,
+        subtitle: format!(
+            "close-ups: level {level}, dots are spectral lines; dashed: the frequency as read"
+        ),
         caption,
-        blocks: vec![
-            whole_band(whole, &modes),
-            Block {
-                name: match all > close_ups.len() {
-                    true => format!("Close-ups, the first {MOST_CLOSE_UPS} of {all} modes"),
-                    false => "Close-ups".to_owned(),
-                },
-                in_page: InPage::First,
-                ..Block::new(COLUMNS, panels(&close_ups))
-            },
-        ],
+        blocks,
         ..Chart::default()
     })
 }
@@ -157,7 +180,17 @@ fn matching(recordings: &ComparedRecordings) -> Vec<[&RecordingResult; 2]> {
 /// Returns the sensors that both tests have, in all recordings that match.
 fn overlays<'a>(recordings: &'a ComparedRecordings, modes: &[&ModeChange]) -> Vec<Overlay<'a>> {
     let mut overlays = Vec::new();
-    for pair in matching(recordings) {
+    let pairs = matching(recordings);
+    let names = [0, 1].map(|side| {
+        let files: Vec<&str> = pairs.iter().map(|pair| pair[side].file.as_str()).collect();
+        ends_of_paths(&files)
+    });
+    let [before, after] = &names;
+    for (pair, names) in pairs.into_iter().zip(before.iter().zip(after)) {
+        let file = match names {
+            (before, after) if before == after => before.clone(),
+            (before, after) => format!("{before} and {after}"),
+        };
         let frfs = pair.map(|one| frfs_of(one, &FrfSettings::default()).unwrap_or_default());
         for response in &pair[0].responses {
             let sensor = response.name.as_str();
@@ -166,6 +199,7 @@ fn overlays<'a>(recordings: &'a ComparedRecordings, modes: &[&ModeChange]) -> Ve
             let found = functions.or_else(|| spectra(pair, sensor, modes));
             overlays.extend(found.map(|(curves, axis)| Overlay {
                 recordings: pair,
+                file: file.clone(),
                 sensor,
                 curves,
                 axis,
@@ -227,21 +261,6 @@ fn reading(recording: &RecordingResult, frequency: f64) -> Option<&ModeReading> 
     let nearest = recording.readings().iter();
     let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)));
     nearest.filter(|one| distance(one) <= SAME_PEAK * frequency)
-}
-
-impl Overlay<'_> {
-    /// Returns true where the bands of both tests hold a mode.
-    fn holds(&self, change: &ModeChange) -> bool {
-        let [before, after] = &self.curves;
-        let sides = [(before, change.before), (after, change.after)];
-        let mut sides = sides.into_iter();
-        sides.all(|(curve, frequency)| (curve.lines.low..=curve.lines.high).contains(&frequency))
-    }
-
-    /// The recording before, shortened as far as names stay apart.
-    fn file(&self) -> String {
-        ends_of_paths(&[&self.recordings[0].file]).concat()
-    }
 }
 
 impl<'a> CloseUp<'a> {
@@ -365,7 +384,7 @@ fn whole_band(overlay: &Overlay, modes: &[&ModeChange]) -> Block {
     });
     panel.rules = rules.collect();
     Block {
-        name: "Whole band".to_owned(),
+        name: format!("Whole band, {}, {}", overlay.file, overlay.sensor),
         ..Block::new(1, vec![panel])
     }
 }
@@ -379,13 +398,10 @@ fn panels(close_ups: &[CloseUp]) -> Vec<Panel> {
         .flat_map(|one| one.y.iter().copied());
     let lowest = extent(all).map_or(-DEPTH[0], |range| range.0);
     let y = Axis::linear(lowest.clamp(-DEPTH[1], -DEPTH[0]), 2.0).of("level", "dB");
-    let first = close_ups.first().map(|one| one.overlay);
-    let has_one_file = close_ups
-        .iter()
-        .all(|one| Some(one.overlay.file()) == first.map(Overlay::file));
-    let has_one_sensor = close_ups
-        .iter()
-        .all(|one| Some(one.overlay.sensor) == first.map(|one| one.sensor));
+    let mut neighbours = close_ups.windows(2);
+    let has_one_file = neighbours.all(|two| two[0].overlay.file == two[1].overlay.file);
+    let mut neighbours = close_ups.windows(2);
+    let has_one_sensor = neighbours.all(|two| two[0].overlay.sensor == two[1].overlay.sensor);
     let mut panels = Vec::new();
     for (one, levels) in close_ups.iter().zip(levels) {
         let change = one.change;
@@ -399,7 +415,7 @@ fn panels(close_ups: &[CloseUp]) -> Vec<Panel> {
             title.push_str(&format!(" (described: {described} %)"));
         }
         if !has_one_file {
-            title.push_str(&format!(", {}", one.overlay.file()));
+            title.push_str(&format!(", {}", one.overlay.file));
         }
         if !has_one_sensor {
             title.push_str(&format!(", {}", one.overlay.sensor));

@@ -185,17 +185,13 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
-    if document.compare.is_some() || document.series.is_some() {
-        let mut found: Vec<String> = document.series.iter().flat_map(series::answer).collect();
-        let changes = comparison::answer(document);
-        // A series and its comparison say the same about modes whose numbers differ.
-        found.extend(
-            changes
-                .into_iter()
-                .filter(|one| !found.contains(one))
-                .collect::<Vec<_>>(),
-        );
-        return found;
+    if let Some(section) = &document.series {
+        // More on what changed stands in its section.
+        let change = comparison::answer(document).into_iter().take(1);
+        return series::answer(section).into_iter().chain(change).collect();
+    }
+    if document.compare.is_some() {
+        return comparison::answer(document);
     }
     let taps = taps(document).map(|taps| capital(&taps) + ".");
     let first = [taps, channels(document), modes(document)];

@@ -74,7 +74,7 @@ pub fn changed_joint(document: &Document) -> Option<Table> {
     let joint = document.compare.as_ref()?.found.joint.as_ref()?;
     let rows = [
         ("Kt", "N/m", joint.kt.as_ref()),
-        ("Kr", "N m/rad", joint.kr.as_ref()),
+        ("Kr", "N\u{a0}m/rad", joint.kr.as_ref()),
     ];
     let rows = rows.into_iter().filter_map(|(name, unit, change)| {
         let change = change?;
@@ -92,8 +92,8 @@ pub fn changed_joint(document: &Document) -> Option<Table> {
     let table = Table::of(
         "The joint, if only the joint changed",
         rows,
-        "Before: as described, or fitted to the frequencies before; std is its standard uncertainty. Low and high: 95 % limits of \
-         the change, which is known better than the stiffnesses themselves.",
+        "Before: as described, or fitted to the frequencies before, with its standard uncertainty. Low and high: 95 % limits of the \
+         change.",
     );
     (!table.rows.is_empty()).then_some(table)
 }

@@ -29,8 +29,8 @@ use tapjoint::report::{
 /// BEFORE and AFTER are test descriptions. With --test they may also be recordings or files of functions, each read
 /// in the place of the first recording that TEST describes. Errors of the model that both tests share cancel:
 /// what is compared is the change of each frequency. With --out a report folder gets report.html, report.json,
-/// CSV files and pictures; where both tests have recordings of one sensor, one has their spectra over each other. Files of an
-/// earlier report are replaced or removed. Other files stay.
+/// CSV files and pictures. Where both tests have recordings of the same sensor, a picture shows their spectra over each other.
+/// Files of an earlier report are replaced or removed. Other files stay.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint compare before.toml after.toml\n  tapjoint compare monday.wav friday.wav --test test.toml --repeatability \"0.1 %\"\n  tapjoint compare before.toml after.toml --out report\n  tapjoint compare --before 1.toml 2.toml --after 3.toml 4.toml\n  tapjoint compare --pair a1.toml a2.toml --pair b1.toml b2.toml\n  tapjoint compare --series week1.toml week2.toml week3.toml --png charts.png"

@@ -283,22 +283,16 @@ fn assert_frozen(name: &str, folder: &Path, test: &str) {
     assert!(differs.is_empty(), "{name}: {differs:?} differ");
 }
 
-/// Returns the names of a report's files, the words of its page, and its tables.
+/// Returns the names of a report's files, the words of its page, and the changes.
 fn report_text(folder: &Path) -> String {
     let entries = fs::read_dir(folder).unwrap();
     let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<String> = names.collect();
     names.sort();
     let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
-    let mut text = format!(
-        "{}\n\n{}",
-        names.join("\n"),
-        visible_text(&read("report.html"))
-    );
-    for table in names.iter().filter(|name| name.ends_with(".csv")) {
-        writeln!(text, "\n{table}\n{}", csv_rounded(&read(table))).unwrap();
-    }
-    text
+    let page = visible_text(&read("report.html"));
+    let changes = csv_rounded(&read("changes.csv"));
+    format!("{}\n\n{page}\n{changes}\n", names.join("\n"))
 }
 
 /// A table with numbers of six significant digits.

@@ -77,45 +77,24 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
     let modes = section.found.modes.iter().filter(|one| one.pair == 0);
     let modes: Vec<&ModeChange> = modes.collect();
     let overlays = overlays(recordings, &modes);
-    let mut close_ups = Vec::new();
-    for change in &modes {
-        let seen = overlays.iter().filter_map(|one| CloseUp::of(change, one));
-        close_ups.extend(seen.min_by(|a, b| {
-            let by_reading = a.uncertainty().total_cmp(&b.uncertainty());
-            by_reading.then(b.prominence().total_cmp(&a.prominence()))
-        }));
-    }
-    if close_ups.is_empty() {
-        return None;
-    }
-    // One sensor for each recording: that on which most modes are read best.
-    let mut bands: Vec<(usize, &Overlay)> = Vec::new();
-    for overlay in &overlays {
-        let own = close_ups.iter();
-        let own = own.filter(|one| std::ptr::eq(one.overlay, overlay)).count();
-        let same = |known: &Overlay| std::ptr::eq(known.recordings[0], overlay.recordings[0]);
-        match bands.iter_mut().find(|(_, known)| same(known)) {
-            Some(known) if own > known.0 => *known = (own, overlay),
-            Some(_) => {}
-            None => bands.push((own, overlay)),
-        }
-    }
-    bands.retain(|(own, _)| *own > 0);
-    bands.truncate(MOST_BANDS);
-    let bands: Vec<&Overlay> = bands.into_iter().map(|(_, overlay)| overlay).collect();
-    let mut blocks: Vec<Block> = bands.iter().map(|one| whole_band(one, &modes)).collect();
+    let mut close_ups = read_best(&modes, &overlays);
+    let bands = bands(&overlays, &close_ups);
+    let first = bands.first()?;
     let (mut title, mut shown) = ("Spectra before and after".to_owned(), String::new());
-    match bands.as_slice() {
-        [only] => {
-            title.push_str(&format!(", {}, {}", only.sensor, only.file));
-            shown.push_str(&format!(", {} in {}", only.sensor, only.file));
-            blocks[0].name = "Whole band".to_owned();
-        }
-        _ => {
-            for panel in blocks.iter_mut().flat_map(|block| &mut block.panels) {
-                panel.height = LOW;
-            }
-        }
+    if bands.len() == 1 {
+        title.push_str(&format!(", {}, {}", first.sensor, first.file));
+        shown.push_str(&format!(", {} in {}", first.sensor, first.file));
+    }
+    let mut blocks = Vec::new();
+    for band in &bands {
+        let (name, height) = match bands.len() {
+            1 => ("Whole band".to_owned(), HIGH),
+            _ => (format!("Whole band, {}, {}", band.file, band.sensor), LOW),
+        };
+        blocks.push(Block {
+            name,
+            ..Block::new(1, vec![whole_band(band, &modes, height)])
+        });
     }
     let mut caption = format!(
         "Spectra before and after{shown}, and a close-up of every compared mode. Vertical lines: the frequency as read. Shaded: \
@@ -161,13 +140,46 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
     })
 }
 
+/// Returns each mode where it was read best, on the sensor that shows it most clearly.
+fn read_best<'a>(modes: &[&'a ModeChange], overlays: &'a [Overlay<'a>]) -> Vec<CloseUp<'a>> {
+    let mut close_ups = Vec::new();
+    for change in modes {
+        let seen = overlays.iter().filter_map(|one| CloseUp::of(change, one));
+        close_ups.extend(seen.min_by(|a, b| {
+            let by_reading = a.uncertainty().total_cmp(&b.uncertainty());
+            by_reading.then(b.prominence().total_cmp(&a.prominence()))
+        }));
+    }
+    close_ups
+}
+
+/// Returns one sensor for each recording in which modes were read best: the one that shows most of them.
+fn bands<'a>(overlays: &'a [Overlay<'a>], close_ups: &[CloseUp]) -> Vec<&'a Overlay<'a>> {
+    let mut bands: Vec<(usize, &Overlay)> = Vec::new();
+    for overlay in overlays {
+        let own = close_ups.iter();
+        let own = own.filter(|one| std::ptr::eq(one.overlay, overlay)).count();
+        let same = |known: &Overlay| std::ptr::eq(known.recordings[0], overlay.recordings[0]);
+        match bands.iter_mut().find(|(_, known)| same(known)) {
+            Some(known) if own > known.0 => *known = (own, overlay),
+            Some(_) => {}
+            None => bands.push((own, overlay)),
+        }
+    }
+    bands.retain(|(own, _)| *own > 0);
+    bands.truncate(MOST_BANDS);
+    bands.into_iter().map(|(_, overlay)| overlay).collect()
+}
+
 /// Returns the recordings of both tests that match: those with the same file stem, else those at the same place in the descriptions.
 fn matching(recordings: &ComparedRecordings) -> Vec<[&RecordingResult; 2]> {
     let (before, after) = (&recordings.before, &recordings.after);
     let stem = |one: &RecordingResult| Path::new(&one.file).file_stem().map(ToOwned::to_owned);
     let mut pairs = Vec::new();
     for (index, one) in before.iter().enumerate() {
-        let named = after.iter().find(|other| stem(other) == stem(one));
+        // Of several with this name, the one at the same place.
+        let at_place = after.get(index).into_iter();
+        let named = at_place.chain(after).find(|other| stem(other) == stem(one));
         let placed = after.get(index).filter(|other| {
             let mut own = before.iter();
             own.all(|one| stem(one) != stem(other))
@@ -355,7 +367,7 @@ impl<'a> CloseUp<'a> {
 }
 
 /// Returns both curves over all frequencies, with the modes.
-fn whole_band(overlay: &Overlay, modes: &[&ModeChange]) -> Block {
+fn whole_band(overlay: &Overlay, modes: &[&ModeChange], height: f64) -> Panel {
     let values = overlay.curves.iter().flat_map(|curve| &curve.values);
     let y = magnitude_axis(values.copied()).of(&overlay.axis.label, &overlay.axis.unit);
     let axes = overlay.recordings.iter();
@@ -364,7 +376,7 @@ fn whole_band(overlay: &Overlay, modes: &[&ModeChange]) -> Block {
     let low = extent(axes.iter().map(|axis| axis.low)).map_or(0.0, |range| range.0);
     let high = extent(axes.iter().map(|axis| axis.high)).map_or(1.0, |range| range.1);
     let x = Axis::linear(low, high).of("frequency", "Hz");
-    let mut panel = Panel::new(HIGH, x, y);
+    let mut panel = Panel::new(height, x, y);
     for side in [0, 1] {
         let Curve { lines, values } = &overlay.curves[side];
         let curve = over_lines(lines, NAMES[side], COLORS[side], values.clone());
@@ -383,10 +395,7 @@ fn whole_band(overlay: &Overlay, modes: &[&ModeChange]) -> Block {
         prominence: one.change_percent.abs(),
     });
     panel.rules = rules.collect();
-    Block {
-        name: format!("Whole band, {}, {}", overlay.file, overlay.sensor),
-        ..Block::new(1, vec![panel])
-    }
+    panel
 }
 
 /// Returns the close-ups, all with the same levels.

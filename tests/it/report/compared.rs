@@ -192,6 +192,15 @@ fn prop_recordings_of_other_names_match_by_their_place() {
             .title
             .contains("low.wav and a.wav")
     );
+    // Of equal names in two folders the place decides.
+    let mut alike = recordings();
+    for all in [&mut alike.before, &mut alike.after] {
+        for (recording, name) in all.iter_mut().zip(["x/t.wav", "y/t.wav"]) {
+            recording.file = name.to_owned();
+        }
+    }
+    let chart = overlay(&document(), &alike).expect("the places match");
+    assert_eq!(close_ups(&chart).panels.len(), CHANGES.len());
     // A name decides before the place does.
     let mut swapped = recordings();
     swapped.after.reverse();

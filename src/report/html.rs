@@ -210,21 +210,22 @@ fn facts(document: &Document) -> Vec<(&'static str, String)> {
     facts
 }
 
-/// Returns the files of the compared tests, in pairs of name and value.
+/// Returns which tests were compared, in pairs of name and value.
 fn compared_tests(document: &Document) -> Vec<(&'static str, String)> {
     if let Some(series) = &document.series {
         return vec![("Tests", series.tests.len().to_string())];
     }
-    let pairs = document.compare.iter().flat_map(|one| &one.tests);
-    let pairs: Vec<[String; 2]> = pairs
-        .map(|pair| [&pair.before, &pair.after].map(|files| files.join(", ")))
-        .collect();
-    match pairs.as_slice() {
-        [[before, after]] => vec![("Before", before.clone()), ("After", after.clone())],
-        several => several
-            .iter()
-            .map(|pair| ("Before and after", pair.join(", ")))
-            .collect(),
+    let Some(section) = &document.compare else {
+        return Vec::new();
+    };
+    // The table has the names of many.
+    let said = |files: &[String]| match files {
+        [only] => only.clone(),
+        several => format!("{} tests", several.len()),
+    };
+    match section.tests.as_slice() {
+        [pair] => vec![("Before", said(&pair.before)), ("After", said(&pair.after))],
+        several => vec![("Pairs", several.len().to_string())],
     }
 }
 
@@ -255,6 +256,10 @@ fn comparison_sections<'a>(document: &Document) -> Vec<Section<'a>> {
                 tables::changed_modes(document),
                 tables::changed_joint(document),
             ]),
+            folded: match document.series {
+                Some(_) => Vec::new(),
+                None => found([tables::compared_tests(document)]),
+            },
             ..Section::default()
         });
     }

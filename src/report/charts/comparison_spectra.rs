@@ -97,17 +97,20 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
         });
     }
     let mut caption = format!(
-        "Spectra before and after{shown}, and a close-up of every compared mode. Vertical lines: the frequency as read. Shaded: \
-         where the peak after is in 95 of 100 tests if nothing changed but what is described."
+        "Spectra before and after{shown}, and a close-up of every compared mode. Vertical lines: the frequency as read."
     );
-    let mut files = section
-        .tests
-        .iter()
-        .flat_map(|one| [&one.before, &one.after]);
-    if section.tests.len() > 1 || files.any(|files| files.len() > 1) {
-        caption.push_str(
-            " Shown are the first test before and the first after; the changes are those of all tests.",
-        );
+    let pair = section.tests.first();
+    let is_mean = pair.is_some_and(|pair| pair.before.len() > 1 || pair.after.len() > 1);
+    caption.push_str(match is_mean {
+        true => {
+            " Shown are the first test before and the first after; the changes are those of the means of all tests."
+        }
+        false => {
+            " Shaded: where the peak after is in 95 of 100 tests if nothing changed but what is described."
+        }
+    });
+    if section.tests.len() > 1 {
+        caption.push_str(" The first of several pairs is shown.");
     }
     let level = match close_ups.iter().all(|one| one.overlay.has_force) {
         true => "below the higher peak",
@@ -126,7 +129,7 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
             false => "Close-ups".to_owned(),
         },
         in_page: InPage::First,
-        ..Block::new(columns, panels(&close_ups))
+        ..Block::new(columns, panels(&close_ups, is_mean))
     });
     Some(Chart {
         kind: "compare-spectra",
@@ -398,8 +401,8 @@ fn whole_band(overlay: &Overlay, modes: &[&ModeChange], height: f64) -> Panel {
     panel
 }
 
-/// Returns the close-ups, all with the same levels.
-fn panels(close_ups: &[CloseUp]) -> Vec<Panel> {
+/// Returns the close-ups, all with the same levels. Changes of means are no changes of the tests that are shown.
+fn panels(close_ups: &[CloseUp], is_mean: bool) -> Vec<Panel> {
     let levels: Vec<[Series; 2]> = close_ups.iter().map(CloseUp::levels).collect();
     let all = levels
         .iter()
@@ -419,6 +422,9 @@ fn panels(close_ups: &[CloseUp]) -> Vec<Panel> {
             change.mode,
             signed_percent(Some(change.change_percent))
         );
+        if is_mean {
+            title.push_str(" in the mean");
+        }
         if change.described_percent.abs() >= LEAST_DESCRIBED {
             let described = signed_percent(Some(change.described_percent));
             title.push_str(&format!(" (described: {described} %)"));
@@ -431,9 +437,10 @@ fn panels(close_ups: &[CloseUp]) -> Vec<Panel> {
         }
         let [low, high] = one.ends();
         let x = Axis::linear(low, high).of("frequency", "Hz");
-        let repeated = repeated(one, &x, &y);
+        // The scatter of means is smaller than that of the tests that are shown.
+        let repeated = (!is_mean).then(|| repeated(one, &x, &y));
         let mut panel = Panel::new(CLOSE_UP, x, y.clone()).titled(title);
-        panel = panel.with([repeated]);
+        panel = panel.with(repeated);
         for (side, curve) in levels.into_iter().enumerate() {
             let at = one.readings[side].frequency;
             let mark = [(at, y.low), (at, y.high)];

@@ -97,3 +97,20 @@ pub fn changed_joint(document: &Document) -> Option<Table> {
     );
     (!table.rows.is_empty()).then_some(table)
 }
+
+/// The compared tests; `None` without a comparison, and for one test before and one after.
+pub fn compared_tests(document: &Document) -> Option<Table> {
+    let pairs = &document.compare.as_ref()?.tests;
+    let mut rows = Vec::new();
+    for (index, pair) in pairs.iter().enumerate() {
+        for repeat in 0..pair.before.len().max(pair.after.len()) {
+            let [before, after] = [&pair.before, &pair.after].map(|files| files.get(repeat));
+            rows.push([
+                number("Pair", (index + 1).to_string()),
+                words("Before", or_missing(before)),
+                words("After", or_missing(after)),
+            ]);
+        }
+    }
+    (rows.len() > 1).then(|| Table::of("Tests", rows, ""))
+}

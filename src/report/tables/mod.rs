@@ -7,7 +7,7 @@ mod modes;
 mod recordings;
 mod series;
 
-pub use comparison::{changed_joint, changed_modes, changes};
+pub use comparison::{changed_joint, changed_modes, changes, compared_tests};
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;
 pub use joint::{

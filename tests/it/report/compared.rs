@@ -172,6 +172,36 @@ fn prop_the_shaded_places_are_those_of_the_described_change_with_the_scatter() {
 }
 
 #[test]
+fn regress_changes_of_means_have_no_shaded_places_of_single_tests() {
+    let mut document = document();
+    let tests = &mut document.compare.as_mut().expect("a comparison").tests;
+    tests[0].after.push("saturday.toml".to_owned());
+    let chart = overlay(&document, &recordings()).expect("the tests have spectra");
+    assert!(
+        chart.caption.contains("the first after"),
+        "{}",
+        chart.caption
+    );
+    for panel in &close_ups(&chart).panels {
+        assert!(panel.title.contains(" in the mean"), "{}", panel.title);
+        assert!(panel.series.iter().all(|one| one.mark != Mark::Band));
+    }
+    let tests = &mut document.compare.as_mut().expect("a comparison").tests;
+    tests[0].after.pop();
+    tests.push(tests[0].clone());
+    let chart = overlay(&document, &recordings()).expect("the tests have spectra");
+    assert!(
+        chart
+            .caption
+            .ends_with("The first of several pairs is shown.")
+    );
+    let files = render_compared(&document, &recordings()).expect("it is rendered");
+    let words = words_of(&text_of(&files, "report.html"));
+    assert!(words.contains("<dt>Pairs</dt><dd>2</dd>"));
+    assert!(words.contains("<td>monday.toml</td><td>friday.toml</td>"));
+}
+
+#[test]
 fn prop_the_page_opens_with_the_close_ups() {
     let chart = chart(&recordings());
     let page = chart.page().expect("there are curves");

@@ -113,8 +113,8 @@ pub fn overlay(document: &Document, recordings: &ComparedRecordings) -> Option<C
         caption.push_str(" The first of several pairs is shown.");
     }
     let level = match close_ups.iter().all(|one| one.overlay.has_force) {
-        true => "below the higher peak",
-        false => "below the peak of each test",
+        true => "below the highest shown",
+        false => "below the highest of each test",
     };
     let all = close_ups.len();
     close_ups.truncate(MOST_CLOSE_UPS);
@@ -351,7 +351,11 @@ impl<'a> CloseUp<'a> {
         shown.map(|(first, values)| {
             let (curve, peak) = (&self.overlay.curves[side], peaks[side]);
             let over = if self.overlay.has_force { higher } else { peak };
-            let levels = values.iter().map(|value| decibels(value / over));
+            // On some lines a function does not exist.
+            let levels = values.iter().map(|value| match *value > 0.0 {
+                true => decibels(value / over),
+                false => f64::NAN,
+            });
             let levels = levels.collect();
             let series = Series::even(
                 NAMES[side],

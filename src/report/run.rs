@@ -1,5 +1,5 @@
-//! All files of one run: `report.json` with its schema, the page, tables and pictures; and the files that an earlier
-//! run has left.
+//! All files of a report: `report.json` with its schema, the page, tables and pictures; and the files that an earlier
+//! report has left.
 
 use rayon::prelude::*;
 use schemars::generate::SchemaSettings;

@@ -4,28 +4,36 @@ use super::Outcome;
 use super::arguments::repeatability;
 use super::input::{TestFile, check_file, read_test};
 use super::output::OutputFile;
+use super::overwrite::Expanded;
 use super::place::is_description;
+use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::{anyhow, bail};
 use clap::Args;
+use std::mem;
 use std::path::{Path, PathBuf, absolute};
 use tapjoint::compare::{
     LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
 };
-use tapjoint::pipeline::{IdentifySettings, TestedStructure, Warning, compared_test};
-use tapjoint::report::document::Document;
+use tapjoint::pipeline::{
+    IdentifySettings, RecordingResult, TestedStructure, Warning, compared_test,
+};
+use tapjoint::report::document::{Document, PairFiles};
 use tapjoint::report::{
-    comparison_of, render_comparison, render_comparison_picture, render_series_csv, series_of,
+    ComparedRecordings, comparison_of, earlier_files, render_compared, render_comparison,
+    render_comparison_picture, render_series_csv, series_of,
 };
 
 /// Say what changed between two tests of one structure, or in a series of tests.
 ///
 /// BEFORE and AFTER are test descriptions. With --test they may also be recordings or files of functions, each read
 /// in the place of the first recording that TEST describes. Errors of the model that both tests share cancel:
-/// what is compared is the change of each frequency.
+/// what is compared is the change of each frequency. With --out a report folder gets report.html, report.json,
+/// CSV files and pictures. Where both tests have recordings of the same sensor, a picture shows their spectra over each other.
+/// Files of an earlier report are replaced or removed. Other files stay.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  tapjoint compare before.toml after.toml\n  tapjoint compare monday.wav friday.wav --test test.toml --repeatability \"0.1 %\"\n  tapjoint compare --before 1.toml 2.toml --after 3.toml 4.toml\n  tapjoint compare --pair a1.toml a2.toml --pair b1.toml b2.toml\n  tapjoint compare --series week1.toml week2.toml week3.toml --png charts.png"
+    after_help = "Examples:\n  tapjoint compare before.toml after.toml\n  tapjoint compare monday.wav friday.wav --test test.toml --repeatability \"0.1 %\"\n  tapjoint compare before.toml after.toml --out report\n  tapjoint compare --before 1.toml 2.toml --after 3.toml 4.toml\n  tapjoint compare --pair a1.toml a2.toml --pair b1.toml b2.toml\n  tapjoint compare --series week1.toml week2.toml week3.toml --png charts.png"
 )]
 pub(super) struct CompareArguments {
     /// Test before the change
@@ -53,6 +61,9 @@ pub(super) struct CompareArguments {
     /// repeats or the scatter of a series, else about 0.1 % is assumed
     #[arg(long, value_name = "R", value_parser = repeatability)]
     repeatability: Option<f64>,
+    /// Folder of the report; default: none is written
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Draw the changes of the frequencies and the causes, or the control charts of a series, into this file (PNG, or SVG if its
     /// name ends in .svg)
     #[arg(long, value_name = "FILE")]
@@ -62,11 +73,46 @@ pub(super) struct CompareArguments {
     csv: Option<PathBuf>,
 }
 
+impl CompareArguments {
+    /// Returns the files that a report may consist of; empty without a report.
+    pub(super) fn expanded(&self) -> Vec<Expanded> {
+        let Some(folder) = &self.out else {
+            return Vec::new();
+        };
+        let mut report = serde_json::json!({ "version": 1, "compare": {}, "warnings": [] });
+        if !self.series.is_empty() {
+            report["series"] = serde_json::json!({});
+        }
+        let files = earlier_files(&report.to_string());
+        vec![("out", files.iter().map(|file| folder.join(file)).collect())]
+    }
+
+    /// Returns the tests before and after of each pair; empty where none were given.
+    fn pairs(&self) -> Vec<[&[PathBuf]; 2]> {
+        match (&self.first, &self.second) {
+            (Some(before), Some(after)) => vec![[before, after].map(std::slice::from_ref)],
+            _ if !self.before.is_empty() => vec![[&self.before, &self.after]],
+            _ => {
+                let pairs = self.pair.chunks_exact(2);
+                pairs.map(|pair| [&pair[..1], &pair[1..]]).collect()
+            }
+        }
+    }
+}
+
 /// A test that was read and analysed.
 struct Side {
     name: String,
     structure: TestedStructure,
     compared: Test,
+    recordings: Vec<RecordingResult>,
+}
+
+/// Everything that is written beside the answer.
+struct Outputs {
+    report: Option<OutputFolder>,
+    png: Option<OutputFile>,
+    csv: Option<OutputFile>,
 }
 
 pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
@@ -88,23 +134,31 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     if !arguments.series.is_empty() && !(LEAST_SERIES..=MOST_SERIES).contains(&count) {
         bail!("--series: {count} tests, but a series has between {LEAST_SERIES} and {MOST_SERIES}");
     }
-    let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
-    let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
+    let report = arguments.out.as_deref();
+    let report = report.map(|folder| OutputFolder::prepare(folder, terminal.files()));
+    let outputs = Outputs {
+        report: report.transpose()?,
+        png: OutputFile::prepare_optional(arguments.png.as_deref())?,
+        csv: OutputFile::prepare_optional(arguments.csv.as_deref())?,
+    };
     let template = arguments
         .test
         .as_deref()
         .map(|test| read_test(test, &terminal))
         .transpose()?;
     let mut warnings = Vec::new();
+    // Spectra are large: only those that the report shows are kept, of the first tests before and after.
+    let shows_spectra = outputs.report.is_some() && arguments.series.is_empty();
+    let mut shown = Vec::new();
     let mut read = |files: &[PathBuf]| -> anyhow::Result<Vec<Side>> {
         let mut sides = Vec::with_capacity(files.len());
         for file in files {
-            sides.push(read_side(
-                file,
-                template.as_ref(),
-                &terminal,
-                &mut warnings,
-            )?);
+            let mut side = read_side(file, template.as_ref(), &terminal, &mut warnings)?;
+            let recordings = mem::take(&mut side.recordings);
+            if shows_spectra && sides.is_empty() && shown.len() < 2 {
+                shown.push(recordings);
+            }
+            sides.push(side);
         }
         Ok(sides)
     };
@@ -115,65 +169,87 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         let sides = read(&arguments.series)?;
         let (name, structure) = (sides[0].name.clone(), sides[0].structure);
         let tests: Vec<Test> = sides.into_iter().map(|side| side.compared).collect();
-        let files = arguments.series.iter();
-        let files = files.map(|file| file.display().to_string()).collect();
         let found = watch(&tests, &settings)?;
+        let mut recordings = ComparedRecordings::default();
+        if let Some((_, departure)) = found.series.departure()
+            && outputs.report.is_some()
+        {
+            // Reading two tests again takes less than keeping the spectra of all.
+            let first = departure.since.saturating_sub(MOST_REPEATS);
+            let again = |test: usize| {
+                let file = &arguments.series[test];
+                read_side(file, template.as_ref(), &terminal, &mut Vec::new())
+            };
+            recordings.before = again(first)?.recordings;
+            recordings.after = again(departure.since)?.recordings;
+        }
+        let files = names(&arguments.series);
         let document = series_of(&name, &structure, files, found, warnings);
-        return answer(&document, png, csv, terminal);
+        return answer(&document, &recordings, outputs, terminal);
     }
-    let mut groups = Vec::new();
-    match (&arguments.first, &arguments.second) {
-        (Some(before), Some(after)) => {
-            groups.push([
-                read(std::slice::from_ref(before))?,
-                read(std::slice::from_ref(after))?,
-            ]);
-        }
-        _ if !arguments.before.is_empty() => {
-            groups.push([read(&arguments.before)?, read(&arguments.after)?]);
-        }
-        _ => {
-            for pair in arguments.pair.chunks_exact(2) {
-                groups.push([read(&pair[..1])?, read(&pair[1..])?]);
-            }
-        }
-    }
-    let Some(first) = groups.first().and_then(|group| group[0].first()) else {
-        bail!(
-            "there is nothing to compare; give BEFORE and AFTER, --before and --after, --pair, or --series"
-        );
-    };
-    let (name, structure) = (first.name.clone(), first.structure);
-    let mut pairs = Vec::with_capacity(groups.len());
-    for [before, after] in groups {
+    let (mut first, mut files, mut pairs) = (None, Vec::new(), Vec::new());
+    for [before, after] in arguments.pairs() {
+        files.push(PairFiles {
+            before: names(before),
+            after: names(after),
+        });
+        let (before, after) = (read(before)?, read(after)?);
+        first = first.or_else(|| Some((before.first()?.name.clone(), before.first()?.structure)));
         pairs.push(Pair {
             before: before.into_iter().map(|side| side.compared).collect(),
             after: after.into_iter().map(|side| side.compared).collect(),
         });
     }
+    let Some((name, structure)) = first else {
+        bail!(
+            "there is nothing to compare; give BEFORE and AFTER, --before and --after, --pair, or --series"
+        );
+    };
     let found = compare(&pairs, &settings)?;
-    let document = comparison_of(&name, &structure, found, warnings);
-    answer(&document, png, csv, terminal)
+    let document = comparison_of(&name, &structure, files, found, warnings);
+    let mut shown = shown.into_iter();
+    let recordings = ComparedRecordings {
+        before: shown.next().unwrap_or_default(),
+        after: shown.next().unwrap_or_default(),
+    };
+    answer(&document, &recordings, outputs, terminal)
 }
 
-/// Writes the picture and the rows, and prints the answer.
+/// Returns files as the user named them.
+fn names(files: &[PathBuf]) -> Vec<String> {
+    let names = files.iter().map(|file| file.display().to_string());
+    names.collect()
+}
+
+/// Writes everything that was asked for, and prints the answer.
 fn answer(
     document: &Document,
-    png: Option<OutputFile>,
-    csv: Option<OutputFile>,
+    recordings: &ComparedRecordings,
+    outputs: Outputs,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    if let Some(file) = png
+    if let Some(file) = outputs.png
         && let Some(bytes) = render_comparison_picture(document, file.picture_format())?
     {
         file.write(&bytes)?;
     }
-    if let Some(file) = csv {
+    if let Some(file) = outputs.csv {
         file.write(render_series_csv(document)?.as_bytes())?;
     }
+    let mut published = None;
+    if let Some(folder) = outputs.report {
+        for file in render_compared(document, recordings)? {
+            folder.add(&file.name, &file.bytes)?;
+        }
+        published = Some(folder.publish_report()?);
+    }
     terminal.say(&render_comparison(document))?;
+    if let Some((folder, _)) = &published {
+        terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
+    }
     terminal.write_document(document)?;
-    Ok(Outcome::Answered)
+    let left = published.and_then(|(_, left)| left);
+    left.map_or(Ok(Outcome::Answered), Err)
 }
 
 /// Reads and analyses one test, and adds its doubts about the readings to `warnings`.
@@ -211,14 +287,20 @@ fn read_side(
         .iter()
         .filter(|one| one.code == "ambiguous-pairing");
     for warning in read.chain(numbered) {
-        if !warnings.contains(warning) {
-            warnings.push(warning.clone());
+        // Recordings of two tests often have the same names.
+        let warning = match is_description(path) {
+            true => warning.clone().of_part(&name),
+            false => warning.clone(),
+        };
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
         }
     }
     Ok(Side {
         name: analysis.name,
         structure,
         compared,
+        recordings: analysis.recordings,
     })
 }
 

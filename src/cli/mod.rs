@@ -199,6 +199,7 @@ impl Command {
             Self::Run(arguments) => arguments.expanded(test),
             Self::Frf(arguments) => arguments.expanded(test),
             Self::BlindCheck(arguments) => arguments.expanded(),
+            Self::Compare(arguments) => arguments.expanded(),
             Self::Man(arguments) => arguments.expanded(&mut CommandLine::command()),
             Self::Simulate(arguments) => arguments.expanded(test),
             _ => Vec::new(),

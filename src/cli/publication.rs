@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Component, Path, PathBuf};
+use tapjoint::report::earlier_files;
 
 /// A folder of results that is filled aside and published at the end.
 #[derive(Debug)]
@@ -247,6 +248,20 @@ impl OutputFolder {
     pub(super) fn publish(self) -> anyhow::Result<PathBuf> {
         let (folder, _) = self.publish_without(Vec::new())?;
         Ok(folder)
+    }
+
+    /// Moves a report into its place, and removes what only an earlier report in the folder had.
+    ///
+    /// Returns the folder, and an error for files that could not be removed.
+    ///
+    /// # Errors
+    /// Those of [`publish`](Self::publish).
+    pub(super) fn publish_report(self) -> anyhow::Result<(PathBuf, Option<anyhow::Error>)> {
+        // Only a folder with a page holds an earlier report: other commands write a report.json alone.
+        let page = self.earlier("report.html");
+        let earlier = page.and(self.earlier("report.json"));
+        let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
+        self.publish_without(stale)
     }
 
     /// Moves everything into its place, then removes those of the `stale` files that were not made again.

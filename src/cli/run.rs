@@ -176,11 +176,7 @@ pub(super) fn run(
     for file in render_run(&document, &analysis.recordings)? {
         output.add(&file.name, &file.bytes)?;
     }
-    // Only a folder with a page holds an earlier report: other commands write a report.json alone.
-    let page = output.earlier("report.html");
-    let earlier = page.and(output.earlier("report.json"));
-    let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
-    let (folder, left) = output.publish_without(stale)?;
+    let (folder, left) = output.publish_report()?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;

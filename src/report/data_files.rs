@@ -23,6 +23,8 @@ const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fal
 /// were changed alike, and `mode` the mode that was changed alone. `statistic` says how `kx`, `ky` and `kz`
 /// (values without unit, or percent) follow from the estimates.
 const PERTURBATION: &str = "method,kind,percent,mode,statistic,kx,ky,kz";
+/// Heads of `changes.csv`.
+const CHANGES: &str = "pair,mode,before_Hz,after_Hz,change_percent,described_percent,std_percent,z";
 /// Heads of the rows of a series of tests.
 const SERIES: &str =
     "test,file,quantity,change_percent,score,last_tests,limit,low_percent,high_percent,differs";
@@ -147,6 +149,27 @@ pub fn render_taps_csv(document: &Document) -> Result<String, ReportError> {
         }
     }
     write(TAPS, rows)
+}
+
+/// Returns `changes.csv`: a row for each compared mode of each pair; only its header without a comparison.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_changes_csv(document: &Document) -> Result<String, ReportError> {
+    let modes = document.compare.iter().flat_map(|one| &one.found.modes);
+    let rows = modes.map(|one| {
+        vec![
+            (one.pair + 1).to_string(),
+            one.mode.to_string(),
+            number(Some(one.before)),
+            number(Some(one.after)),
+            number(Some(one.change_percent)),
+            number(Some(one.described_percent)),
+            number(Some(one.std_percent)),
+            number(Some(one.z)),
+        ]
+    });
+    write(CHANGES, rows)
 }
 
 /// Returns a row for each test and chart of a series; only the header without one.

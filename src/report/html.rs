@@ -8,6 +8,7 @@ use super::format::{capital, significant, trimmed};
 use super::tables::{self, Table};
 use super::words::diagnosis::gap_story;
 use super::words::findings::{no_estimate, sentences};
+use super::words::{comparison, series};
 use tapjoint_beam::{Assembly, BeamTheory};
 use tapjoint_description::JointModel;
 
@@ -34,6 +35,9 @@ const PLOT_LICENSE: &str = include_str!("assets/uPlot-LICENSE.txt");
 const SCRIPT: &str = include_str!("templates/report.js");
 const POINTS: &str = include_str!("templates/report_points.js");
 
+/// Warnings of one code that a page on several tests lists: those of two tests with two recordings each.
+const MOST_ALIKE: usize = 4;
+
 /// The scripts that make pictures live; left out where there is no picture.
 struct Live {
     library: &'static str,
@@ -49,6 +53,8 @@ struct Page<'a> {
     title: String,
     facts: Vec<(&'static str, String)>,
     warnings: Vec<&'a WarningSection>,
+    /// Number of further warnings.
+    hidden_warnings: usize,
     findings: Vec<String>,
     sections: Vec<Section<'a>>,
     method: Method,
@@ -60,6 +66,14 @@ struct Page<'a> {
 struct Method {
     recordings: bool,
     joint: bool,
+    comparison: bool,
+    series: bool,
+}
+
+impl Method {
+    fn is_told(&self) -> bool {
+        self.recordings || self.joint || self.comparison || self.series
+    }
 }
 
 /// A part of the page.
@@ -82,8 +96,14 @@ struct Section<'a> {
 /// # Errors
 /// [`ReportError::Html`] if the template cannot be filled.
 pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<String, ReportError> {
-    let mut sections = model_sections(document);
-    sections.extend(measurement_sections(document));
+    let mut sections = match is_comparison(document) {
+        true => comparison_sections(document),
+        false => {
+            let mut sections = model_sections(document);
+            sections.extend(measurement_sections(document));
+            sections
+        }
+    };
     for section in &mut sections {
         let own = figures.iter().filter(|figure| figure.section == section.id);
         section.figures = own.collect();
@@ -93,15 +113,24 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     let any_live = figures.iter().any(|figure| figure.live.is_some());
     let name = document.test.as_ref().map(|test| test.name.clone());
     let name = name.filter(|name| !name.is_empty());
+    let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
+    let (warnings, hidden_warnings) = listed_warnings(document);
     let page = Page {
-        title: name.unwrap_or_else(|| "Unnamed test".to_owned()),
+        title: match (&document.series, &document.compare) {
+            (Some(_), _) => format!("{name}: a series of tests"),
+            (None, Some(_)) => format!("{name}: before and after"),
+            (None, None) => name,
+        },
         facts: facts(document),
-        warnings: document.main_warnings().collect(),
+        warnings,
+        hidden_warnings,
         findings: sentences(document),
         sections,
         method: Method {
             recordings: document.recordings.is_some(),
             joint: document.estimate.is_some() || document.prediction.is_some(),
+            comparison: document.compare.is_some(),
+            series: document.series.is_some(),
         },
         live: any_live.then_some(Live {
             library: PLOT_LIBRARY,
@@ -115,10 +144,28 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     page.render().map_err(ReportError::Html)
 }
 
+/// Returns the warnings that are listed, and the number of others. Many tests have many doubts of one kind: a few stand for all.
+fn listed_warnings(document: &Document) -> (Vec<&WarningSection>, usize) {
+    let mut listed: Vec<&WarningSection> = Vec::new();
+    let mut hidden = 0;
+    for warning in document.main_warnings() {
+        let alike = listed.iter().filter(|one| one.code == warning.code).count();
+        match is_comparison(document) && alike >= MOST_ALIKE {
+            true => hidden += 1,
+            false => listed.push(warning),
+        }
+    }
+    (listed, hidden)
+}
+
+fn is_comparison(document: &Document) -> bool {
+    document.compare.is_some() || document.series.is_some()
+}
+
 /// Returns what was tested, in pairs of name and value; of a bare recording what the file says.
 fn facts(document: &Document) -> Vec<(&'static str, String)> {
     let described = document.test.as_ref().filter(|test| test.kind.is_some());
-    let mut facts = Vec::new();
+    let mut facts = compared_tests(document);
     match (described, document.recordings.as_deref()) {
         (Some(test), _) => {
             let kind = test.kind.map(|kind| match kind {
@@ -161,6 +208,63 @@ fn facts(document: &Document) -> Vec<(&'static str, String)> {
         _ => {}
     }
     facts
+}
+
+/// Returns which tests were compared, in pairs of name and value.
+fn compared_tests(document: &Document) -> Vec<(&'static str, String)> {
+    if let Some(series) = &document.series {
+        return vec![("Tests", series.tests.len().to_string())];
+    }
+    let Some(section) = &document.compare else {
+        return Vec::new();
+    };
+    // The table has the names of many.
+    let said = |files: &[String]| match files {
+        [only] => only.clone(),
+        several => format!("{} tests", several.len()),
+    };
+    match section.tests.as_slice() {
+        [pair] => vec![("Before", said(&pair.before)), ("After", said(&pair.after))],
+        several => vec![("Pairs", several.len().to_string())],
+    }
+}
+
+/// Returns the sections on a series of tests, and on what changed.
+fn comparison_sections<'a>(document: &Document) -> Vec<Section<'a>> {
+    let mut sections = Vec::new();
+    if document.series.is_some() {
+        sections.push(Section {
+            id: "series",
+            title: "Tests in the order of time",
+            tables: found([tables::control_charts(document)]),
+            folded: found([tables::tests_of_series(document)]),
+            ..Section::default()
+        });
+    }
+    if document.compare.is_some() {
+        let mut story = Vec::new();
+        if let Some(section) = &document.series {
+            story.extend(series::compared(section));
+            story.extend(comparison::answer(document));
+        }
+        sections.push(Section {
+            id: "compare",
+            title: "What changed",
+            story,
+            tables: found([
+                tables::changes(document),
+                tables::changed_modes(document),
+                tables::changed_joint(document),
+                tables::changed_dampings(document),
+            ]),
+            folded: match document.series {
+                Some(_) => Vec::new(),
+                None => found([tables::compared_tests(document)]),
+            },
+            ..Section::default()
+        });
+    }
+    sections
 }
 
 /// Returns the sections on the joint, the gap and the uncertainty, as far as they were asked for.

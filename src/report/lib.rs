@@ -18,6 +18,7 @@ mod text;
 /// The charts of a report, each built once from the results that it shows.
 pub mod charts {
     pub mod comparison;
+    pub mod comparison_spectra;
     pub mod diagnosis;
     pub mod joint;
     pub mod modes;
@@ -35,7 +36,7 @@ pub mod words {
 }
 
 pub use data_files::{
-    render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
+    render_changes_csv, render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
     render_perturbation_csv, render_series_csv, render_taps_csv,
 };
 pub use document::{
@@ -44,8 +45,9 @@ pub use document::{
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
-    MODEL_FILE, earlier_files, render_cloud_picture, render_comparison_picture, render_frf_picture,
-    render_json, render_run, render_schema, render_spectrum_picture,
+    ComparedRecordings, MODEL_FILE, earlier_files, render_cloud_picture, render_compared,
+    render_comparison_picture, render_frf_picture, render_json, render_run, render_schema,
+    render_spectrum_picture,
 };
 pub use text::{
     render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,

@@ -1,5 +1,5 @@
-//! All files of one run: `report.json` with its schema, the page, tables and pictures; and the files that an earlier
-//! run has left.
+//! All files of a report: `report.json` with its schema, the page, tables and pictures; and the files that an earlier
+//! report has left.
 
 use rayon::prelude::*;
 use schemars::generate::SchemaSettings;
@@ -11,14 +11,14 @@ use crate::charts::diagnosis::{gap, place_map};
 use crate::charts::joint::{cloud, frequencies, shapes};
 use crate::charts::modes::{amplitude, stabilisation};
 use crate::charts::spectra::{frf, spectrum, taps};
-use crate::charts::{comparison, series};
+use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::html::{InlineFigure, render_html};
 use crate::picture::{Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
-    ReportError, ReportFile, render_modes_csv, render_parameters_csv, render_perturbation_csv,
-    render_taps_csv,
+    ReportError, ReportFile, render_changes_csv, render_modes_csv, render_parameters_csv,
+    render_perturbation_csv, render_series_csv, render_taps_csv,
 };
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
@@ -32,7 +32,62 @@ pub fn render_run(
     document: &Document,
     recordings: &[RecordingResult],
 ) -> Result<Vec<ReportFile>, ReportError> {
-    let pictures = pictures(document, recordings);
+    let mut files = render_page(document, &pictures(document, recordings))?;
+    files.extend([
+        ReportFile::of("parameters.csv", render_parameters_csv(document)?),
+        ReportFile::of("modes.csv", render_modes_csv(document)?),
+    ]);
+    let mut recordings = document.recordings.iter().flatten();
+    if recordings.any(|recording| !recording.taps.is_empty()) {
+        files.push(ReportFile::of("taps.csv", render_taps_csv(document)?));
+    }
+    if document.perturbation.is_some() {
+        let text = render_perturbation_csv(document)?;
+        files.push(ReportFile::of("perturbation.csv", text));
+    }
+    Ok(files)
+}
+
+/// Recordings of the two tests whose spectra are shown over each other; empty where tests have none.
+#[derive(Debug, Clone, Default)]
+pub struct ComparedRecordings {
+    /// Those of the first test before.
+    pub before: Vec<RecordingResult>,
+    /// Those of the first test after.
+    pub after: Vec<RecordingResult>,
+}
+
+/// All files of a report on a comparison: `report.html`, `report.json`, and the pictures as PNG and as SVG. A comparison has
+/// `changes.csv`, `compare` and, where both tests have spectra of one sensor, `compare-spectra`. A series has `series.csv` and `series`.
+///
+/// # Errors
+/// The first [`ReportError`] of any file.
+pub fn render_compared(
+    document: &Document,
+    recordings: &ComparedRecordings,
+) -> Result<Vec<ReportFile>, ReportError> {
+    let charts = [
+        series::control_charts(document),
+        comparison::changes(document),
+        comparison_spectra::overlay(document, recordings),
+    ];
+    let charts = charts.into_iter().flatten();
+    let pictures: Vec<_> = charts.map(|chart| (chart.kind.to_owned(), chart)).collect();
+    let mut files = render_page(document, &pictures)?;
+    if document.series.is_some() {
+        files.push(ReportFile::of("series.csv", render_series_csv(document)?));
+    }
+    if document.compare.is_some() {
+        files.push(ReportFile::of("changes.csv", render_changes_csv(document)?));
+    }
+    Ok(files)
+}
+
+/// Returns the pictures, the page with them, and `report.json`.
+fn render_page(
+    document: &Document,
+    pictures: &[(String, Chart)],
+) -> Result<Vec<ReportFile>, ReportError> {
     type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
     let (rendered, json) = rayon::join(
         || {
@@ -53,17 +108,7 @@ pub fn render_run(
     files.extend([
         ReportFile::of("report.html", render_html(document, &figures)?),
         ReportFile::of("report.json", json?),
-        ReportFile::of("parameters.csv", render_parameters_csv(document)?),
-        ReportFile::of("modes.csv", render_modes_csv(document)?),
     ]);
-    let mut recordings = document.recordings.iter().flatten();
-    if recordings.any(|recording| !recording.taps.is_empty()) {
-        files.push(ReportFile::of("taps.csv", render_taps_csv(document)?));
-    }
-    if document.perturbation.is_some() {
-        let text = render_perturbation_csv(document)?;
-        files.push(ReportFile::of("perturbation.csv", text));
-    }
     Ok(files)
 }
 
@@ -150,6 +195,8 @@ fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFig
             "frequencies" | "mode-shapes" => "joint",
             "gap" | "gap-place" => "gap",
             "cloud" => "uncertainty",
+            "compare" | "compare-spectra" => "compare",
+            "series" => "series",
             _ => "modes",
         },
         caption: chart.caption.clone(),
@@ -215,10 +262,10 @@ pub fn render_schema() -> String {
 
 /// The model that a diagnosis leads to, beside the report.
 pub const MODEL_FILE: &str = "updated-model.toml";
-/// Files of words, the model apart.
-const WORDS: [&str; 6] = [
-    "report.html",
-    "report.json",
+/// Files of every report.
+const OF_ALL: [&str; 2] = ["report.html", "report.json"];
+/// Tables of a test.
+const TABLES: [&str; 4] = [
     "parameters.csv",
     "modes.csv",
     "taps.csv",
@@ -229,7 +276,17 @@ const OF_TEST: [&str; 5] = ["frequencies", "mode-shapes", "cloud", "gap", "gap-p
 /// Pictures of each recording, followed by its name.
 const OF_RECORDING: [&str; 5] = ["spectrum", "frf", "stabilisation", "amplitude", "taps"];
 
-/// Names of all files that a run may have written beside this `report.json`; empty where the text is none
+/// Files of a comparison of tests and of a series of tests, the page and the document apart.
+const OF_COMPARISON: [&str; 5] = [
+    "changes.csv",
+    "compare.png",
+    "compare.svg",
+    "compare-spectra.png",
+    "compare-spectra.svg",
+];
+const OF_SERIES: [&str; 3] = ["series.csv", "series.png", "series.svg"];
+
+/// Names of all files that `run` or `compare` may have written beside this `report.json`; empty where the text is none
 /// of ours. Pictures of recordings that it does not name are somebody else's.
 pub fn earlier_files(report_json: &str) -> Vec<String> {
     let Ok(report) = serde_json::from_str::<Value>(report_json) else {
@@ -238,6 +295,16 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     let ours = report["version"].is_u64() && report["warnings"].is_array();
     if !ours {
         return Vec::new();
+    }
+    let [has_compared, has_series] = ["compare", "series"].map(|key| report[key].is_object());
+    if has_compared || has_series {
+        let compared = OF_COMPARISON.iter().filter(|_| has_compared);
+        let names = OF_ALL.iter().chain(compared);
+        let of_series = OF_SERIES.iter().filter(|_| has_series);
+        return names
+            .chain(of_series)
+            .map(|name| (*name).to_owned())
+            .collect();
     }
     let recordings = report["recordings"].as_array();
     let files = recordings
@@ -255,9 +322,10 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     // Where the earlier run wrote no model, one of that name is somebody else's.
     let model = report["gap"]["updated_model"]["file"].as_str();
     let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
-    WORDS
-        .map(str::to_owned)
+    OF_ALL
         .into_iter()
+        .chain(TABLES)
+        .map(str::to_owned)
         .chain(model)
         .chain(pictures)
         .collect()

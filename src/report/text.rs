@@ -198,7 +198,7 @@ pub fn render_comparison(document: &Document) -> String {
         _ => "",
     };
     let compared = document.compare.as_ref();
-    let damping = compared.and_then(|found| found.damping.as_ref());
+    let damping = compared.and_then(|compared| compared.found.damping.as_ref());
     let is_damped = damping.is_some_and(|found| found.verdict != DampingVerdict::NoChange);
     let tables = [
         tables::changed_modes(document),

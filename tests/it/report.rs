@@ -1,5 +1,6 @@
 //! Tests of the report: what is drawn, what is written, and that nothing missing breaks it.
 
+mod compared;
 mod fixture;
 mod gap_pictures;
 mod gap_story;

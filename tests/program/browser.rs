@@ -470,6 +470,44 @@ fn titles_say_values(titles: &Value, case: &str) {
     }
 }
 
+/// Writes down which figures are live, and with which view they open.
+const COUNTER: &str = r#"<script>
+setTimeout(function () {
+  var seen = document.createElement("pre"), chosen = Array.from(document.querySelectorAll(".chips .chosen"));
+  seen.id = "seen";
+  seen.textContent = JSON.stringify({
+    live: document.querySelectorAll("figure.live").length,
+    drawn: document.querySelectorAll("figure.live canvas").length,
+    chosen: chosen.map(function (button) { return button.textContent; })
+  });
+  document.body.appendChild(seen);
+}, 3000);
+</script>"#;
+
+#[test]
+fn regress_the_page_of_a_comparison_works_in_a_browser() {
+    let Some(chromium) = chromium() else { return };
+    let folder = samples();
+    let test = "recordings/cantilever/test.toml";
+    tapjoint(
+        folder.path(),
+        &["compare", test, test, "--out", "report"],
+        0,
+    );
+    let page = folder.path().join("report/report.html");
+    let html = std::fs::read_to_string(&page).unwrap();
+    let (head, tail) = html.rsplit_once("</body>").unwrap();
+    std::fs::write(&page, format!("{head}{COUNTER}</body>{tail}")).unwrap();
+    for dark in [false, true] {
+        let (seen, console) = visited(&chromium, &page, 1280, dark);
+        assert_eq!(console, "", "dark {dark}: the console complains");
+        assert_eq!(seen["live"], 2, "{seen}");
+        // Changes and causes, and a close-up of each of the modes.
+        assert!(seen["drawn"].as_u64() >= Some(5), "{seen}");
+        assert_eq!(seen["chosen"], serde_json::json!(["Close-ups"]), "{seen}");
+    }
+}
+
 /// Pages of a PDF, which Chromium lists without compression.
 fn pages(pdf: &[u8]) -> usize {
     let words = String::from_utf8_lossy(pdf);

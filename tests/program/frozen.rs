@@ -283,6 +283,18 @@ fn assert_frozen(name: &str, folder: &Path, test: &str) {
     assert!(differs.is_empty(), "{name}: {differs:?} differ");
 }
 
+/// Returns the names of a report's files, the words of its page, and the changes.
+fn report_text(folder: &Path) -> String {
+    let entries = fs::read_dir(folder).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    let page = visible_text(&read("report.html"));
+    let changes = csv_rounded(&read("changes.csv"));
+    format!("{}\n\n{page}\n{changes}\n", names.join("\n"))
+}
+
 /// A table with numbers of six significant digits.
 fn csv_rounded(table: &str) -> String {
     let cell = |cell: &str| match serde_json::from_str(cell) {
@@ -398,6 +410,14 @@ fn frozen_compare() {
     let agreeing = [&series[..5], &series[7..]].concat();
     text.push_str(&put_out(folder.path(), &agreeing));
     assert_snapshot("compare_series", &text);
+    for (arguments, page) in [
+        (&json[..5], "compare_page"),
+        (&series[..], "compare_series_page"),
+    ] {
+        let text = put_out(folder.path(), &[arguments, &["--out", page, "-q"]].concat());
+        assert_eq!(text, "");
+        assert_snapshot(page, &report_text(&folder.path().join(page)));
+    }
 }
 
 #[test]

@@ -58,6 +58,71 @@ fn regress_a_run_leaves_nothing_of_an_earlier_one() {
 }
 
 #[test]
+fn regress_a_comparison_leaves_nothing_of_an_earlier_report() {
+    let folder = samples();
+    let test = "recordings/cantilever/test.toml";
+    let report = folder.path().join("report");
+    let series = ["compare", "--series", test, test, test];
+    let stated = ["--repeatability", "0.1 %"];
+    let pair = ["compare", test, test];
+    let run = |words: &[&str], out: &str| {
+        tapjoint(
+            folder.path(),
+            &[words, &stated, &["--out", out]].concat(),
+            0,
+        );
+    };
+    tapjoint(folder.path(), &["run", test, "--out", "report"], 0);
+    // Files of those names that somebody else has made.
+    let foreign = ["spectrum-mine.png", "series.txt"];
+    for name in foreign {
+        std::fs::write(report.join(name), "mine").unwrap();
+    }
+    for (words, out) in [(&series[..], "series"), (&pair[..], "pair")] {
+        run(words, "report");
+        run(words, out);
+        let mut expected = names(&folder.path().join(out));
+        assert!(expected.contains("report.html"), "{expected:?}");
+        expected.extend(foreign.map(str::to_owned));
+        // The list that the run has begun, because taps.csv has no mark, goes on.
+        expected.insert("made-by-tapjoint.sha256".to_owned());
+        assert_eq!(names(&report), expected, "{out}");
+    }
+    // A run takes the place of a comparison, too.
+    tapjoint(folder.path(), &["run", test, "--out", "report"], 0);
+    assert!(!names(&report).contains("compare.png"));
+    let listed = names(&folder.path().join("pair"));
+    let ours = r#"{"version": 1, "warnings": [], "compare": {}}"#;
+    let ours: BTreeSet<String> = earlier_files(ours).into_iter().collect();
+    assert_eq!(listed, ours);
+}
+
+#[test]
+fn regress_files_of_other_reports_are_somebody_elses() {
+    let of =
+        |sections: &str| earlier_files(&format!("{{\"version\": 1, \"warnings\": []{sections}}}"));
+    let [run, pair] = [of(""), of(r#", "compare": {}"#)];
+    let series = of(r#", "series": {}"#);
+    for name in ["changes.csv", "compare-spectra.svg"] {
+        assert!(pair.contains(&name.to_owned()), "{name}");
+        assert!(
+            ![&run, &series]
+                .iter()
+                .any(|names| names.contains(&name.to_owned()))
+        );
+    }
+    for name in ["series.csv", "series.png"] {
+        assert!(series.contains(&name.to_owned()), "{name}");
+        assert!(
+            ![&run, &pair]
+                .iter()
+                .any(|names| names.contains(&name.to_owned()))
+        );
+    }
+    assert!(!pair.contains(&"modes.csv".to_owned()));
+}
+
+#[test]
 fn regress_a_folder_without_a_report_is_left_as_it_is() {
     let folder = samples();
     let report = folder.path().join("pictures");

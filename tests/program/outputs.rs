@@ -136,7 +136,7 @@ const TABLE: &[Row] = &[
             "cantilever/high.wav",
         ],
         &["--png"],
-        &[],
+        &[folder("--out", "compare-spectra.svg", None)],
     ),
     row(
         &[
@@ -183,7 +183,7 @@ const TABLE: &[Row] = &[
             "cantilever/high.wav",
         ],
         &["--png", "--csv"],
-        &[],
+        &[folder("--out", "series.csv", None)],
     ),
     row(
         &["blind-check", "--folder", "tests", "--truth", "truths.json"],

@@ -256,7 +256,7 @@ impl Warning {
 
     /// The doubt about a part of the test, in these words: "free length 0.2 m", "free test free.toml".
     #[must_use]
-    pub(super) fn of_part(self, words: &str) -> Self {
+    pub fn of_part(self, words: &str) -> Self {
         Warning {
             sentence: format!("{words}: {}", self.sentence),
             ..self

@@ -215,6 +215,5 @@ fn recover_a_change_of_the_loss_factor() {
             repeats == 1 || found > 0.9,
             "{scatter:?} {repeats}: {found}"
         );
-        println!("{scatter:?} {repeats}: {holds} {quiet} {found}");
     }
 }

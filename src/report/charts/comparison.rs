@@ -16,7 +16,7 @@ const LEAST_SPAN: f64 = 0.1;
 /// Changes of all frequencies with what repeating a test changes, and how probable each cause is; `None` without a
 /// comparison.
 pub fn changes(document: &Document) -> Option<Chart> {
-    let found = document.compare.as_ref()?;
+    let found = &document.compare.as_ref()?.found;
     let first = found
         .hypotheses
         .iter()

@@ -326,7 +326,7 @@ fn unit_of_transform(unit: &Option<String>) -> String {
 }
 
 /// Returns a curve over the spectral lines.
-fn over_lines(lines: &Lines, name: &str, color: Color, values: Vec<f64>) -> Series {
+pub(super) fn over_lines(lines: &Lines, name: &str, color: Color, values: Vec<f64>) -> Series {
     Series::even(name, color, lines.frequency(0), lines.spacing, values)
 }
 
@@ -411,7 +411,7 @@ fn force_panel(spectra: &MeasuredSpectra, unit: &str) -> Option<Panel> {
 }
 
 /// Returns the level of a ratio of amplitudes (dB), at least -120.
-fn decibels(ratio: f64) -> f64 {
+pub(super) fn decibels(ratio: f64) -> f64 {
     20.0 * ratio.max(1e-6).log10()
 }
 

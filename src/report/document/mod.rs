@@ -38,7 +38,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
-use tapjoint_compare::{Comparison, Series, Watched};
+use tapjoint_compare::{Comparison, MOST_REPEATS, Series, Watched};
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::QualityVerdict;
@@ -105,7 +105,7 @@ pub struct Document {
     pub gap: Option<GapSection>,
     /// What changed between two tests, or in a series of tests.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub compare: Option<Comparison>,
+    pub compare: Option<ComparisonSection>,
     /// Control charts of a series of tests.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<SeriesSection>,
@@ -259,6 +259,25 @@ pub fn prediction_of(name: &str, structure: &TestedStructure, modes: &[Predicted
     }
 }
 
+/// What changed between two tests.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ComparisonSection {
+    /// Files of the tests of each pair.
+    pub tests: Vec<PairFiles>,
+    /// The answer.
+    #[serde(flatten)]
+    pub found: Comparison,
+}
+
+/// Files of the tests of one pair.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PairFiles {
+    /// Tests before the change.
+    pub before: Vec<String>,
+    /// Tests after the change.
+    pub after: Vec<String>,
+}
+
 /// Control charts of a series of tests.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SeriesSection {
@@ -269,17 +288,19 @@ pub struct SeriesSection {
     pub series: Series,
 }
 
-/// Returns the document of a comparison. `name` is that of the first test, `warnings` are those of all tests.
+/// Returns the document of a comparison of tests with these files. `name` is that of the first test, `warnings` are those of
+/// all tests.
 pub fn comparison_of(
     name: &str,
     structure: &TestedStructure,
+    tests: Vec<PairFiles>,
     found: Comparison,
     warnings: Vec<Warning>,
 ) -> Document {
     Document {
         version: VERSION,
         test: Some(test_section(name, Some(structure))),
-        compare: Some(found),
+        compare: Some(ComparisonSection { tests, found }),
         warnings: warnings
             .iter()
             .map(|warning| WarningSection::of(warning, false))
@@ -297,10 +318,23 @@ pub fn series_of(
     warnings: Vec<Warning>,
 ) -> Document {
     let warnings = warnings.iter();
+    let departure = found.series.departure().map(|(_, departure)| departure);
+    let compare = found.change.zip(departure).map(|(found, departure)| {
+        let until = tests.iter().take(departure.test + 1).cloned();
+        let first = departure.since.saturating_sub(MOST_REPEATS);
+        let pair = PairFiles {
+            before: until.clone().take(departure.since).skip(first).collect(),
+            after: until.skip(departure.since).collect(),
+        };
+        ComparisonSection {
+            tests: vec![pair],
+            found,
+        }
+    });
     Document {
         version: VERSION,
         test: Some(test_section(name, Some(structure))),
-        compare: found.change,
+        compare,
         series: Some(SeriesSection {
             tests,
             series: found.series,

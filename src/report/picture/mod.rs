@@ -70,6 +70,8 @@ pub enum InPage {
     /// Its panels are shown together.
     #[default]
     Together,
+    /// The same, before all other blocks: the page opens with them.
+    First,
     /// Each of its panels is shown by itself.
     Apart,
     /// None: zooming shows more.

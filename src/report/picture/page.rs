@@ -62,8 +62,10 @@ impl Chart {
             page.blocks = vec![Block::new(1, curves(&panels, most)?)];
             return Some(page);
         }
+        let mut shown: Vec<&Block> = shown.collect();
+        shown.sort_by_key(|block| block.in_page != InPage::First);
         for block in shown {
-            if block.in_page == InPage::Together {
+            if block.in_page != InPage::Apart {
                 page.blocks.push(view(&block.name, &block.panels));
                 continue;
             }
@@ -259,7 +261,11 @@ fn view(name: &str, panels: &[Panel]) -> Block {
             if let Places::Even(_) = one.x {
                 let all = x.into_iter().zip(y);
                 let all = all.filter(|(x, y)| panel.x.holds(*x) && y.is_finite());
-                (x, y) = thinned(all.collect()).into_iter().unzip();
+                let most = match one.mark {
+                    Mark::Curve(_) => MOST_POINTS,
+                    _ => BEHIND,
+                };
+                (x, y) = thinned(all.collect(), most).into_iter().unzip();
             }
             points.series.push(Series {
                 x: Places::Each(x),
@@ -315,12 +321,12 @@ pub fn decimate(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
     reduced
 }
 
-/// At most [`BEHIND`] points: of every few the highest and the lowest, in their order.
-fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= BEHIND {
+/// At most so many points: of every few the highest and the lowest, in their order.
+fn thinned(points: Vec<(f64, f64)>, most: usize) -> Vec<(f64, f64)> {
+    if points.len() <= most {
         return points;
     }
-    let stride = (2 * points.len()).div_ceil(BEHIND);
+    let stride = (2 * points.len()).div_ceil(most);
     let mut kept = Vec::new();
     for some in points.chunks(stride) {
         let low = some.iter().min_by(|a, b| a.1.total_cmp(&b.1));

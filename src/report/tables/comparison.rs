@@ -1,4 +1,4 @@
-//! Tables of a comparison of two tests.
+//! Tables of a comparison of tests.
 
 use super::{Table, number, page_words, words};
 use crate::document::Document;
@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 5;
 
 /// The compared modes; `None` without a comparison.
 pub fn changed_modes(document: &Document) -> Option<Table> {
-    let found = document.compare.as_ref()?;
+    let found = &document.compare.as_ref()?.found;
     let several = found.modes.iter().any(|mode| mode.pair > 0);
     let is_described = found
         .modes
@@ -57,7 +57,7 @@ pub fn changed_modes(document: &Document) -> Option<Table> {
 
 /// The dampings; `None` where the tests have none in common.
 pub fn changed_dampings(document: &Document) -> Option<Table> {
-    let found = document.compare.as_ref()?.damping.as_ref()?;
+    let found = document.compare.as_ref()?.found.damping.as_ref()?;
     let several = found.modes.iter().any(|mode| mode.pair > 0);
     let mut rows = Vec::new();
     for mode in &found.modes {
@@ -83,7 +83,7 @@ fn signed(percent: f64) -> String {
 
 /// The causes, the most probable first; `None` without a comparison.
 pub fn changes(document: &Document) -> Option<Table> {
-    let found = document.compare.as_ref()?;
+    let found = &document.compare.as_ref()?.found;
     let listed = found
         .hypotheses
         .iter()
@@ -100,4 +100,50 @@ pub fn changes(document: &Document) -> Option<Table> {
         ]
     });
     Some(Table::of("What may have changed", rows, ""))
+}
+
+/// The joint before and after, if only the joint changed; `None` without a comparison, and where there is no elastic joint.
+pub fn changed_joint(document: &Document) -> Option<Table> {
+    let joint = document.compare.as_ref()?.found.joint.as_ref()?;
+    let rows = [
+        ("Kt", "N/m", joint.kt.as_ref()),
+        ("Kr", "N\u{a0}m/rad", joint.kr.as_ref()),
+    ];
+    let rows = rows.into_iter().filter_map(|(name, unit, change)| {
+        let change = change?;
+        Some([
+            words("Stiffness", name),
+            words("Unit", unit),
+            number("Before", significant(change.before, 4)),
+            number("Std (%)", significant(change.before_std_percent, 2)),
+            number("After", significant(change.after, 4)),
+            number("Change (%)", signed(change.change_percent)),
+            number("Low (%)", signed(change.low)),
+            number("High (%)", signed(change.high)),
+        ])
+    });
+    let table = Table::of(
+        "The joint, if only the joint changed",
+        rows,
+        "Before: as described, or fitted to the frequencies before, with its standard uncertainty. Low and high: 95 % limits of the \
+         change.",
+    );
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// The compared tests; `None` without a comparison, and for one test before and one after.
+pub fn compared_tests(document: &Document) -> Option<Table> {
+    let pairs = &document.compare.as_ref()?.tests;
+    let mut rows = Vec::new();
+    for (index, pair) in pairs.iter().enumerate() {
+        for repeat in 0..pair.before.len().max(pair.after.len()) {
+            let [before, after] = [&pair.before, &pair.after].map(|files| files.get(repeat));
+            rows.push([
+                number("Pair", (index + 1).to_string()),
+                words("Before", or_missing(before)),
+                words("After", or_missing(after)),
+            ]);
+        }
+    }
+    (rows.len() > 1).then(|| Table::of("Tests", rows, ""))
 }

@@ -7,7 +7,7 @@ mod modes;
 mod recordings;
 mod series;
 
-pub use comparison::{changed_dampings, changed_modes, changes};
+pub use comparison::{changed_dampings, changed_joint, changed_modes, changes, compared_tests};
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;
 pub use joint::{
@@ -22,7 +22,7 @@ pub use recordings::{
     channels, conditions, datasets, hammer, quality, quality_all, quality_count, quality_doubts,
     recordings, rejected_taps, taps, taps_used,
 };
-pub use series::control_charts;
+pub use series::{control_charts, tests_of_series};
 
 use crate::document::{Document, ModeSection, ReadBy};
 use crate::format::MISSING;

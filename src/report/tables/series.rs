@@ -1,4 +1,4 @@
-//! Table of a series of tests.
+//! Tables of a series of tests.
 
 use super::{Table, number, words};
 use crate::document::Document;
@@ -43,4 +43,17 @@ pub fn control_charts(document: &Document) -> Option<Table> {
 
 fn one_based(index: Option<usize>) -> String {
     or_missing(index.map(|index| index + 1))
+}
+
+/// The tests with their numbers; `None` without a series.
+pub fn tests_of_series(document: &Document) -> Option<Table> {
+    let section = document.series.as_ref()?;
+    let rows = section.tests.iter().enumerate();
+    let rows = rows.map(|(index, file)| {
+        [
+            number("Test", (index + 1).to_string()),
+            words("File", file.as_str()),
+        ]
+    });
+    Some(Table::of("Tests", rows, ""))
 }

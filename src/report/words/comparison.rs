@@ -55,9 +55,10 @@ fn in_unit(found: &Interval, factor: f64, unit: &str) -> String {
 
 /// Returns the answer in a few sentences, the shortest first.
 pub fn answer(document: &Document) -> Vec<String> {
-    let Some(found) = &document.compare else {
+    let Some(section) = &document.compare else {
         return Vec::new();
     };
+    let found = &section.found;
     let verdict = &found.verdict;
     let sure = probability(verdict.probability);
     let causes = verdict.effects.iter().zip(&verdict.items);

@@ -2,6 +2,7 @@
 
 use super::diagnosis::{gap_in_short, gap_story, listed, missing, shows_gap};
 use super::sizes::stiffness_with_limits;
+use super::{comparison, series};
 use crate::document::{
     Document, EstimateSection, HeadlineSection, HeadlineValue, PredictionSection, ReadBy,
 };
@@ -184,6 +185,14 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
+    if let Some(section) = &document.series {
+        // More on what changed stands in its section.
+        let change = comparison::answer(document).into_iter().take(1);
+        return series::answer(section).into_iter().chain(change).collect();
+    }
+    if document.compare.is_some() {
+        return comparison::answer(document);
+    }
     let taps = taps(document).map(|taps| capital(&taps) + ".");
     let first = [taps, channels(document), modes(document)];
     // One sentence for each mode that changes with the amplitude.

@@ -3,7 +3,7 @@
 use crate::document::SeriesSection;
 use crate::format::{capital, signed_percent};
 use crate::words::comparison::matched;
-use tapjoint_compare::Charted;
+use tapjoint_compare::{Charted, MOST_REPEATS};
 use tapjoint_numerics::stats::times;
 
 /// Returns what a chart shows, in words.
@@ -14,6 +14,22 @@ pub fn quantity(charted: Charted) -> String {
         Charted::Kt => "Kt".to_owned(),
         Charted::Kr => "Kr".to_owned(),
     }
+}
+
+/// Returns which tests are compared with which; `None` where all tests agree.
+pub fn compared(section: &SeriesSection) -> Option<String> {
+    let (_, departure) = section.series.departure()?;
+    let since = departure.since;
+    // The numbers count from 1.
+    let tests = |first: usize, last: usize| match first == last {
+        true => format!("test {first}"),
+        false => format!("tests {first} to {last}"),
+    };
+    Some(format!(
+        "Before: {}. After: {}.",
+        tests(since.saturating_sub(MOST_REPEATS) + 1, since),
+        tests(since + 1, departure.test + 1)
+    ))
 }
 
 /// Returns the answer in a few sentences, the shortest first.

@@ -65,7 +65,9 @@ impl Files {
         let folders = inputs.iter().filter(|path| path.is_dir());
         let entries = folders.filter_map(|folder| fs::read_dir(folder).ok());
         let tests = entries.flatten().flatten();
-        let tests = tests.map(|entry| entry.path().join("test.toml"));
+        // A pair of tests has two folders of its own.
+        let names = ["test.toml", "before/test.toml", "after/test.toml"];
+        let tests = tests.flat_map(|entry| names.map(|name| entry.path().join(name)));
         let tests: Vec<PathBuf> = tests.filter(|path| path.is_file()).collect();
         for path in tests {
             let test = described(&path);
@@ -243,7 +245,7 @@ const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
     NONE                         0         0         0\n    -1\n";
 
 /// First words of the CSV files that the program writes.
-const CSV_HEADS: [&str; 7] = [
+const CSV_HEADS: [&str; 8] = [
     "parameter,method,unit,value,std,low,high,",
     "mode,label,recording,method,frequency_Hz,std_Hz,",
     "method,kind,percent,mode,statistic,kx,ky,kz\n",
@@ -251,6 +253,7 @@ const CSV_HEADS: [&str; 7] = [
     "recording,response,form,unit,frequency_Hz,h1_real,",
     "quantity,name,method,unit,block,lines,window,reading,",
     "name,planted,detectable,refutable,verdict,named,",
+    "name,changed,item,visible,repeatability,verdict,named,",
 ];
 /// First words of the test descriptions that the program writes.
 const DESCRIPTION_HEADS: [&str; 3] = [

@@ -289,7 +289,7 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Returns true if the program made this file.
 ///
-/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the folder above, names the file, the
+/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the two folders above, names the file, the
 /// checksum decides: a file that has changed since counts as foreign. `simulate` and `blind-check` write such
 /// a list, because their recordings cannot carry a mark. Otherwise the content decides:
 ///
@@ -306,7 +306,8 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 ///
 /// A file of any other format, and a file that cannot be read, counts as foreign.
 pub(super) fn is_made_here(path: &Path) -> bool {
-    let listed = path.ancestors().skip(1).take(2).find_map(|folder| {
+    // A folder of kept pairs has its list two folders above the recordings.
+    let listed = path.ancestors().skip(1).take(3).find_map(|folder| {
         let list = fs::read_to_string(folder.join(CHECKSUMS)).ok()?;
         let name = name_in_list(path.strip_prefix(folder).ok()?);
         let expected = checksums(&list).remove(&name)?;

@@ -44,7 +44,7 @@ pub(super) struct BlindCheckArguments {
     /// Nothing changes in a quarter of the pairs. The others are dealt out evenly: joint, lost mass, added mass, crack, length,
     /// modulus, moved sensor, axial load, two changes, a change outside of the causes. The descriptions are wrong by their
     /// tolerances and by one effect that both tests share. From test to test the natural frequencies scatter, by 0.01 to
-    /// 0.4 %; every other comparison on average is told how much
+    /// 0.4 %; half of the comparisons, at random, are told how much
     #[arg(long, conflicts_with_all = ["one_recording", "drift"])]
     compare: bool,
     /// Number of virtual tests, or of pairs. Of 19 tests, 10 have one effect, 5 none, 2 two effects, and 2 an effect

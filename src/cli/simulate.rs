@@ -88,7 +88,7 @@ pub(super) struct SimulateArguments {
     /// have typical values. Repeat it for more effects
     #[arg(long = "with", value_name = "EFFECT:KEY=VALUE,...", value_parser = effect)]
     effects: Vec<Effect>,
-    /// Make two tests, before and after this change, which no description knows. Such as joint-change:kt=-10%. Effects of
+    /// Make two tests, before and after a change that no description knows, such as joint-change:kt=-10%. Effects of
     /// --with are in both tests. Noise, taps and errors of the sensors are drawn for each test. Repeat it for more changes at
     /// once
     #[arg(long = "change", value_name = "KIND:KEY=VALUE,...", value_parser = change)]

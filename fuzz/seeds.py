@@ -475,6 +475,7 @@ def truths():
         "two": {"name": "a", "effects": ["length", "axial-load"], "params": {"relative": 0.01, "force": 5, "length.relative": 1}},
         "braces": {"name": "b", "effects": ["added-mass", "local-crack"], "params": {"added-mass": {"mass": 1, "position": "x"}}},
         "outside": {"name": "c", "effects": ["sensor-mas", "none", "wind"], "params": {}, "detectable": False},
+        "pair": {"name": "d", "changes": [{"cause": "lost-mass", "item": "L3", "parameters": {"mass": -0.008}}], "visible": True, "repeatability": 0.001},
     }
     for name, entry in entries.items():
         yield name, json.dumps([entry]).encode()

@@ -215,6 +215,13 @@ def bare_cases():
             ],
         ),
         Case(
+            "blind-check --compare",
+            [
+                ["blind-check", "--compare", "--cases", 4, "--seed", 3, "--keep", "kept", "--json", "score.json"],
+                ["blind-check", "--compare", "--folder", "kept", "--truth", "kept/truth.json", "--out", "again", "--json", "-"],
+            ],
+        ),
+        Case(
             "blind-check --one-recording",
             [["blind-check", "--one-recording", "--cases", 4, "--seed", 5, "--out", "one", "--noise", 54, "--drift", 0.02]],
         ),

@@ -17,22 +17,117 @@
 //! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
 //! of threads.
 
-mod draw;
 mod series;
 mod smallest;
 
-use draw::{Cell, Drawn};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tapjoint::compare::{CauseKind, Comparison, VerdictKind, compare};
+use tapjoint::compare::{
+    CauseKind, Comparison, MeasuredMode, Pair, Settings, Test, VerdictKind, compare,
+};
+use tapjoint::study::change_check::{
+    ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square,
+};
 
 const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--list]";
 /// Structures drawn for one pair until one of them can be.
 const ATTEMPTS: u64 = 50;
-/// Chi square of a visible change.
-const VISIBLE: f64 = 14.9;
+
+/// A drawn pair.
+struct Drawn {
+    /// What the program sees.
+    pairs: Vec<Pair>,
+    /// What it is told.
+    settings: Settings,
+    /// Structure and change.
+    structure: ChangedStructure,
+    /// Chi square of the change alone.
+    chi_square: f64,
+    /// True standard deviation of the difference of two tests (1).
+    repeatability: f64,
+}
+
+impl Drawn {
+    /// Draws a pair; `None` where the drawn structure cannot be.
+    fn new(cell: ChangeClass, seed: u64, number: u64, attempt: u64) -> Option<Self> {
+        let mut draw = ChaCha8Rng::seed_from_u64(seed);
+        draw.set_stream(((cell as u64) << 40) + (number << 8) + attempt);
+        let draw = &mut draw;
+        let structure = ChangedStructure::draw(cell, draw)?;
+        let frequencies = structure.frequencies(draw.random_range(4..=8))?;
+        let repeatability = SetUpScatter::draw_repeatability(draw);
+        let knows = draw.random_range(0..4);
+        let repeats = if knows == 2 { 3 } else { 1 };
+        let scatter = SetUpScatter {
+            repeatability,
+            share: 0.5 * draw.random::<f64>(),
+        };
+        let mut tests = |frequencies: &[f64]| -> Vec<Test> {
+            (0..repeats)
+                .map(|_| {
+                    let factors = scatter.factors(frequencies.len(), draw);
+                    let read = frequencies.iter().zip(factors).enumerate();
+                    let modes = read.map(|(index, (frequency, factor))| MeasuredMode {
+                        mode: index + 1,
+                        frequency: frequency * factor,
+                        std: 0.05 * repeatability * frequency,
+                    });
+                    Test {
+                        structure: structure.described.clone(),
+                        items: structure.items.clone(),
+                        knows_joint: [false; 2],
+                        common_std: 0.01,
+                        modes: modes.collect(),
+                        unnumbered: Vec::new(),
+                    }
+                })
+                .collect()
+        };
+        let pair = Pair {
+            before: tests(&frequencies[0]),
+            after: tests(&frequencies[1]),
+        };
+        Some(Self {
+            pairs: vec![pair],
+            settings: Settings {
+                repeatability: (knows < 2).then_some(repeatability),
+            },
+            chi_square: chi_square(&frequencies, repeatability),
+            structure,
+            repeatability,
+        })
+    }
+
+    /// Returns the true causes; empty for nothing, and for one that the program does not know.
+    fn causes(&self) -> Vec<CauseKind> {
+        let changes = self.structure.changes.iter();
+        changes.filter_map(|change| change.kind()).collect()
+    }
+
+    /// Counts whether the intervals of a true single cause hold its sizes: Kt, Kr, mass, position.
+    fn count_intervals(&self, found: &Comparison, mut count: impl FnMut(usize, bool)) {
+        let [change] = &self.structure.changes[..] else {
+            return;
+        };
+        let kind = change.kind();
+        let Some(own) = found.hypotheses.iter().find(|one| Some(one.effect) == kind) else {
+            return;
+        };
+        for (index, name) in ["kt", "kr", "mass", "position"].into_iter().enumerate() {
+            let truth = change.parameters.get(name);
+            // A mass is told only where it is seen at all.
+            let is_told =
+                index < 2 || (kind == Some(CauseKind::AddedMass) && self.chi_square > 30.0);
+            if let (Some(truth), Some(value), true) = (truth, own.parameters.get(name), is_told) {
+                count(index, (value.low..=value.high).contains(truth));
+            }
+        }
+    }
+}
 
 struct Row {
-    cell: Cell,
+    cell: ChangeClass,
     drawn: Drawn,
     found: Comparison,
 }
@@ -70,7 +165,7 @@ impl Row {
     }
 
     fn is_right(&self, kind: CauseKind) -> bool {
-        self.drawn.causes.iter().any(|own| own.is_like(kind))
+        self.drawn.causes().iter().any(|own| own.is_like(kind))
     }
 
     fn first_is_right(&self) -> bool {
@@ -121,9 +216,9 @@ fn main() -> Result<(), String> {
         return Ok(());
     }
     let mut tasks = Vec::new();
-    for cell in Cell::ALL {
+    for cell in ChangeClass::ALL {
         if cells.is_empty() || cells.iter().any(|name| name == cell.name()) {
-            let count = if cell == Cell::Nothing {
+            let count = if cell == ChangeClass::Nothing {
                 4 * pairs
             } else {
                 pairs
@@ -158,7 +253,7 @@ fn print_row(row: &Row) {
         row.cell.name(),
         row.drawn.chi_square,
         100.0 * row.drawn.repeatability,
-        row.drawn.sizes,
+        row.drawn.structure.changes,
         verdict.kind.name(),
         names.join(","),
         verdict.probability,
@@ -172,7 +267,7 @@ fn print_scores(rows: &[Row]) {
         "{:16} {:>20} {:>20} {:>20} {:>20} {:>20} {:>20}",
         "cell", "visible", "first right", "named", "named wrongly", "list holds", "called a change"
     );
-    for cell in Cell::ALL {
+    for cell in ChangeClass::ALL {
         let own: Vec<&Row> = rows.iter().filter(|row| row.cell == cell).collect();
         if own.is_empty() {
             continue;
@@ -208,7 +303,7 @@ fn print_scores(rows: &[Row]) {
     let mut held: [Rate; 4] = Default::default();
     let mut bins = [(0.0, Rate::default()); 5];
     for row in rows {
-        let is_single = row.drawn.causes.len() == 1;
+        let is_single = row.drawn.causes().len() == 1;
         if is_single && row.drawn.chi_square >= VISIBLE {
             first.count(row.first_is_right());
             let kinds = &row.found.verdict.effects;
@@ -219,8 +314,10 @@ fn print_scores(rows: &[Row]) {
         // What is stated of the first cause of all.
         let top = &row.found.hypotheses[0];
         let right = match top.effect {
-            CauseKind::NoChange => row.drawn.causes.is_empty() && row.cell == Cell::Nothing,
-            CauseKind::Unknown => row.cell == Cell::Outside,
+            CauseKind::NoChange => {
+                row.drawn.causes().is_empty() && row.cell == ChangeClass::Nothing
+            }
+            CauseKind::Unknown => row.cell == ChangeClass::Outside,
             kind => row.is_right(kind),
         };
         let together: f64 = row

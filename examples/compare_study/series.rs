@@ -4,13 +4,14 @@
 //! the size of the change. It gives one false alarm in 200 tests, all modes together. Its reference is half of the step (Page
 //! 1954, "Continuous inspection schemes", Biometrika 41), and for a drift the best of several.
 
-use super::draw::{Cell, log_uniform, normal, structure};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StudentT};
 use rayon::prelude::*;
 use tapjoint::compare::{Item, MeasuredMode, Settings, Test, watch};
 use tapjoint::structure::specimen::{Mesh, Specimen};
+use tapjoint::study::blind_check::{log_uniform, normal};
+use tapjoint::study::change_check::{ChangeClass, structure};
 
 /// False alarms per test.
 const FALSE_ALARM: f64 = 1.0 / 200.0;
@@ -101,7 +102,7 @@ struct Tested {
 impl Tested {
     fn new(draw: &mut ChaCha8Rng, modes: usize) -> Self {
         loop {
-            if let Some((described, items)) = structure(draw, Cell::Joint)
+            if let Some((described, items)) = structure(draw, ChangeClass::Joint)
                 && let Some(frequencies) = frequencies_of(&described, modes)
             {
                 return Self {
@@ -227,7 +228,7 @@ pub fn print_series(series: usize, seed: u64) {
                     let noise = Noise {
                         shape,
                         share: 0.6 * draw.random::<f64>(),
-                        repeatability: log_uniform(&mut draw, 1e-4, 4e-3),
+                        repeatability: log_uniform(1e-4, 4e-3, &mut draw),
                     };
                     let tests = (0..LONG).map(|_| {
                         let off = noise.test(&mut draw, modes);

@@ -1,11 +1,11 @@
 //! The smallest change of a joint that is seen, over the repeatability.
 
-use super::draw::{Cell, structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tapjoint::compare::{MeasuredMode, Pair, Settings, StiffnessChange, Test, compare};
 use tapjoint::structure::specimen::{Body, Mesh};
+use tapjoint::study::change_check::{ChangeClass, structure};
 
 const REPEATABILITIES: [f64; 5] = [2e-4, 5e-4, 1e-3, 2e-3, 4e-3];
 const MODES: usize = 5;
@@ -14,7 +14,7 @@ const MODES: usize = 5;
 fn seen(seed: u64, number: u64, repeatability: f64) -> Option<[f64; 2]> {
     let mut draw = ChaCha8Rng::seed_from_u64(seed);
     draw.set_stream((3 << 50) + number);
-    let (described, items) = structure(&mut draw, Cell::Joint)?;
+    let (described, items) = structure(&mut draw, ChangeClass::Joint)?;
     if matches!(described.body, Body::Joined(_)) {
         return None;
     }

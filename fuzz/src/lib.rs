@@ -20,6 +20,7 @@ use tapjoint::report::deck::{
 };
 use tapjoint::report::document_of;
 use tapjoint::study::blind_check::parse_truths;
+use tapjoint::study::change_check::{pair_truths_json, parse_pair_truths};
 
 /// What a target does with bytes.
 type Feed = fn(&[u8]);
@@ -286,9 +287,15 @@ fn check_line(message: &impl ToString) {
     assert!(message.len() < 4000, "{} bytes", message.len());
 }
 
-/// Reads the truths of a blind check.
+/// Reads the truths of a blind check, of tests and of pairs.
 fn truths(bytes: &[u8]) {
-    if let Ok(file) = parse_truths(&String::from_utf8_lossy(bytes)) {
+    let text = String::from_utf8_lossy(bytes);
+    if let Ok(file) = parse_pair_truths(&text) {
+        let written = pair_truths_json(&file.truths).expect("finite numbers");
+        let again = parse_pair_truths(&written).expect("what was read is written alike");
+        assert_eq!(again, file);
+    }
+    if let Ok(file) = parse_truths(&text) {
         assert!(file.truths.len() <= bytes.len());
         assert!(file.doubts.iter().all(|doubt| !doubt.is_empty()));
     }

@@ -1,6 +1,7 @@
 //! `tapjoint blind-check`: the success rate of the diagnosis on tests with an unknown effect.
 
 use super::Outcome;
+use super::change_check;
 use super::input::{TestFile, read_test};
 use super::output::failed;
 use super::overwrite::{CHECKSUMS, Expanded};
@@ -32,13 +33,21 @@ use tapjoint::study::blind_check::{
 ///
 /// The diagnosis does not know the effect of a test. Each test has five recordings: two sensors, three tap positions, one moved sensor, two levels. The
 /// SHA-256 of the true effects is printed before the diagnosis begins. The diagnosis gets recordings and
-/// descriptions only. With --folder, existing tests are diagnosed and scored.
+/// descriptions only. With --folder, existing tests are diagnosed and scored. With --compare, `tapjoint compare` is measured
+/// instead, on pairs of tests whose change is withheld.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  tapjoint blind-check --cases 100 --seed 7\n  tapjoint blind-check --folder tests --truth truth.json"
+    after_help = "Examples:\n  tapjoint blind-check --cases 100 --seed 7\n  tapjoint blind-check --folder tests --truth truth.json\n  tapjoint blind-check --compare --cases 40 --seed 7"
 )]
 pub(super) struct BlindCheckArguments {
-    /// Number of virtual tests. Of 19 tests, 10 have one effect, 5 none, 2 two effects, and 2 an effect
+    /// Compare pairs of tests instead of diagnosing tests. Each pair has one recording before and one after a change.
+    /// Nothing changes in a quarter of the pairs. The others are dealt out evenly: joint, lost mass, added mass, crack, length,
+    /// modulus, moved sensor, axial load, two changes, a change outside of the causes. The descriptions are wrong by their
+    /// tolerances and by one effect that both tests share. From test to test the natural frequencies scatter, by 0.01 to
+    /// 0.4 %; half of the comparisons, at random, are told how much
+    #[arg(long, conflicts_with_all = ["one_recording", "drift"])]
+    compare: bool,
+    /// Number of virtual tests, or of pairs. Of 19 tests, 10 have one effect, 5 none, 2 two effects, and 2 an effect
     /// outside the catalogue
     #[arg(
         long,
@@ -47,7 +56,7 @@ pub(super) struct BlindCheckArguments {
         value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000),
         conflicts_with = "folder"
     )]
-    cases: usize,
+    pub(super) cases: usize,
     /// Use one recording with one sensor and five modes instead of five recordings
     #[arg(long, conflicts_with = "folder")]
     one_recording: bool,
@@ -67,22 +76,25 @@ pub(super) struct BlindCheckArguments {
         conflicts_with = "folder"
     )]
     drift: f64,
-    /// Folder of existing tests, each a folder with test.toml and recordings
+    /// Folder of existing tests, each a folder with test.toml and recordings. With --compare, each is a folder of a pair, with
+    /// before/test.toml and after/test.toml
     #[arg(long, value_name = "DIR", requires = "truth")]
-    folder: Option<PathBuf>,
+    pub(super) folder: Option<PathBuf>,
     /// True effects of the existing tests, as --keep writes them. JSON list of {"name", "effects", "params"},
     /// with "detectable" and "refutable" (true or false) if known. "within_tolerance": true marks a common factor on
     /// all frequencies that the description's tolerances cover, and that is no effect then. Parameters of two effects stand in
-    /// braces: {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
+    /// braces: {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}. With --compare a list of {"name", "changes":
+    /// [{"cause", "item", "parameters"}]}, with "visible" (true or false) if known. "repeatability" (1, such as 0.001) is told
+    /// to the comparison
     #[arg(long, value_name = "FILE", requires = "folder")]
-    truth: Option<PathBuf>,
+    pub(super) truth: Option<PathBuf>,
     /// Keep the drawn tests in this folder, with recordings, descriptions and truth.json. The folder must
     /// be new or hold tests that were kept earlier
     #[arg(long, value_name = "DIR", conflicts_with = "folder")]
-    keep: Option<PathBuf>,
+    pub(super) keep: Option<PathBuf>,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "blind-check")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
 }
 
 /// Names of the results.
@@ -100,7 +112,10 @@ const RESULTS: [&str; 8] = [
 impl BlindCheckArguments {
     /// Returns the results, and every file in an earlier folder of kept tests.
     pub(super) fn expanded(&self) -> Vec<Expanded> {
-        let results = RESULTS.iter().map(|name| self.out.join(name)).collect();
+        let results = RESULTS.iter();
+        // Comparisons have no reliability diagram.
+        let results = results.filter(|name| !(self.compare && name.starts_with("reliability")));
+        let results = results.map(|name| self.out.join(name)).collect();
         let kept = self.keep.iter().flat_map(|folder| files_made_in(folder));
         let kept = kept.chain(self.keep.iter().map(|folder| folder.join("truth.json")));
         let kept = kept.collect::<BTreeSet<_>>().into_iter().collect();
@@ -114,9 +129,7 @@ impl BlindCheckArguments {
                 self.drift
             );
         }
-        if !(self.noise >= 0.0 && self.noise <= 200.0) {
-            bail!("--noise {}: give decibels from 0 to 200", self.noise);
-        }
+        let noise_db = self.noise_db()?;
         // The proportions of 300, 150, 60 and 60.
         let [nulls, outside, pairs] = [5, 2, 2].map(|part| (self.cases * part + 9) / 19);
         Ok(Campaign {
@@ -129,10 +142,21 @@ impl BlindCheckArguments {
             } else {
                 Extent::FiveRecordings
             },
-            noise_db: self.noise,
+            noise_db,
             drift: self.drift,
             seed,
         })
+    }
+
+    /// Returns the noise below the responses (dB).
+    ///
+    /// # Errors
+    /// It is out of range.
+    pub(super) fn noise_db(&self) -> anyhow::Result<f64> {
+        if !(self.noise >= 0.0 && self.noise <= 200.0) {
+            bail!("--noise {}: give decibels from 0 to 200", self.noise);
+        }
+        Ok(self.noise)
     }
 }
 
@@ -141,6 +165,9 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
+    if arguments.compare {
+        return change_check::run(arguments, seed, terminal);
+    }
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
     let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
@@ -236,21 +263,13 @@ fn drawn(
 }
 
 /// Number of tests that are diagnosed again under other names.
-const AGAIN: usize = 3;
+pub(super) const AGAIN: usize = 3;
 
 /// Diagnoses the first tests again under other names: the answers must not change. Returns their number.
 fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
     for (test, (_, answer)) in tests.iter().zip(cases).take(AGAIN) {
         let mut recorded = test.record()?;
-        let mut random = ChaCha8Rng::seed_from_u64(test.seed ^ 0x5eed);
-        let mut numbers: Vec<usize> = (10..10 + recorded.recordings.len()).collect();
-        numbers.shuffle(&mut random);
-        for (recording, number) in recorded.recordings.iter_mut().zip(numbers) {
-            let name = format!("{:08x}{number}.wav", random.next_u32());
-            recorded.description = recorded.description.replace(&recording.file, &name);
-            recording.file = name;
-        }
-        recorded.description = recorded.description.replace(&test.truth.name, "another");
+        rename_recordings(&mut recorded, test.seed, &test.truth.name);
         let (_, again) = diagnose_in_passing(&recorded, &test.truth)?;
         if again != *answer {
             bail!(
@@ -260,6 +279,19 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
         }
     }
     Ok(tests.len().min(AGAIN))
+}
+
+/// Gives a test and its recordings other names; `name` is that of the test.
+pub(super) fn rename_recordings(recorded: &mut RecordedTest, seed: u64, name: &str) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let mut numbers: Vec<usize> = (10..10 + recorded.recordings.len()).collect();
+    numbers.shuffle(&mut random);
+    for (recording, number) in recorded.recordings.iter_mut().zip(numbers) {
+        let name = format!("{:08x}{number}.wav", random.next_u32());
+        recorded.description = recorded.description.replace(&recording.file, &name);
+        recording.file = name;
+    }
+    recorded.description = recorded.description.replace(name, "another");
 }
 
 fn diagnose_in_passing(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
@@ -274,6 +306,17 @@ fn diagnose_recorded(
     folder: &Path,
     shown: &Path,
 ) -> anyhow::Result<Case> {
+    write_test(recorded, folder, shown)?;
+    let test = TestDescription::parse(&recorded.description, "test.toml")?;
+    Ok(case_of(&test, folder, truth))
+}
+
+/// Writes a test into a folder; `shown` is its name in messages.
+pub(super) fn write_test(
+    recorded: &RecordedTest,
+    folder: &Path,
+    shown: &Path,
+) -> anyhow::Result<()> {
     fs::create_dir_all(folder).map_err(|cause| failed(shown, &cause))?;
     write_file(folder, shown, "test.toml", recorded.description.as_bytes())?;
     for recording in &recorded.recordings {
@@ -287,8 +330,7 @@ fn diagnose_recorded(
         )?;
         write_file(folder, shown, &recording.file, &bytes)?;
     }
-    let test = TestDescription::parse(&recorded.description, "test.toml")?;
-    Ok(case_of(&test, folder, truth))
+    Ok(())
 }
 
 /// Writes a file of a test; `shown` is its folder in messages.
@@ -334,7 +376,8 @@ fn elsewhere(
             );
         }
     }
-    for unlisted in unlisted(folder, &truths) {
+    let names: Vec<&str> = truths.iter().map(|truth| truth.name.as_str()).collect();
+    for unlisted in unlisted(folder, &names, "test.toml") {
         terminal.warn(&format!(
             "{}: {name} does not name this test, so it is left out",
             folder.join(unlisted).display()
@@ -380,13 +423,13 @@ fn elsewhere(
     Ok((cases, conduct))
 }
 
-/// Returns the folders with a test that the truths do not name, in order.
-fn unlisted(folder: &Path, truths: &[Truth]) -> Vec<String> {
+/// Returns the folders with a description of this name that the truths do not name, in order.
+pub(super) fn unlisted(folder: &Path, listed: &[&str], description: &str) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries
-        .filter(|entry| entry.path().join("test.toml").is_file())
+        .filter(|entry| entry.path().join(description).is_file())
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| truths.iter().all(|truth| truth.name != *name))
+        .filter(|name| !listed.contains(&name.as_str()))
         .collect();
     names.sort();
     names
@@ -429,7 +472,7 @@ fn check_names_elsewhere(
 ///
 /// `None` if it has no recordings, one lies in another folder, or the description names one in a form that
 /// cannot be exchanged.
-fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
+pub(super) fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     let Ok(text) = fs::read_to_string(folder.join("test.toml")) else {
         return Ok(None);
     };

@@ -5,6 +5,7 @@
 
 mod arguments;
 mod input;
+mod laboratory;
 mod output;
 mod overwrite;
 mod place;
@@ -14,6 +15,7 @@ mod staging;
 mod terminal;
 
 mod blind_check;
+mod change_check;
 mod compare;
 mod diagnose;
 mod export;

@@ -65,7 +65,9 @@ impl Files {
         let folders = inputs.iter().filter(|path| path.is_dir());
         let entries = folders.filter_map(|folder| fs::read_dir(folder).ok());
         let tests = entries.flatten().flatten();
-        let tests = tests.map(|entry| entry.path().join("test.toml"));
+        // A pair of tests has two folders of its own.
+        let names = ["test.toml", "before/test.toml", "after/test.toml"];
+        let tests = tests.flat_map(|entry| names.map(|name| entry.path().join(name)));
         let tests: Vec<PathBuf> = tests.filter(|path| path.is_file()).collect();
         for path in tests {
             let test = described(&path);
@@ -243,7 +245,7 @@ const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
     NONE                         0         0         0\n    -1\n";
 
 /// First words of the CSV files that the program writes.
-const CSV_HEADS: [&str; 8] = [
+const CSV_HEADS: [&str; 9] = [
     "parameter,method,unit,value,std,low,high,",
     "mode,label,recording,method,frequency_Hz,std_Hz,",
     "method,kind,percent,mode,statistic,kx,ky,kz\n",
@@ -252,6 +254,7 @@ const CSV_HEADS: [&str; 8] = [
     "recording,response,form,unit,frequency_Hz,h1_real,",
     "quantity,name,method,unit,block,lines,window,reading,",
     "name,planted,detectable,refutable,verdict,named,",
+    "name,changed,item,visible,repeatability,verdict,named,",
 ];
 /// First words of the test descriptions that the program writes.
 const DESCRIPTION_HEADS: [&str; 3] = [
@@ -287,7 +290,7 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Returns true if the program made this file.
 ///
-/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the folder above, names the file, the
+/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the two folders above, names the file, the
 /// checksum decides: a file that has changed since counts as foreign. `simulate` and `blind-check` write such
 /// a list, because their recordings cannot carry a mark. Otherwise the content decides:
 ///
@@ -304,7 +307,8 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 ///
 /// A file of any other format, and a file that cannot be read, counts as foreign.
 pub(super) fn is_made_here(path: &Path) -> bool {
-    let listed = path.ancestors().skip(1).take(2).find_map(|folder| {
+    // A folder of kept pairs has its list two folders above the recordings.
+    let listed = path.ancestors().skip(1).take(3).find_map(|folder| {
         let list = fs::read_to_string(folder.join(CHECKSUMS)).ok()?;
         let name = name_in_list(path.strip_prefix(folder).ok()?);
         let expected = checksums(&list).remove(&name)?;

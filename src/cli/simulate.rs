@@ -1,14 +1,16 @@
-//! `tapjoint simulate`: the recordings of a virtual test, and the options of the laboratory that records it.
+//! `tapjoint simulate`: the recordings of a virtual test, or of two between which something changed.
 
 use super::Outcome;
-use super::arguments::{StiffnessArguments, words};
+use super::arguments::{StiffnessArguments, repeatability};
 use super::input::{effect_at, read_model};
+use super::laboratory::{LaboratoryArguments, laboratory_lines, within};
 use super::overwrite::{CHECKSUMS, Expanded};
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
-use clap::builder::{RangedU64ValueParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -22,7 +24,7 @@ use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
 use tapjoint::report::wrapped;
 use tapjoint::simulate::{
-    AntiAlias, Damping, Laboratory, MOST_RATE, TestPlan, Tip, Truth, VirtualRecording, VirtualTest,
+    Change, ChangeTruth, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest,
     nominal_description, plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
@@ -31,7 +33,16 @@ const EXAMPLES: &str = "Examples:
   tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g
   tapjoint simulate test.toml --out virtual --with sensor-position:offset=8mm,sensor=2,recording=1
   tapjoint simulate test.toml --out virtual --kx 1400 --ky 4.8 --with joint-nonlinearity:ratio=-0.1,exponent=1 --seed 7
-  tapjoint run virtual/test.toml";
+  tapjoint run virtual/test.toml
+  tapjoint simulate test.toml --out pair --change joint-change:kt=-10%,kr=5% --repeatability 0.1%
+  tapjoint compare pair/before/test.toml pair/after/test.toml";
+
+const CHANGES: &str = "Changes:
+  joint-change:kt=-10%,kr=5%: relative changes of the joint's stiffnesses; its coupling stays
+  lost-mass:item=L3: the mass of a sensor or of a fastened mass with this name is gone; a sensor still gives its signal
+  added-mass, local-crack, length, modulus, sensor-position, axial-load: as the effects above, after the change only
+
+";
 
 /// Returns the effects with their parameters and typical values, and the examples.
 fn list_of_effects() -> String {
@@ -53,6 +64,7 @@ fn list_of_effects() -> String {
     text + "\nSensors and recordings are numbered from 1, as in TEST. For sensor-scale, sensor=0 means all sensors. recording=0 \
             means all recordings. Any other number means all recordings with the same described place. An error of \
             the set-up does not change the places in the new test.toml.\n\n"
+        + CHANGES
         + EXAMPLES
 }
 
@@ -61,7 +73,8 @@ fn list_of_effects() -> String {
 /// They are what a laboratory would record of the described structure. TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. The output
 /// folder gets the recordings, a test.toml and truth.json. The test.toml describes the test as an analyst
 /// knows it: effects of --with are left out, and the joint is to be fitted. A list of checksums lets the
-/// next `tapjoint simulate` replace these files.
+/// next `tapjoint simulate` replace these files. With --change there are two such tests, in the folders before and after,
+/// and truth.json lies beside them.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, after_long_help = list_of_effects())]
 pub(super) struct SimulateArguments {
@@ -75,6 +88,16 @@ pub(super) struct SimulateArguments {
     /// have typical values. Repeat it for more effects
     #[arg(long = "with", value_name = "EFFECT:KEY=VALUE,...", value_parser = effect)]
     effects: Vec<Effect>,
+    /// Make two tests, before and after a change that no description knows, such as joint-change:kt=-10%. Effects of
+    /// --with are in both tests. Noise, taps and errors of the sensors are drawn for each test. Repeat it for more changes at
+    /// once
+    #[arg(long = "change", value_name = "KIND:KEY=VALUE,...", value_parser = change)]
+    changes: Vec<Change>,
+    /// Standard deviation of the difference of a frequency between the two tests, such as "0.1 %"; default: 0. The natural frequency
+    /// of each mode is scattered, by a normal distribution. A quarter of the variance is common to all modes of a
+    /// test
+    #[arg(long, value_name = "R", value_parser = repeatability, requires = "changes")]
+    repeatability: Option<f64>,
     /// Write no truth.json, so that the folder does not reveal the effects
     #[arg(long)]
     no_truth: bool,
@@ -93,6 +116,77 @@ fn effect(text: &str) -> Result<Effect, String> {
         .map(|part| parameter(id, part))
         .collect::<Result<Vec<_>, _>>()?;
     Effect::from_pairs(id, &pairs).map_err(|error| error.to_string())
+}
+
+/// Parses `KIND:key=value,...` of a change.
+fn change(text: &str) -> Result<Change, String> {
+    let (name, parameters) = text.split_once(':').unwrap_or((text, ""));
+    match name.trim() {
+        Change::JOINT => joint_change(parameters),
+        Change::LOST_MASS => match parameters.split_once('=') {
+            Some((key, item)) if key.trim() == "item" && !item.trim().is_empty() => {
+                let item = item.trim().to_owned();
+                Ok(Change::LostMass { item })
+            }
+            _ => Err(
+                "write lost-mass:item=NAME, with the name of a sensor or of a fastened mass"
+                    .to_owned(),
+            ),
+        },
+        name => {
+            let known = Change::EFFECTS.map(EffectId::name);
+            if !known.contains(&name) {
+                return Err(format!(
+                    "`{name}` is no change between two tests; changes are: {}, {}, {}",
+                    Change::JOINT,
+                    Change::LOST_MASS,
+                    known.join(", ")
+                ));
+            }
+            effect(text).map(Change::Effect)
+        }
+    }
+}
+
+/// Range of a relative change of a stiffness (1).
+const JOINT_CHANGE: [f64; 2] = [-0.99, 100.0];
+
+/// Parses the parameters of a change of the joint.
+fn joint_change(parameters: &str) -> Result<Change, String> {
+    let example = "such as joint-change:kt=-10%,kr=5%";
+    let [mut kt, mut kr] = [None; 2];
+    for part in parameters.split(',').filter(|part| !part.trim().is_empty()) {
+        let Some((key, value)) = part.split_once('=') else {
+            return Err(format!(
+                "\"{}\" has no value; write key=value, {example}",
+                part.trim()
+            ));
+        };
+        let size = match key.trim() {
+            "kt" => &mut kt,
+            "kr" => &mut kr,
+            key => {
+                return Err(format!(
+                    "`joint-change` has no parameter `{key}`; it has: kt, kr"
+                ));
+            }
+        };
+        let [lowest, highest] = JOINT_CHANGE;
+        let value = within(Dimension::Ratio, lowest, highest)(value.trim())?;
+        if size.replace(value).is_some() {
+            return Err(format!(
+                "`joint-change` is given `{}` twice; give it once",
+                key.trim()
+            ));
+        }
+    }
+    if kt.is_none() && kr.is_none() {
+        return Err(format!("`joint-change` needs kt, kr or both, {example}"));
+    }
+    Ok(Change::Joint {
+        kt: kt.unwrap_or(0.0),
+        kr: kr.unwrap_or(0.0),
+    })
 }
 
 /// Parses `key=value` of an effect.
@@ -134,6 +228,8 @@ fn parameter(id: EffectId, text: &str) -> Result<(&str, f64), String> {
 const DESCRIPTION: &str = "test.toml";
 /// Name of the file with what was planted.
 const TRUTH: &str = "truth.json";
+/// Folders of the tests before and after a change.
+const SIDES: [&str; 2] = ["before", "after"];
 
 impl SimulateArguments {
     /// Returns the files of the virtual test.
@@ -141,7 +237,14 @@ impl SimulateArguments {
         let recordings = test.into_iter().flat_map(|test| &test.recordings);
         // A recording that is described twice, in two bands perhaps, is one file.
         let mut names: BTreeSet<String> = recordings.map(wav_name).collect();
-        names.extend([DESCRIPTION, CHECKSUMS].map(str::to_owned));
+        names.insert(DESCRIPTION.to_owned());
+        if !self.changes.is_empty() {
+            let sides = SIDES.iter();
+            names = sides
+                .flat_map(|side| names.iter().map(move |name| format!("{side}/{name}")))
+                .collect();
+        }
+        names.insert(CHECKSUMS.to_owned());
         if !self.no_truth {
             names.insert(TRUTH.to_owned());
         }
@@ -169,58 +272,189 @@ pub(super) fn run(
     let plan = TestPlan {
         description: &file.test,
         effects: &effects,
+        changes: &[],
+        repeatability: arguments.repeatability.unwrap_or(0.0),
         laboratory: &laboratory,
         joint: given,
         seed,
     };
-    let test = plan_test(&plan).map_err(|error| anyhow!("{}: {error}", file.name))?;
-    let truth = truth_of(&plan, &test);
-    check_sizes(&test, &laboratory, output.place_of(DESCRIPTION).parent())?;
-    let seconds = test.recordings.iter().map(seconds_of).sum();
-    let done = AtomicUsize::new(0);
-    let clipped = test
-        .recordings
-        .par_iter()
-        .map(|recording| {
-            let path = output.place_of(&recording.file);
-            let progress = Progress {
-                terminal: &terminal,
-                done: &done,
-                of: seconds,
-            };
-            write_recording(recording, &laboratory, &path, &progress)
-                .with_context(|| format!("{}: could not be written", recording.file))
-        })
-        .collect::<anyhow::Result<Vec<u64>>>()?;
-    let believed = nominal_description(&text, &file.test, &test)?;
-    output.add(DESCRIPTION, believed.as_bytes())?;
-    if !arguments.no_truth {
-        let mut text = serde_json::to_string_pretty(&truth)?;
-        text.push('\n');
-        output.add(TRUTH, text.as_bytes())?;
+    let described = Described {
+        text: &text,
+        name: &file.name,
+    };
+    if !arguments.changes.is_empty() {
+        return run_pair(arguments, &plan, &described, output, terminal);
     }
-    for (recording, clipped) in test.recordings.iter().zip(&clipped) {
-        if *clipped > 0 {
-            terminal.warn(&format!(
-                "{}: {clipped} samples lie beyond full scale and are clipped; give a larger `scale`, or a lower --level",
-                recording.file
-            ));
-        }
+    let made = Made::plan("", &plan, &described)?;
+    record(std::slice::from_ref(&made), &laboratory, &output, &terminal)?;
+    if !arguments.no_truth {
+        output.add(TRUTH, &lines_of(&serde_json::to_value(&made.truth)?)?)?;
     }
     let folder = output.publish()?;
-    terminal.say(&summary(&truth, &test, &folder))?;
+    terminal.say(&summary(&made.truth, &made.test, &folder))?;
+    terminal.write_json(&serde_json::json!({ "truth": made.truth }))?;
+    Ok(Outcome::Answered)
+}
+
+/// Makes the tests before and after a change.
+fn run_pair(
+    arguments: &SimulateArguments,
+    plan: &TestPlan<'_>,
+    described: &Described<'_>,
+    output: OutputFolder,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
+    // The seed of one test is not that of another pair.
+    let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+    let before = TestPlan {
+        seed: random.next_u64(),
+        ..plan.clone()
+    };
+    let after = TestPlan {
+        seed: random.next_u64(),
+        changes: &arguments.changes,
+        ..plan.clone()
+    };
+    let made = [
+        Made::plan(SIDES[0], &before, described)?,
+        Made::plan(SIDES[1], &after, described)?,
+    ];
+    for side in SIDES {
+        fs::create_dir_all(output.place_of(side))?;
+    }
+    record(&made, plan.laboratory, &output, &terminal)?;
+    let changes: Vec<ChangeTruth> = arguments.changes.iter().map(Change::truth).collect();
+    let [before, after] = &made;
+    let truth = serde_json::json!({
+        "version": before.truth.version,
+        "name": before.truth.name,
+        "seed": plan.seed,
+        "changes": changes,
+        "repeatability": arguments.repeatability,
+        "before": before.truth,
+        "after": after.truth,
+    });
+    if !arguments.no_truth {
+        output.add(TRUTH, &lines_of(&truth)?)?;
+    }
+    let folder = output.publish()?;
+    let mut text = summary(&before.truth, &before.test, &folder.join(SIDES[0]));
+    let _ = writeln!(
+        text,
+        "\nAfter the change, in {}\n",
+        folder.join(SIDES[1]).display()
+    );
+    text.push_str(&recording_lines(&after.truth, &after.test));
+    for change in changes {
+        let mut values: Vec<String> = change.item.into_iter().collect();
+        let sizes = change.parameters.iter();
+        values.extend(sizes.map(|(name, value)| format!("{name} {value}")));
+        let line = format!("Changed: {} ({})", change.cause, values.join(", "));
+        text.push_str(&with_minus_signs(&wrapped(&line, 2)));
+    }
+    terminal.say(&text)?;
     terminal.write_json(&serde_json::json!({ "truth": truth }))?;
     Ok(Outcome::Answered)
 }
 
+/// A description as it was read.
+struct Described<'a> {
+    text: &'a str,
+    /// Its file.
+    name: &'a str,
+}
+
+/// A test ready to be recorded.
+struct Made {
+    /// Folder in the output folder; empty for the output folder itself.
+    folder: &'static str,
+    test: VirtualTest,
+    truth: Truth,
+    /// The description as an analyst knows it.
+    believed: String,
+}
+
+impl Made {
+    fn plan(
+        folder: &'static str,
+        plan: &TestPlan<'_>,
+        described: &Described<'_>,
+    ) -> anyhow::Result<Self> {
+        let test = plan_test(plan).map_err(|error| anyhow!("{}: {error}", described.name))?;
+        Ok(Self {
+            folder,
+            truth: truth_of(plan, &test),
+            believed: nominal_description(described.text, plan.description, &test)?,
+            test,
+        })
+    }
+
+    /// Returns the name of one of its files in the output folder.
+    fn named(&self, file: &str) -> String {
+        match self.folder {
+            "" => file.to_owned(),
+            folder => format!("{folder}/{file}"),
+        }
+    }
+}
+
+/// Writes recordings and descriptions of these tests.
+fn record(
+    tests: &[Made],
+    laboratory: &Laboratory,
+    output: &OutputFolder,
+    terminal: &Terminal,
+) -> anyhow::Result<()> {
+    let recordings = tests
+        .iter()
+        .flat_map(|made| made.test.recordings.iter().map(move |one| (made, one)));
+    let recordings: Vec<(&Made, &VirtualRecording)> = recordings.collect();
+    let all: Vec<&VirtualRecording> = recordings.iter().map(|(_, one)| *one).collect();
+    check_sizes(&all, laboratory, output.place_of(DESCRIPTION).parent())?;
+    let seconds = all.iter().map(|one| seconds_of(one)).sum();
+    let done = AtomicUsize::new(0);
+    let clipped = recordings
+        .par_iter()
+        .map(|(made, recording)| {
+            let name = made.named(&recording.file);
+            let progress = Progress {
+                terminal,
+                done: &done,
+                of: seconds,
+            };
+            write_recording(recording, laboratory, &output.place_of(&name), &progress)
+                .with_context(|| format!("{name}: could not be written"))
+        })
+        .collect::<anyhow::Result<Vec<u64>>>()?;
+    for made in tests {
+        output.add(&made.named(DESCRIPTION), made.believed.as_bytes())?;
+    }
+    for ((made, recording), clipped) in recordings.iter().zip(&clipped) {
+        if *clipped > 0 {
+            terminal.warn(&format!(
+                "{}: {clipped} samples lie beyond full scale and are clipped; give a larger `scale`, or a lower --level",
+                made.named(&recording.file)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns a value as JSON with a line feed at the end.
+fn lines_of(value: &serde_json::Value) -> anyhow::Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(value)?;
+    text.push(b'\n');
+    Ok(text)
+}
+
 /// Refuses recordings that do not fit into WAV files, or into a folder, before any is made.
 fn check_sizes(
-    test: &VirtualTest,
+    recordings: &[&VirtualRecording],
     laboratory: &Laboratory,
     folder: Option<&Path>,
 ) -> anyhow::Result<()> {
     let mut bytes = 0_u64;
-    for recording in &test.recordings {
+    for recording in recordings {
         let layout = layout_of(recording, laboratory);
         layout.check_size(&recording.file)?;
         bytes = bytes.saturating_add(layout.bytes());
@@ -295,13 +529,9 @@ fn write_recording(
     Ok(stream.finish()?)
 }
 
-/// Describes the virtual test: recordings, joint, planted effects and laboratory.
-fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
-    let mut text = format!(
-        "Virtual test of \"{}\" in {}\n\n",
-        truth.name,
-        folder.display()
-    );
+/// Describes the recordings.
+fn recording_lines(truth: &Truth, test: &VirtualTest) -> String {
+    let mut text = String::new();
     for (recording, made) in truth.recordings.iter().zip(&test.recordings) {
         let modes = recording.modes.iter().take(6);
         let modes: Vec<String> = modes.map(|mode| format!("{:.3}", mode.frequency)).collect();
@@ -323,6 +553,17 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
         );
         text.push_str(&wrapped(&line, 2));
     }
+    text
+}
+
+/// Describes the virtual test: recordings, joint, planted effects and laboratory.
+fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
+    let mut text = format!(
+        "Virtual test of \"{}\" in {}\n\n",
+        truth.name,
+        folder.display()
+    );
+    text.push_str(&recording_lines(truth, test));
     if let Some(joint) = &truth.joint {
         let [kt, kr] = [(joint.kt, "N/m"), (joint.kr, "N m/rad")].map(|(value, unit)| {
             value.map_or_else(|| "rigid".to_owned(), |value| format!("{value:.6e} {unit}"))
@@ -355,315 +596,6 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
         let _ = writeln!(text, "  {name:<18} {value}");
     }
     text
-}
-
-/// Returns the parts of the laboratory with their values, `off` for a part that is left out.
-fn laboratory_lines(laboratory: &Laboratory) -> Vec<(&'static str, String)> {
-    let Laboratory {
-        hammer,
-        sensors,
-        recorder,
-        specimen,
-    } = laboratory;
-    let good_sensors = "times 0.003 m/s2, 2e-6 m/s, 1e-7 m, 0.005 N (rms)";
-    let filter = match recorder.anti_alias {
-        AntiAlias::On => "flat to rate/2.56".to_owned(),
-        AntiAlias::Off => "off".to_owned(),
-    };
-    let hum = format!("of full scale at {} Hz", recorder.mains);
-    let damping = match &specimen.damping {
-        Damping::Modal(ratios) => {
-            let ratios: Vec<String> = ratios
-                .iter()
-                .map(|ratio| format!("{:.3}", 100.0 * ratio))
-                .collect();
-            format!("{} % (the last for all beyond)", ratios.join(", "))
-        }
-        Damping::Rayleigh { mass, stiffness } => {
-            format!("{mass} 1/s of mass, {stiffness} s of stiffness")
-        }
-    };
-    vec![
-        ("hammer", format!("{} N at level 1", hammer.peak_force)),
-        ("scatter of level", percent(hammer.level_scatter)),
-        ("scatter of length", percent(hammer.length_scatter)),
-        ("scatter of place", or_off(1e3 * hammer.place_scatter, "mm")),
-        ("double hits", percent(hammer.double_hits)),
-        ("weak hits", percent(hammer.weak_hits)),
-        ("lead", format!("{} s", hammer.lead)),
-        ("noise", or_off(sensors.noise, good_sensors)),
-        ("sensitivities", percent(sensors.sensitivity_error)),
-        ("AC coupling", or_off(sensors.ac_coupling, "Hz")),
-        ("mounting", or_off(sensors.mounting_resonance, "Hz")),
-        ("anti-alias filter", filter),
-        ("bits", recorder.bits.to_string()),
-        ("mains hum", small_or_off(recorder.hum, &hum)),
-        ("drift", small_or_off(recorder.drift, "of full scale")),
-        ("offset", small_or_off(recorder.offset, "of full scale")),
-        (
-            "clock",
-            match recorder.clock_error {
-                0.0 => "off".to_owned(),
-                error => format!("{error:+e}"),
-            },
-        ),
-        ("damping", damping),
-    ]
-}
-
-fn percent(value: f64) -> String {
-    or_off(100.0 * value, "%")
-}
-
-fn or_off(value: f64, unit: &str) -> String {
-    match value {
-        0.0 => "off".to_owned(),
-        value => format!("{value} {unit}"),
-    }
-}
-
-/// Writes a small value with an exponent.
-fn small_or_off(value: f64, unit: &str) -> String {
-    match value {
-        0.0 => "off".to_owned(),
-        value => format!("{value:e} {unit}"),
-    }
-}
-
-/// Settings of a virtual test. The defaults are those of a good laboratory; the command prints them.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Laboratory")]
-pub(super) struct LaboratoryArguments {
-    /// Leave out all disturbances: noise, scatter, errors, and all filters but the anti-alias filter. The
-    /// other options still apply
-    #[arg(long)]
-    ideal: bool,
-    /// Leave out parts of the laboratory
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,...")]
-    without: Vec<Part>,
-    /// Number of taps in each recording; default: 5
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
-    taps: Option<usize>,
-    /// Length of each recording (s); default: long enough for the taps to ring down
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    seconds: Option<f64>,
-    /// Sample rate (Hz), 100 to 204800; default: the lowest usual rate that covers the band
-    #[arg(long, value_name = "HZ", value_parser = sample_rate)]
-    rate: Option<u32>,
-    /// Bits of a sample, 32 = floating point; default: 24
-    #[arg(long, value_name = "N", value_parser = ["16", "24", "32"])]
-    bits: Option<String>,
-    /// Tip of the hammer; default: the softest that excites the band
-    #[arg(long, value_parser = tip())]
-    tip: Option<Tip>,
-    /// Peak force of a tap (N), multiplied by each recording's `level`; default: 20
-    #[arg(long, value_name = "N", value_parser = within(Dimension::Force, 1e-6, 1e6))]
-    level: Option<f64>,
-    /// Noise of sensors and hammer relative to that of good ones; default: 1
-    #[arg(long, value_name = "X", value_parser = within(Dimension::Ratio, 0.0, 1e9))]
-    noise: Option<f64>,
-    /// Share of the taps that strike twice; default: 0
-    #[arg(long, value_name = "SHARE", value_parser = within(Dimension::Ratio, 0.0, 1.0))]
-    double_hits: Option<f64>,
-    /// Share of the taps that are far too weak; default: 0
-    #[arg(long, value_name = "SHARE", value_parser = within(Dimension::Ratio, 0.0, 1.0))]
-    weak_hits: Option<f64>,
-    /// Quiet time before the first tap (s); default: 0.5
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    lead: Option<f64>,
-    /// Relative error of the recorder's clock, positive = frequencies are read too high; default: 5e-6
-    #[arg(long, value_name = "X", value_parser = within(Dimension::Ratio, -0.5, 0.5), allow_negative_numbers = true)]
-    clock_error: Option<f64>,
-    /// Resonance frequency of a mounted accelerometer (Hz), up to 100000, 0 = none; default: 18000
-    #[arg(long, value_name = "HZ", value_parser = within(Dimension::Frequency, 0.0, 1e5))]
-    mounting: Option<f64>,
-    /// Mains frequency (Hz); default: 50
-    #[arg(long, value_name = "HZ", value_parser = within(Dimension::Frequency, 0.0, 1e5))]
-    mains: Option<f64>,
-    /// Damping ratio of each mode. The last one applies to all higher modes; default:
-    /// 0.4%,0.3%,0.25%,0.2%
-    #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = within(Dimension::Ratio, 0.0, 1.0), conflicts_with = "rayleigh")]
-    damping: Vec<f64>,
-    /// Damping proportional to mass (1/s) and stiffness (s), instead of --damping
-    #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',', value_parser = within(Dimension::Ratio, 0.0, 1e6))]
-    rayleigh: Vec<f64>,
-}
-
-/// Parts of the laboratory that can be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Part {
-    /// Noise of sensors and hammer
-    Noise,
-    /// Mains hum
-    Hum,
-    /// Slow drift of the zero
-    Drift,
-    /// Offset of the zero
-    Offset,
-    /// Anti-alias filter
-    AntiAlias,
-    /// High-pass of AC-coupled inputs
-    AcCoupling,
-    /// Resonance of the mounted accelerometers
-    Mounting,
-    /// Errors of the sensitivities
-    SensitivityError,
-    /// Error of the clock
-    ClockError,
-    /// Scatter of level, length and place of the taps
-    Scatter,
-    /// Rigid-body motion of a free or lap-jointed beam on its suspension
-    Suspension,
-}
-
-fn tip() -> impl TypedValueParser<Value = Tip> {
-    let tips = [
-        ("steel", Tip::Steel),
-        ("nylon", Tip::Nylon),
-        ("rubber", Tip::Rubber),
-    ];
-    words(
-        tips,
-        ["0.3 ms, to 3.3 kHz", "1.4 ms, to 1 kHz", "5 ms, to 290 Hz"],
-    )
-}
-
-impl LaboratoryArguments {
-    /// Returns the laboratory with these options.
-    pub(super) fn resolve(&self) -> anyhow::Result<Laboratory> {
-        let mut laboratory = if self.ideal {
-            Laboratory::ideal()
-        } else {
-            Laboratory::default()
-        };
-        for part in &self.without {
-            part.leave_out(&mut laboratory);
-        }
-        self.set_hammer(&mut laboratory)?;
-        laboratory.recorder.sample_rate = self.rate;
-        if let Some(bits) = &self.bits {
-            laboratory.recorder.bits = bits.parse()?;
-        }
-        set(&mut laboratory.recorder.clock_error, self.clock_error);
-        set(&mut laboratory.recorder.mains, self.mains);
-        set(&mut laboratory.sensors.noise, self.noise);
-        set(&mut laboratory.sensors.mounting_resonance, self.mounting);
-        if !self.damping.is_empty() {
-            laboratory.specimen.damping = Damping::Modal(self.damping.clone());
-        }
-        match self.rayleigh[..] {
-            [] => {}
-            [_, stiffness] if stiffness > 1.0 => bail!(
-                "--rayleigh: the stiffness part is {stiffness:?} s; give 0 to 1 s, such as 0.5,1e-6"
-            ),
-            [mass, stiffness] => {
-                laboratory.specimen.damping = Damping::Rayleigh { mass, stiffness };
-            }
-            _ => bail!(
-                "--rayleigh has {} numbers; give two, MASS (1/s) and STIFFNESS (s), such as 0.5,1e-6",
-                self.rayleigh.len()
-            ),
-        }
-        Ok(laboratory)
-    }
-
-    fn set_hammer(&self, laboratory: &mut Laboratory) -> anyhow::Result<()> {
-        let hammer = &mut laboratory.hammer;
-        set(&mut hammer.taps, self.taps);
-        set(&mut hammer.lead, self.lead);
-        set(&mut hammer.peak_force, self.level);
-        set(&mut hammer.double_hits, self.double_hits);
-        set(&mut hammer.weak_hits, self.weak_hits);
-        hammer.tip = self.tip;
-        if let Some(seconds) = self.seconds {
-            let interval = (seconds - hammer.lead) / hammer.taps as f64;
-            // A tap needs room for its pulse and some of what rings.
-            if interval < 0.05 {
-                bail!(
-                    "--seconds {seconds} leaves {interval:.3} s for each of {} taps after {} s of lead; give at least {:.1} s, or fewer --taps",
-                    hammer.taps,
-                    hammer.lead,
-                    hammer.lead + 0.05 * hammer.taps as f64
-                );
-            }
-            hammer.interval = Some(interval);
-        }
-        Ok(())
-    }
-}
-
-fn set<T>(value: &mut T, given: Option<T>) {
-    if let Some(given) = given {
-        *value = given;
-    }
-}
-
-impl Part {
-    fn leave_out(self, laboratory: &mut Laboratory) {
-        let Laboratory {
-            hammer,
-            sensors,
-            recorder,
-            specimen,
-        } = laboratory;
-        match self {
-            Self::Noise => sensors.noise = 0.0,
-            Self::Hum => recorder.hum = 0.0,
-            Self::Drift => recorder.drift = 0.0,
-            Self::Offset => recorder.offset = 0.0,
-            Self::AntiAlias => recorder.anti_alias = AntiAlias::Off,
-            Self::AcCoupling => sensors.ac_coupling = 0.0,
-            Self::Mounting => sensors.mounting_resonance = 0.0,
-            Self::SensitivityError => sensors.sensitivity_error = 0.0,
-            Self::ClockError => recorder.clock_error = 0.0,
-            Self::Scatter => {
-                hammer.level_scatter = 0.0;
-                hammer.length_scatter = 0.0;
-                hammer.place_scatter = 0.0;
-            }
-            Self::Suspension => specimen.suspension = None,
-        }
-    }
-}
-
-fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
-    parse_quantity(text, dimension).map_err(|error| error.to_string())
-}
-
-/// Returns the parser of a quantity between these limits (SI).
-fn within(
-    dimension: Dimension,
-    lowest: f64,
-    highest: f64,
-) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
-    move |text| {
-        let value = quantity(text, dimension)?;
-        match (lowest..=highest).contains(&value) {
-            true => Ok(value),
-            false => Err(format!("give a number from {lowest} to {highest}")),
-        }
-    }
-}
-
-/// Parses a time of at most a day.
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.trim().trim_end_matches('s').trim().parse::<f64>() {
-        Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),
-        _ => Err(format!(
-            "\"{text}\" is no time; give seconds from 0 to 86400"
-        )),
-    }
-}
-
-fn sample_rate(text: &str) -> Result<u32, String> {
-    let rate = quantity(text, Dimension::Rate)?;
-    if rate.fract() == 0.0 && (100.0..=f64::from(MOST_RATE)).contains(&rate) {
-        Ok(rate as u32)
-    } else {
-        Err(format!(
-            "{rate} Hz is no sample rate of an analyser; give a whole number from 100 to {MOST_RATE}"
-        ))
-    }
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ use crate::{ReportError, ReportFile};
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::Verdict;
 use tapjoint_study::blind_check::{
-    Calibration, Case, CaseKind, Class, Conduct, Planted, Scores, Target, Truth, render_rows, rows,
-    score,
+    Calibration, Case, CaseKind, Class, Conduct, Planted, Row, Scores, Target, Truth, render_rows,
+    rows, score,
 };
 
 /// Width of the square pictures (pixels).
@@ -100,25 +100,7 @@ fn name_of(planted: &Planted) -> &str {
 /// The score: every figure with its interval, its counts, what was aimed at and what an ideal observer reaches; and how
 /// the check was conducted.
 pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
-    let mut figures = serde_json::Map::new();
-    for row in rows(scores, conduct.extent) {
-        let target = match row.target {
-            Target::AtLeast(limit) => json!({"at_least": limit}),
-            Target::AtMost(limit) => json!({"at_most": limit}),
-            Target::None => Value::Null,
-        };
-        let figure = json!({
-            "meaning": row.meaning,
-            "value": row.value.filter(|value| value.is_finite()),
-            "low": row.interval.map(|interval| interval.0),
-            "high": row.interval.map(|interval| interval.1),
-            "hits": row.counts.map(|counts| counts.0),
-            "of": row.counts.map(|counts| counts.1),
-            "target": target,
-            "ideal": row.ideal,
-        });
-        figures.insert(row.key.to_owned(), figure);
-    }
+    let figures = figures_json(&rows(scores, conduct.extent));
     let [nulls, singles, several, outside] = scores.counts;
     let reliability: Vec<Value> = scores
         .calibration
@@ -142,6 +124,30 @@ pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
         });
     }
     score
+}
+
+/// The figures by key, each with its interval, its counts, what was aimed at and what an ideal observer reaches.
+pub(crate) fn figures_json(rows: &[Row]) -> Value {
+    let mut figures = serde_json::Map::new();
+    for row in rows {
+        let target = match row.target {
+            Target::AtLeast(limit) => json!({"at_least": limit}),
+            Target::AtMost(limit) => json!({"at_most": limit}),
+            Target::None => Value::Null,
+        };
+        let figure = json!({
+            "meaning": row.meaning,
+            "value": row.value.filter(|value| value.is_finite()),
+            "low": row.interval.map(|interval| interval.0),
+            "high": row.interval.map(|interval| interval.1),
+            "hits": row.counts.map(|counts| counts.0),
+            "of": row.counts.map(|counts| counts.1),
+            "target": target,
+            "ideal": row.ideal,
+        });
+        figures.insert(row.key.to_owned(), figure);
+    }
+    Value::Object(figures)
 }
 
 /// Every case: what was planted, what was answered.
@@ -234,44 +240,68 @@ pub fn tell_apart(cases: &[Case]) -> String {
     format!("{text}{EXPLAINED}\n{}", render_rows(&figures))
 }
 
-/// The confusion matrix: rows are what was planted, columns the most probable class; each cell holds
-/// the number of cases, and its shade their share of the row.
+/// The confusion matrix of all tests with one right class.
 fn confusion(cases: &[Case]) -> Chart {
     let classes = classes();
-    let mut counts = BTreeMap::new();
-    for (truth, answer) in cases {
-        if let Some((planted, (first, _))) = truth.class().zip(answer.first()) {
-            *counts.entry((planted, first)).or_insert(0) += 1;
+    let index = |class: Class| classes.iter().position(|own| *own == class);
+    let counted = cases
+        .iter()
+        .filter_map(|(truth, answer)| Some((index(truth.class()?)?, index(answer.first()?.0)?)));
+    let names = classes.iter().map(Class::name).collect();
+    Confusion::of(names, counted).chart(
+        "What was planted, and what came first",
+        "rows: planted; columns: the most probable class; tests with two effects are left out",
+        ["planted", "most probable class"],
+    )
+}
+
+/// Counts of what was true and what came first, by indices of classes.
+pub(crate) struct Confusion {
+    classes: Vec<&'static str>,
+    counts: BTreeMap<(usize, usize), usize>,
+}
+
+impl Confusion {
+    /// Counts cases: the index of the true class and of the one that came first.
+    pub(crate) fn of(
+        classes: Vec<&'static str>,
+        cases: impl Iterator<Item = (usize, usize)>,
+    ) -> Self {
+        let mut counts = BTreeMap::new();
+        for case in cases {
+            *counts.entry(case).or_insert(0) += 1;
         }
+        Self { classes, counts }
     }
-    let last = classes.len() as f64 - 0.5;
-    let names = classes.iter().enumerate();
-    let names = names.map(|(at, class)| (at as f64, class.name().to_owned()));
-    let x = Axis::linear(-0.5, last).of("most probable class", "");
-    let x = x.named(names.clone());
-    let y = Axis::linear(-last, 0.5).of("planted", "");
-    let y = y.named(names.map(|(at, name)| (-at, name)));
-    let mut cells = Series::new("", Color::Blue, Mark::Cell);
-    for (row, planted) in classes.iter().enumerate() {
-        let own = counts.iter().filter(|((class, _), _)| class == planted);
-        let total: usize = own.map(|(_, count)| *count).sum();
-        for (column, class) in classes.iter().enumerate() {
-            if let Some(count) = counts.get(&(*planted, *class)) {
-                cells.push(column as f64, -(row as f64));
-                cells.low.push(*count as f64 / total as f64);
-                cells.labels.push(count.to_string());
-            }
+
+    /// The matrix as a picture: rows are what was true, columns what came first; each cell holds the number of cases, and its
+    /// shade their share of the row. `axes` names rows and columns.
+    pub(crate) fn chart(&self, title: &str, subtitle: &str, axes: [&str; 2]) -> Chart {
+        let last = self.classes.len() as f64 - 0.5;
+        let names = self.classes.iter().enumerate();
+        let names = names.map(|(at, name)| (at as f64, (*name).to_owned()));
+        let x = Axis::linear(-0.5, last)
+            .of(axes[1], "")
+            .named(names.clone());
+        let y = Axis::linear(-last, 0.5)
+            .of(axes[0], "")
+            .named(names.map(|(at, name)| (-at, name)));
+        let mut cells = Series::new("", Color::Blue, Mark::Cell);
+        for (&(row, column), count) in &self.counts {
+            let own = self.counts.iter().filter(|((other, _), _)| *other == row);
+            let total: usize = own.map(|(_, count)| *count).sum();
+            cells.push(column as f64, -(row as f64));
+            cells.low.push(*count as f64 / total as f64);
+            cells.labels.push(count.to_string());
         }
-    }
-    let panel = Panel::new(CELL * classes.len() as f64, x, y).with([cells]);
-    Chart {
-        kind: "confusion",
-        title: "What was planted, and what came first".to_owned(),
-        subtitle:
-            "rows: planted; columns: the most probable class; tests with two effects are left out"
-                .to_owned(),
-        blocks: vec![Block::new(1, vec![panel])],
-        ..Chart::default()
+        let panel = Panel::new(CELL * self.classes.len() as f64, x, y).with([cells]);
+        Chart {
+            kind: "confusion",
+            title: title.to_owned(),
+            subtitle: subtitle.to_owned(),
+            blocks: vec![Block::new(1, vec![panel])],
+            ..Chart::default()
+        }
     }
 }
 

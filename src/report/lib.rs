@@ -3,6 +3,7 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
+pub mod change_check;
 mod data_files;
 pub mod deck;
 pub mod document;

@@ -241,6 +241,23 @@ pub enum SimulateError {
         /// Key of the stiffness in the description.
         key: &'static str,
     },
+    /// The loss of a mass that the description does not name.
+    #[error("`lost-mass`: nothing that weighs is named \"{item}\"; the description names: {known}")]
+    NoItem {
+        /// The name given.
+        item: String,
+        /// Sensors and fastened masses with a name and a mass.
+        known: String,
+    },
+    /// A change of a spring that the joint does not have.
+    #[error(
+        "`joint-change`: {key} cannot change, since the joint is rigid there or is none; leave it out, or describe a \
+         finite stiffness"
+    )]
+    NoSpring {
+        /// Key of the stiffness.
+        key: &'static str,
+    },
     /// A set-up that the test cannot have.
     #[error(transparent)]
     SetUp(#[from] SetUpError),

@@ -10,6 +10,7 @@
 //! never a part of the recording.
 
 mod chain;
+mod change;
 mod hammer;
 mod joint_moment;
 mod laboratory;
@@ -20,6 +21,7 @@ mod recording_run;
 mod truth;
 
 pub use chain::Signal;
+pub use change::{Change, ChangeTruth};
 pub use hammer::{HammerSettings, Pulse, PulseShape, Tap, TapKind, TapPlan, Tip};
 pub use joint_moment::{JointMoment, Slider};
 pub use laboratory::{

@@ -100,6 +100,14 @@ impl ObservedStructure {
         })
     }
 
+    /// Multiplies the natural frequencies of the elastic modes, the lowest first, by these factors (1). Shapes stay.
+    pub fn scale_frequencies(&mut self, factors: &[f64]) {
+        let elastic = self.reduced.modes.iter_mut().skip(self.suspended);
+        for (mode, factor) in elastic.zip(factors) {
+            mode.frequency *= factor;
+        }
+    }
+
     /// Positions of its sensors (m).
     pub fn sensors(&self) -> &[f64] {
         &self.sensors

@@ -2,6 +2,10 @@
 //! laboratory and effects.
 
 use super::chain::Signal;
+use super::change::{
+    Change, all_effects, change_joint, check_changes, set_up_factors, without_lost_masses,
+    without_lost_sensors,
+};
 use super::hammer::{TapPlan, Tip};
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
 use super::laboratory::{Damping, Laboratory, SimulateError};
@@ -27,6 +31,10 @@ pub struct TestPlan<'a> {
     pub description: &'a TestDescription,
     /// Effects that the description leaves out.
     pub effects: &'a [Effect],
+    /// Changes since an earlier test of this structure, which the description leaves out, too.
+    pub changes: &'a [Change],
+    /// Standard deviation of the difference of a natural frequency between two tests of one state (1, relative).
+    pub repeatability: f64,
     /// The laboratory that carries the test out.
     pub laboratory: &'a Laboratory,
     /// The joint, where it is not the description's.
@@ -75,6 +83,12 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
+    check_changes(test, plan.changes)?;
+    let effects = all_effects(plan.effects, plan.changes);
+    let plan = &TestPlan {
+        effects: &effects,
+        ..plan.clone()
+    };
     check_effects(plan)?;
     let set_ups = described_set_ups(test)?;
     check_set_up(plan.effects, &set_ups)?;
@@ -116,6 +130,32 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
 }
 
 impl VirtualRecording {
+    /// Puts another structure in the place of the planned one, with its sensors at these positions (m). Taps stay where they
+    /// are marked, in proportion to the length.
+    ///
+    /// # Errors
+    /// As [`ObservedStructure::new`].
+    pub fn replace_structure(
+        &mut self,
+        specimen: Specimen,
+        sensors: &[f64],
+        laboratory: &Laboratory,
+    ) -> Result<(), SimulateError> {
+        let (before, after) = (self.seen.specimen.body.length(), specimen.body.length());
+        let taps = &mut self.plan.taps;
+        taps.position = marked_position(taps.position, before, after);
+        taps.beam_length = after;
+        self.structure = ObservedStructure::new(
+            &specimen,
+            &laboratory.specimen,
+            sensors,
+            self.seen.joint_loss_factor,
+            self.plan.highest_mode(laboratory),
+        )?;
+        self.seen.specimen = specimen;
+        Ok(())
+    }
+
     /// Begins the recording.
     pub fn begin(&self, laboratory: &Laboratory) -> RecordingRun {
         RecordingRun::new(self.structure.clone(), &self.plan, laboratory)
@@ -240,7 +280,9 @@ fn prepare(
         .zip(&set_up.sensors)
         .map(|(sensor, &position)| PointMass { position, ..sensor })
         .collect();
-    let nominal = nominal_specimen(test, described, &places, plan.joint)?;
+    let weighed = without_lost_sensors(test, &places, plan.changes);
+    let masses = without_lost_masses(described, plan.changes);
+    let nominal = nominal_specimen(test, &masses, &weighed, plan.joint)?;
     let level = described.level.unwrap_or(1.0);
     let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
     // Streams of their own, behind those of the recordings' channels.
@@ -251,7 +293,8 @@ fn prepare(
         level: 0.0,
         drift: std::array::from_fn(|_| StandardNormal.sample(&mut random)),
     };
-    let seen = apply(plan.effects, &nominal, &circumstances);
+    let mut seen = apply(plan.effects, &nominal, &circumstances);
+    change_joint(&mut seen.specimen, plan.changes)?;
     let (nominal_length, length) = (nominal.body.length(), seen.specimen.body.length());
     let sample_rate = sample_rate(laboratory, &wanted.name, wanted.highest)?;
     let reach = f64::from(sample_rate) / 2.56;
@@ -281,13 +324,14 @@ fn prepare(
     let positions: Vec<f64> = positions
         .map(|position| marked_position(position, nominal_length, length))
         .collect();
-    let structure = ObservedStructure::new(
+    let mut structure = ObservedStructure::new(
         &seen.specimen,
         &laboratory.specimen,
         &positions,
         seen.joint_loss_factor,
         recording.highest_mode(laboratory),
     )?;
+    structure.scale_frequencies(&set_up_factors(plan.repeatability, plan.seed));
     let block = match described.block.filter(|_| described.band.is_none()) {
         Some(block) => block as f64 / f64::from(sample_rate),
         None => wanted.block_seconds,

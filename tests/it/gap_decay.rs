@@ -37,6 +37,8 @@ fn virtual_test(effects: &[Effect], seed: u64) -> Diagnosis {
         description: &description,
         effects,
         laboratory: &laboratory,
+        changes: &[],
+        repeatability: 0.0,
         joint: None,
         seed,
     };

@@ -5,6 +5,7 @@
 mod amplitude;
 mod blind_check;
 mod blind_check_draw;
+mod change_check;
 mod cli;
 mod cli_frf;
 mod combinations;

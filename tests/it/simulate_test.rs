@@ -31,6 +31,8 @@ fn plan<'a>(
         description,
         effects,
         laboratory,
+        changes: &[],
+        repeatability: 0.0,
         joint: None,
         seed,
     }

@@ -421,6 +421,20 @@ fn frozen_compare() {
 }
 
 #[test]
+fn frozen_change_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = ["blind-check", "--compare", "--cases", "4", "--seed", "2"];
+    // The digest depends on the last digit of every number.
+    let printed = put_out(folder.path(), &check);
+    let lines = printed.lines().filter(|line| !line.contains("SHA-256"));
+    let mut text = lines.fold(String::new(), |text, line| text + line + "\n");
+    let cases = folder.path().join("blind-check/cases.csv");
+    text.push_str("=== cases.csv\n");
+    text.push_str(&std::fs::read_to_string(cases).unwrap());
+    assert_snapshot("change_check", &text);
+}
+
+#[test]
 fn frozen_help() {
     let folder = tempfile::tempdir().unwrap();
     let commands = [

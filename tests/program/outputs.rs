@@ -202,6 +202,34 @@ const TABLE: &[Row] = &[
     ),
     row(
         &[
+            "blind-check",
+            "--compare",
+            "--folder",
+            "pairs",
+            "--truth",
+            "pairs.json",
+        ],
+        &[
+            "pairs.json",
+            "pairs/a/before/test.toml",
+            "pairs/a/before/taps.wav",
+            "pairs/a/after/test.toml",
+            "pairs/a/after/taps.wav",
+        ],
+        &[],
+        &[folder("--out", "truth.json", Some("pairs.json"))],
+    ),
+    row(
+        &["blind-check", "--compare", "--cases", "1"],
+        &[],
+        &[],
+        &[
+            folder("--out", "cases.csv", None),
+            folder("--keep", "truth.json", None),
+        ],
+    ),
+    row(
+        &[
             "resolution",
             "test.toml",
             "--blocks",
@@ -245,6 +273,25 @@ const TABLE: &[Row] = &[
         &["source.toml"],
         &[],
         &[folder("--out", "test.toml", Some("source.toml"))],
+    ),
+    row(
+        &[
+            "simulate",
+            "source.toml",
+            "--kx",
+            "824",
+            "--ky",
+            "15",
+            "--seconds",
+            "3",
+            "--taps",
+            "1",
+            "--change",
+            "joint-change:kr=-5%",
+        ],
+        &["source.toml"],
+        &[],
+        &[folder("--out", "after/test.toml", Some("source.toml"))],
     ),
 ];
 
@@ -290,7 +337,13 @@ fn inputs() -> tempfile::TempDir {
     tapjoint(place, &[&arguments[..], &short].concat(), 0);
     let report = ["identify", "test.toml", "--json", "report.json", "-q"];
     tapjoint(place, &report, 0);
-    for name in ["cantilever", "sub", "tests/a"] {
+    for name in [
+        "cantilever",
+        "sub",
+        "tests/a",
+        "pairs/a/before",
+        "pairs/a/after",
+    ] {
         fs::create_dir_all(place.join(name)).unwrap();
     }
     for name in ["test.toml", "low.wav", "high.wav"] {
@@ -298,12 +351,16 @@ fn inputs() -> tempfile::TempDir {
         copy(&from, &format!("cantilever/{name}"));
     }
     for name in ["test.toml", "taps.wav"] {
-        copy(&place.join(name), &format!("tests/a/{name}"));
+        for test in ["tests/a", "pairs/a/before", "pairs/a/after"] {
+            copy(&place.join(name), &format!("{test}/{name}"));
+        }
     }
     fs::write(place.join("modes.toml"), MODES).unwrap();
     fs::write(place.join("modes.unv"), BY_PYUFF).unwrap();
     let truth = r#"[{"name": "a", "effects": [], "params": {}}]"#;
     fs::write(place.join("truths.json"), truth).unwrap();
+    let truth = r#"[{"name": "a", "changes": []}]"#;
+    fs::write(place.join("pairs.json"), truth).unwrap();
     let rows: Vec<String> = (0..2000)
         .map(|n| format!("{},{},{}\n", 1e-3 * f64::from(n), n % 7, n % 5))
         .collect();
@@ -407,8 +464,8 @@ fn prop_no_folder_is_filled_over_an_input() {
         for kind in ["itself", "soft", "hard"] {
             let filled = place.join("filled");
             let _ = fs::remove_dir_all(&filled);
-            fs::create_dir(&filled).unwrap();
             let target = filled.join(name);
+            fs::create_dir_all(target.parent().unwrap()).unwrap();
             let given = match kind {
                 "itself" => {
                     fs::copy(place.join(input), &target).unwrap();

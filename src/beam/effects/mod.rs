@@ -372,7 +372,7 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
 }
 
 /// Multiplies the joint's stiffnesses, translational and rotational; the base keeps its own.
-fn scale_joint(specimen: &mut Specimen, factors: [f64; 2]) {
+pub fn scale_joint(specimen: &mut Specimen, factors: [f64; 2]) {
     if let Some(joint) = &mut specimen.joint {
         joint.kt *= factors[0];
         joint.kr *= factors[1];

@@ -6,11 +6,12 @@
 //! test engineer meets them, positions off any grid.
 
 use super::case::{CaseKind, Extent, Planted, Truth};
-use super::planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform};
+use super::planted_effects::{
+    Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform, normal,
+};
 use crate::plan::{PlanError, PlanSettings, plan_of};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::effects::{Effect, EffectError, EffectId};
 use tapjoint_beam::joint::StiffnessUnits;
@@ -24,8 +25,8 @@ use tapjoint_diagnosis::{
 use tapjoint_identify::consistent::Parameter;
 use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
 use tapjoint_simulate::{
-    Damping, Laboratory, ObservedStructure, SimulateError, TestPlan, VirtualRecording, add_noise,
-    below, nominal_description, plan_test,
+    Damping, Laboratory, SimulateError, TestPlan, VirtualRecording, add_noise, below,
+    nominal_description, plan_test,
 };
 
 /// A blind check to be drawn.
@@ -141,6 +142,9 @@ pub enum DrawError {
     /// The limits of a drawn test cannot be computed.
     #[error("the limits of a drawn test cannot be computed: {0}")]
     Limits(#[from] GapError),
+    /// No drawn structure has enough modes within reach of the hammer.
+    #[error("no structure could be drawn whose modes the hammer excites")]
+    NoStructure,
     /// The nominal description cannot be written.
     #[error("a drawn description cannot be written: {0}")]
     Nominal(#[from] toml::de::Error),
@@ -260,8 +264,7 @@ fn within_tolerance(effects: &[Effect], description: &TestDescription) -> Option
 
 /// A random factor whose logarithm is normal, with this standard deviation.
 fn log_normal(spread: f64, random: &mut ChaCha8Rng) -> f64 {
-    let draw: f64 = StandardNormal.sample(random);
-    (spread * draw).exp()
+    (spread * normal(random)).exp()
 }
 
 fn sensor_table(name: &str, channel: usize, position: f64) -> String {
@@ -433,6 +436,8 @@ impl DrawnTest {
         let plan = TestPlan {
             description: &self.description,
             effects: &self.effects,
+            changes: &[],
+            repeatability: 0.0,
             laboratory: &self.laboratory,
             joint: None,
             seed: self.seed,
@@ -440,51 +445,63 @@ impl DrawnTest {
         let mut test = plan_test(&plan)?;
         let recordings = test.recordings.iter_mut();
         for recording in recordings.filter(|_| !self.fastened.is_empty()) {
-            // Adds what no effect describes, and looks at the structure again.
-            self.fastened.add_to(&mut recording.seen.specimen);
-            recording.structure = ObservedStructure::new(
-                &recording.seen.specimen,
-                &self.laboratory.specimen,
-                recording.structure.sensors(),
-                recording.seen.joint_loss_factor,
-                recording.plan.highest_mode(&self.laboratory),
-            )?;
+            // Adds what no effect describes.
+            let mut specimen = recording.seen.specimen.clone();
+            self.fastened.add_to(&mut specimen);
+            let sensors = recording.structure.sensors().to_vec();
+            recording.replace_structure(specimen, &sensors, &self.laboratory)?;
         }
         let recordings = test.recordings.iter().enumerate();
         Ok(RecordedTest {
             description: nominal_description(&self.text, &self.description, &test)?,
             recordings: recordings
-                .map(|(n, recording)| self.take(recording, n))
+                .map(|(number, recording)| {
+                    record_channels(
+                        recording,
+                        &self.laboratory,
+                        self.noise_db,
+                        self.seed,
+                        number as u64,
+                    )
+                })
                 .collect(),
         })
     }
+}
 
-    fn take(&self, recording: &VirtualRecording, number: usize) -> Recorded {
-        let mut run = recording.begin(&self.laboratory);
-        let count = recording.plan.channels.len();
-        let mut channels = vec![Vec::with_capacity(recording.plan.frames as usize); count];
-        let mut frame = vec![0.0; count];
-        while run.next_frame(&mut frame) {
-            for (channel, value) in channels.iter_mut().zip(&frame) {
-                channel.push(*value);
-            }
+/// Makes a recording with white noise on every channel: `noise_db` below the root mean square of a response, and further below
+/// the peak of the hammer.
+pub(crate) fn record_channels(
+    recording: &VirtualRecording,
+    laboratory: &Laboratory,
+    noise_db: f64,
+    seed: u64,
+    number: u64,
+) -> Recorded {
+    let mut run = recording.begin(laboratory);
+    let count = recording.plan.channels.len();
+    let mut channels = vec![Vec::with_capacity(recording.plan.frames as usize); count];
+    let mut frame = vec![0.0; count];
+    while run.next_frame(&mut frame) {
+        for (channel, value) in channels.iter_mut().zip(&frame) {
+            channel.push(*value);
         }
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        // Beyond the streams of the recording itself.
-        random.set_stream(1 << 50 | number as u64);
-        for (index, channel) in channels.iter_mut().enumerate() {
-            let rms = if index == 0 {
-                let peak = channel.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
-                below(peak, self.noise_db + FORCE_MARGIN_DB)
-            } else {
-                below(root_mean_square(channel), self.noise_db)
-            };
-            add_noise(channel, rms, &mut random);
-        }
-        Recorded {
-            file: recording.file.clone(),
-            sample_rate: recording.plan.sample_rate,
-            channels,
-        }
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // Beyond the streams of the recording itself.
+    random.set_stream(1 << 50 | number);
+    for (index, channel) in channels.iter_mut().enumerate() {
+        let rms = if index == 0 {
+            let peak = channel.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
+            below(peak, noise_db + FORCE_MARGIN_DB)
+        } else {
+            below(root_mean_square(channel), noise_db)
+        };
+        add_noise(channel, rms, &mut random);
+    }
+    Recorded {
+        file: recording.file.clone(),
+        sample_rate: recording.plan.sample_rate,
+        channels,
     }
 }

@@ -17,8 +17,9 @@ mod table;
 mod truth_file;
 
 pub use case::{Answer, Case, CaseKind, Class, EstimatedParameter, Extent, Planted, Truth};
+pub(crate) use draw::record_channels;
 pub use draw::{Campaign, DrawError, DrawnTest, Recorded, RecordedTest};
-pub use planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect};
+pub use planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform, normal};
 pub use score::{
     Calibration, Conduct, Rate, ReliabilityBin, Scores, always_scale, score, shuffled,
 };

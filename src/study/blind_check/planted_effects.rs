@@ -4,6 +4,7 @@
 use rand::RngExt;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::{DescribedSetUp, Effect, EffectError, EffectId, Group};
 use tapjoint_beam::specimen::{Hinge, PointMass, PointSpring, Specimen};
@@ -71,8 +72,13 @@ pub fn draw_effect(
 }
 
 /// A random size whose logarithm is uniform.
-pub(super) fn log_uniform(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
+pub fn log_uniform(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
     random.random_range(low.ln()..high.ln()).exp()
+}
+
+/// A random number with mean 0 and standard deviation 1.
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
 }
 
 /// Sizes of an error in the position of a sensor (m): from a careless reading of the tape to a number that is mistyped.

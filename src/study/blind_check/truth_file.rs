@@ -29,6 +29,23 @@ pub enum TruthError {
         /// The parser's message, with line and column.
         source: serde_json::Error,
     },
+    /// No JSON list of pairs of tests.
+    #[error(
+        "this is no list of truths ({source}); write a JSON list of \
+         {{\"name\": \"...\", \"changes\": [{{\"cause\": \"...\", \"parameters\": {{...}}}}]}}, one for each pair of tests"
+    )]
+    PairShape {
+        /// The parser's message, with line and column.
+        source: serde_json::Error,
+    },
+    /// A repeatability that no comparison accepts.
+    #[error("the repeatability of \"{name}\" is {value}, but must lie between 1e-6 and 0.1")]
+    Repeatability {
+        /// The pair.
+        name: String,
+        /// The value given (1).
+        value: f64,
+    },
     /// Two entries of one name.
     #[error("the test \"{name}\" occurs twice; give each test one entry")]
     Twice {

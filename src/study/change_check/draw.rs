@@ -1,20 +1,23 @@
-//! Drawn pairs of tests: structure, description, change, scatter.
+//! Draws a structure, its description, and a change that comes between two tests.
+//!
+//! The description is wrong by its tolerances and by one effect that both tests share. Sizes are drawn from small to
+//! large.
 
-use rand::{RngExt, SeedableRng};
+use super::truth::PlantedChange;
+use crate::blind_check::{log_uniform, normal};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, LogNormal, StandardNormal, StudentT};
-use tapjoint::compare::{
-    CauseKind, Comparison, Item, ItemKind, MeasuredMode, Pair, Settings, Test,
-};
-use tapjoint::effects::{Circumstances, Effect, EffectId, apply};
-use tapjoint::structure::specimen::{
+use rand_distr::{Distribution, LogNormal, StudentT};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectId, apply};
+use tapjoint_beam::specimen::{
     BeamSection, Body, Joint, LapLayout, LapOverlap, Mesh, PointMass, PointSpring, Specimen,
 };
-use tapjoint::structure::{Assembly, Beam, BeamTheory};
+use tapjoint_beam::{Assembly, Beam, BeamTheory};
+use tapjoint_compare::{CauseKind, Item, ItemKind};
 
-/// Class of changes.
+/// Class of drawn changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cell {
+pub enum ChangeClass {
     /// Nothing.
     Nothing,
     /// The joint, translation, rotation or both.
@@ -35,11 +38,11 @@ pub enum Cell {
     Axial,
     /// Two of them.
     Two,
-    /// A change that the program does not know.
+    /// A change that the comparison does not know.
     Outside,
 }
 
-impl Cell {
+impl ChangeClass {
     /// All classes.
     pub const ALL: [Self; 11] = [
         Self::Nothing,
@@ -55,24 +58,18 @@ impl Cell {
         Self::Outside,
     ];
 
-    /// Its name.
+    /// Returns its name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Nothing => "nothing",
-            Self::Joint => "joint-change",
-            Self::Lost => "lost-mass",
-            Self::Added => "added-mass",
-            Self::Crack => "local-crack",
-            Self::Length => "length",
-            Self::Modulus => "modulus",
-            Self::Moved => "sensor-position",
-            Self::Axial => "axial-load",
             Self::Two => "two",
             Self::Outside => "outside",
+            _ => self.cause().map_or("", CauseKind::name),
         }
     }
 
-    fn cause(self) -> Option<CauseKind> {
+    /// Returns the cause that the comparison should name; `None` for nothing, for two causes and for one outside.
+    pub fn cause(self) -> Option<CauseKind> {
         Some(match self {
             Self::Joint => CauseKind::JointChange,
             Self::Lost => CauseKind::LostMass,
@@ -87,167 +84,143 @@ impl Cell {
     }
 }
 
-/// A drawn pair.
-pub struct Drawn {
-    /// What the program sees.
-    pub pairs: Vec<Pair>,
-    /// What it is told.
-    pub settings: Settings,
-    /// True causes; empty for nothing, and for one that the program does not know.
-    pub causes: Vec<CauseKind>,
-    /// Their sizes by name.
-    pub sizes: Vec<(&'static str, f64)>,
-    /// Chi square of the change alone.
-    pub chi_square: f64,
-    /// True standard deviation of the difference of two tests (1).
-    pub repeatability: f64,
-}
+/// Chi square of a visible change: one in a hundred false alarms and one in ten misses, for an observer who knows what to
+/// look for.
+pub const VISIBLE: f64 = 14.9;
+/// Kinds of changes outside of the causes, as truth files name them.
+pub const OUTSIDE: [&str; 4] = ["second-support", "mass-patch", "soft-patch", "three-masses"];
 
 /// Elements of the true structure.
 const MESH: Mesh = Mesh { elements: 80 };
 /// Single changes of two at once.
-const SINGLE: [Cell; 5] = [
-    Cell::Joint,
-    Cell::Added,
-    Cell::Crack,
-    Cell::Modulus,
-    Cell::Axial,
+const SINGLE: [ChangeClass; 5] = [
+    ChangeClass::Joint,
+    ChangeClass::Added,
+    ChangeClass::Crack,
+    ChangeClass::Modulus,
+    ChangeClass::Axial,
 ];
-
-pub fn log_uniform(draw: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
-    low * (high / low).powf(draw.random::<f64>())
-}
-
-pub fn normal(draw: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(draw)
-}
+/// Limits of the drawn repeatability (1).
+const REPEATABILITY: [f64; 2] = [1e-4, 4e-3];
 
 fn sign(draw: &mut ChaCha8Rng) -> f64 {
     if draw.random::<bool>() { 1.0 } else { -1.0 }
 }
 
-impl Drawn {
-    /// Draws a pair; `None` where the drawn structure cannot be.
-    pub fn new(cell: Cell, seed: u64, number: u64, attempt: u64) -> Option<Self> {
-        let mut draw = ChaCha8Rng::seed_from_u64(seed);
-        draw.set_stream(((cell as u64) << 40) + (number << 8) + attempt);
-        let draw = &mut draw;
-        let (described, items) = structure(draw, cell)?;
-        let truth = actual(draw, &described);
-        let mut causes = Vec::new();
-        let mut sizes = Vec::new();
-        let mut after = truth.clone();
-        let mut changes = vec![cell];
-        if cell == Cell::Two {
+/// A structure before and after a change, and what the descriptions of both tests say of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangedStructure {
+    /// The structure as both descriptions have it, all items on it.
+    pub described: Specimen,
+    /// The items, sensors first, in the order of the masses of all three structures.
+    pub items: Vec<Item>,
+    /// The structure as it was.
+    pub before: Specimen,
+    /// The structure as it is after the change.
+    pub after: Specimen,
+    /// What changed; empty for nothing.
+    pub changes: Vec<PlantedChange>,
+}
+
+impl ChangedStructure {
+    /// Draws a structure with a change; `None` where the drawn one cannot be.
+    pub fn draw(class: ChangeClass, draw: &mut ChaCha8Rng) -> Option<Self> {
+        let (described, items) = structure(draw, class)?;
+        let before = actual(draw, &described);
+        let mut after = before.clone();
+        let mut classes = vec![class];
+        if class == ChangeClass::Two {
             let first = draw.random_range(0..SINGLE.len());
             let second = (first + draw.random_range(1..SINGLE.len())) % SINGLE.len();
-            changes = vec![SINGLE[first], SINGLE[second]];
+            classes = vec![SINGLE[first], SINGLE[second]];
         }
-        for change in changes {
-            after = changed(draw, &after, &items, change, &mut sizes)?;
-            causes.extend(change.cause());
+        let mut changes = Vec::new();
+        for class in classes {
+            let mut planted = PlantedChange::of(class.cause());
+            after = changed(draw, &after, &items, class, &mut planted)?;
+            if class != ChangeClass::Nothing {
+                changes.push(planted);
+            }
         }
-        let count = draw.random_range(4..=8);
+        Some(Self {
+            described,
+            items,
+            before,
+            after,
+            changes,
+        })
+    }
+
+    /// Returns the lowest natural frequencies (Hz) before and after; `None` where the structure cannot be.
+    pub fn frequencies(&self, count: usize) -> Option<[Vec<f64>; 2]> {
         let modes = |specimen: &Specimen| -> Option<Vec<f64>> {
             let solved = specimen.modes(count, MESH).ok()?;
             Some(solved.frequencies().to_vec())
         };
-        let (before, after) = (modes(&truth)?, modes(&after)?);
-        let repeatability = log_uniform(draw, 1e-4, 4e-3);
-        let squares = before.iter().zip(&after);
-        let chi_square = squares
-            .map(|(a, b)| ((b / a).ln() / repeatability).powi(2))
-            .sum::<f64>();
-        let knows = draw.random_range(0..4);
-        let repeats = if knows == 2 { 3 } else { 1 };
-        let share = 0.5 * draw.random::<f64>();
-        let mut tests = |frequencies: &[f64]| -> Vec<Test> {
-            (0..repeats)
-                .map(|_| {
-                    let common = share.sqrt() * normal(draw);
-                    let mut modes = Vec::new();
-                    for (index, frequency) in frequencies.iter().enumerate() {
-                        let tail: f64 = StudentT::new(4.0).map_or(0.0, |t| t.sample(draw));
-                        // Student's with four degrees of freedom has the variance 2.
-                        let own = (1.0 - share).sqrt() * tail / 2.0_f64.sqrt();
-                        let off = repeatability / 2.0_f64.sqrt() * (common + own);
-                        modes.push(MeasuredMode::of_frequency(
-                            index + 1,
-                            frequency * off.exp(),
-                            0.05 * repeatability * frequency,
-                        ));
-                    }
-                    Test {
-                        structure: described.clone(),
-                        items: items.clone(),
-                        knows_joint: [false; 2],
-                        common_std: 0.01,
-                        modes,
-                        unnumbered: Vec::new(),
-                    }
-                })
-                .collect()
-        };
-        let pair = Pair {
-            before: tests(&before),
-            after: tests(&after),
-        };
-        Some(Self {
-            pairs: vec![pair],
-            settings: Settings {
-                repeatability: (knows < 2).then_some(repeatability),
-            },
-            causes,
-            sizes,
-            chi_square,
-            repeatability,
-        })
+        Some([modes(&self.before)?, modes(&self.after)?])
+    }
+}
+
+/// Returns chi square of a change alone, by frequencies before and after (Hz).
+pub fn chi_square([before, after]: &[Vec<f64>; 2], repeatability: f64) -> f64 {
+    let squares = before.iter().zip(after);
+    squares
+        .map(|(a, b)| ((b / a).ln() / repeatability).powi(2))
+        .sum()
+}
+
+/// Scatter of frequencies between set-ups, with long tails (Student's with four degrees of freedom).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetUpScatter {
+    /// Standard deviation of the difference of two tests of one state (1, relative).
+    pub repeatability: f64,
+    /// Share of the variance that all modes of a test have in common (1).
+    pub share: f64,
+}
+
+impl SetUpScatter {
+    /// Draws a repeatability (1).
+    pub fn draw_repeatability(draw: &mut ChaCha8Rng) -> f64 {
+        log_uniform(REPEATABILITY[0], REPEATABILITY[1], draw)
     }
 
-    /// Counts whether the intervals of a true single cause hold its sizes: Kt, Kr, mass, position.
-    pub fn count_intervals(&self, found: &Comparison, mut count: impl FnMut(usize, bool)) {
-        let [kind] = self.causes[..] else {
-            return;
-        };
-        let Some(own) = found.hypotheses.iter().find(|one| one.effect == kind) else {
-            return;
-        };
-        for (index, name) in ["kt", "kr", "mass", "position"].into_iter().enumerate() {
-            let truth = self.sizes.iter().find(|one| one.0 == name);
-            // A mass is told only where it is seen at all.
-            let is_told = index < 2 || (kind == CauseKind::AddedMass && self.chi_square > 30.0);
-            if let (Some((_, truth)), Some(value), true) =
-                (truth, own.parameters.get(name), is_told)
-            {
-                count(index, (value.low..=value.high).contains(truth));
-            }
+    /// Draws the factor on each frequency in one test.
+    pub fn factors(&self, modes: usize, draw: &mut ChaCha8Rng) -> Vec<f64> {
+        let common = self.share.sqrt() * normal(draw);
+        let mut factors = Vec::with_capacity(modes);
+        for _ in 0..modes {
+            let tail: f64 = StudentT::new(4.0).map_or(0.0, |t| t.sample(draw));
+            // Student's with four degrees of freedom has the variance 2.
+            let own = (1.0 - self.share).sqrt() * tail / 2.0_f64.sqrt();
+            factors.push((self.repeatability / 2.0_f64.sqrt() * (common + own)).exp());
         }
+        factors
     }
 }
 
 /// Draws a described structure and its items.
-pub fn structure(draw: &mut ChaCha8Rng, cell: Cell) -> Option<(Specimen, Vec<Item>)> {
+pub fn structure(draw: &mut ChaCha8Rng, class: ChangeClass) -> Option<(Specimen, Vec<Item>)> {
     let kind = match draw.random_range(0..10) {
         0..6 => Assembly::Cantilever,
         6..8 => Assembly::Lap,
-        _ if matches!(cell, Cell::Joint | Cell::Two) => Assembly::Cantilever,
+        _ if matches!(class, ChangeClass::Joint | ChangeClass::Two) => Assembly::Cantilever,
         _ => Assembly::Free,
     };
-    let length = log_uniform(draw, 0.2, 0.8);
+    let length = log_uniform(0.2, 0.8, draw);
     let materials = [(205e9, 7850.0), (70e9, 2700.0), (110e9, 8500.0)];
     let (modulus, density) = materials[draw.random_range(0..3)];
     let beam = Beam {
         length,
-        width: length * log_uniform(draw, 0.04, 0.12),
-        thickness: length * log_uniform(draw, 0.008, 0.03),
+        width: length * log_uniform(0.04, 0.12, draw),
+        thickness: length * log_uniform(0.008, 0.03, draw),
         modulus,
         density,
         poisson: 0.3,
     };
     let stiffness = beam.bending_stiffness();
     let joint = Joint {
-        kt: log_uniform(draw, 50.0, 2e4) * stiffness / length.powi(3),
-        kr: log_uniform(draw, 1.0, 80.0) * stiffness / length,
+        kt: log_uniform(50.0, 2e4, draw) * stiffness / length.powi(3),
+        kr: log_uniform(1.0, 80.0, draw) * stiffness / length,
         coupling: 0.0,
     };
     let theory = if draw.random::<bool>() {
@@ -266,16 +239,16 @@ pub fn structure(draw: &mut ChaCha8Rng, cell: Cell) -> Option<(Specimen, Vec<Ite
     let mut specimen = Specimen::jointed(theory, &beam, kind, &lap, joint);
     let mut items = Vec::new();
     for number in 0..draw.random_range(1..=3) {
-        let mass = beam.mass() * log_uniform(draw, 0.005, 0.05);
+        let mass = beam.mass() * log_uniform(0.005, 0.05, draw);
         items.push(Item {
             name: format!("S{number}"),
             point: PointMass::new(length * (0.15 + 0.8 * draw.random::<f64>()), mass),
             kind: ItemKind::Sensor,
         });
     }
-    let masses = if cell == Cell::Lost { 1 } else { 0 };
+    let masses = if class == ChangeClass::Lost { 1 } else { 0 };
     for number in 0..draw.random_range(masses..=4) {
-        let mass = beam.mass() * log_uniform(draw, 0.005, 0.06);
+        let mass = beam.mass() * log_uniform(0.005, 0.06, draw);
         items.push(Item {
             name: format!("M{number}"),
             point: PointMass::new(length * (0.1 + 0.9 * draw.random::<f64>()), mass),
@@ -317,10 +290,10 @@ fn actual(draw: &mut ChaCha8Rng, described: &Specimen) -> Specimen {
             let place = length * draw.random::<f64>();
             truth.masses.push(PointMass::new(
                 place,
-                beam_mass * log_uniform(draw, 0.005, 0.05),
+                beam_mass * log_uniform(0.005, 0.05, draw),
             ));
         }
-        2 => truth.joint_mass.mass += beam_mass * log_uniform(draw, 0.01, 0.1),
+        2 => truth.joint_mass.mass += beam_mass * log_uniform(0.01, 0.1, draw),
         3 => {
             let euler = truth.body.beams()[0].bending_stiffness() * 9.87 / (length * length);
             truth.axial_force += 0.03 * euler * normal(draw);
@@ -330,42 +303,43 @@ fn actual(draw: &mut ChaCha8Rng, described: &Specimen) -> Specimen {
     truth
 }
 
-/// Draws a change, and adds its sizes.
+/// Draws a change with its sizes and its item.
 fn changed(
     draw: &mut ChaCha8Rng,
     before: &Specimen,
     items: &[Item],
-    cell: Cell,
-    sizes: &mut Vec<(&'static str, f64)>,
+    class: ChangeClass,
+    planted: &mut PlantedChange,
 ) -> Option<Specimen> {
     let mut after = before.clone();
     let length = before.body.length();
     let beam_mass: f64 = before.body.beams().iter().map(Beam::mass).sum();
     let place = length * (0.05 + 0.9 * draw.random::<f64>());
-    let effect = match cell {
-        Cell::Nothing => return Some(after),
-        Cell::Joint => {
+    let effect = match class {
+        ChangeClass::Nothing => return Some(after),
+        ChangeClass::Joint => {
             let joint = after.joint.as_mut()?;
             let which = draw.random_range(0..3);
             let [mut kt, mut kr] = [0.0; 2];
             if which != 1 {
-                kt = sign(draw) * log_uniform(draw, 0.01, 0.3);
+                kt = sign(draw) * log_uniform(0.01, 0.3, draw);
             }
             if which != 0 {
-                kr = sign(draw) * log_uniform(draw, 0.01, 0.3);
+                kr = sign(draw) * log_uniform(0.01, 0.3, draw);
             }
             joint.kt *= 1.0 + kt;
             joint.kr *= 1.0 + kr;
-            sizes.extend([("kt", kt), ("kr", kr)]);
+            planted.set(&[("kt", kt), ("kr", kr)]);
             return Some(after);
         }
-        Cell::Lost => {
+        ChangeClass::Lost => {
             let index = draw.random_range(0..items.len());
-            sizes.push(("mass", -after.masses[index].mass));
+            planted.item = Some(items[index].name.clone());
+            planted.set(&[("mass", -after.masses[index].mass)]);
             after.masses[index].mass = 0.0;
             return Some(after);
         }
-        Cell::Moved => {
+        ChangeClass::Moved => {
             let index = draw.random_range(
                 0..items
                     .iter()
@@ -373,57 +347,55 @@ fn changed(
                     .count(),
             );
             let moved =
-                after.masses[index].position + sign(draw) * length * log_uniform(draw, 0.005, 0.1);
+                after.masses[index].position + sign(draw) * length * log_uniform(0.005, 0.1, draw);
             if !(0.0..=length).contains(&moved) {
                 return None;
             }
-            sizes.push(("sensor_shift", moved - after.masses[index].position));
+            planted.item = Some(items[index].name.clone());
+            planted.set(&[("sensor_shift", moved - after.masses[index].position)]);
             after.masses[index].position = moved;
             return Some(after);
         }
-        Cell::Added => {
-            let mass = beam_mass * log_uniform(draw, 0.001, 0.1);
-            sizes.extend([("mass", mass), ("position", place)]);
+        ChangeClass::Added => {
+            let mass = beam_mass * log_uniform(0.001, 0.1, draw);
             (
                 EffectId::AddedMass,
                 vec![("mass", mass), ("position", place)],
             )
         }
-        Cell::Crack => {
-            let compliance = log_uniform(draw, 0.001, 0.1);
-            sizes.extend([("compliance", compliance), ("position", place)]);
+        ChangeClass::Crack => {
+            let compliance = log_uniform(0.001, 0.1, draw);
             (
                 EffectId::LocalCrack,
                 vec![("compliance", compliance), ("position", place)],
             )
         }
-        Cell::Length => {
-            let size = sign(draw) * log_uniform(draw, 0.0005, 0.01);
-            sizes.push(("relative", size));
+        ChangeClass::Length => {
+            let size = sign(draw) * log_uniform(0.0005, 0.01, draw);
             (EffectId::Length, vec![("relative", size)])
         }
-        Cell::Modulus => {
-            let size = sign(draw) * log_uniform(draw, 0.0005, 0.02);
-            sizes.push(("relative", size));
+        ChangeClass::Modulus => {
+            let size = sign(draw) * log_uniform(0.0005, 0.02, draw);
             (EffectId::Modulus, vec![("relative", size)])
         }
-        Cell::Axial => {
+        ChangeClass::Axial => {
             // Nothing else holds the load.
             if before.joint.is_none() || matches!(before.body, Body::Joined(_)) {
                 return None;
             }
             let euler = before.body.beams()[0].bending_stiffness() * 9.87 / (length * length);
-            let size = sign(draw) * euler * log_uniform(draw, 0.002, 0.05);
-            sizes.push(("force", size));
+            let size = sign(draw) * euler * log_uniform(0.002, 0.05, draw);
             (EffectId::AxialLoad, vec![("force", size)])
         }
-        Cell::Outside => {
-            match draw.random_range(0..4) {
+        ChangeClass::Outside => {
+            let kind = draw.random_range(0..OUTSIDE.len());
+            planted.cause = OUTSIDE[kind].to_owned();
+            match kind {
                 0 => {
                     let unit = before.body.beams()[0].bending_stiffness() / length.powi(3);
                     after.springs.push(PointSpring {
                         position: place,
-                        stiffness: unit * log_uniform(draw, 0.1, 10.0),
+                        stiffness: unit * log_uniform(0.1, 10.0, draw),
                     });
                 }
                 1 => {
@@ -433,7 +405,7 @@ fn changed(
                         start,
                         end: start + width,
                         stiffness: 1.0,
-                        mass: 1.0 + log_uniform(draw, 0.01, 0.2),
+                        mass: 1.0 + log_uniform(0.01, 0.2, draw),
                     });
                 }
                 2 => {
@@ -442,22 +414,24 @@ fn changed(
                     after.sections.push(BeamSection {
                         start,
                         end: start + width,
-                        stiffness: 1.0 - log_uniform(draw, 0.01, 0.2),
+                        stiffness: 1.0 - log_uniform(0.01, 0.2, draw),
                         mass: 1.0,
                     });
                 }
                 _ => {
                     for _ in 0..3 {
                         let place = length * (0.1 + 0.9 * draw.random::<f64>());
-                        let mass = beam_mass * log_uniform(draw, 0.002, 0.03);
+                        let mass = beam_mass * log_uniform(0.002, 0.03, draw);
                         after.masses.push(PointMass::new(place, mass));
                     }
                 }
             }
             return Some(after);
         }
-        Cell::Two => return None,
+        ChangeClass::Two => return None,
     };
-    let effect = Effect::from_pairs(effect.0, &effect.1).ok()?;
+    let (id, sizes) = effect;
+    planted.set(&sizes);
+    let effect = Effect::from_pairs(id, &sizes).ok()?;
     Some(apply(&[effect], before, &Circumstances::default()).specimen)
 }

@@ -1,0 +1,196 @@
+//! What changes between two virtual tests of one structure, and how far the set-up scatters from test to test.
+
+use super::laboratory::SimulateError;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use tapjoint_beam::effects::{Effect, EffectId, scale_joint};
+use tapjoint_beam::specimen::{PointMass, Specimen};
+use tapjoint_description::{RecordingDescription, TestDescription};
+
+/// A change that a description does not know.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// The joint's stiffnesses change; its coupling stays.
+    Joint {
+        /// Relative change of the translational stiffness (1).
+        kt: f64,
+        /// Relative change of the rotational stiffness (1).
+        kr: f64,
+    },
+    /// The mass of a described item is gone. A sensor still gives its signal.
+    LostMass {
+        /// Name of the sensor or of the fastened mass.
+        item: String,
+    },
+    /// An effect of the catalogue.
+    Effect(Effect),
+}
+
+/// A change as `truth.json` has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChangeTruth {
+    /// Name of the cause.
+    pub cause: String,
+    /// Name of the item that it is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub item: Option<String>,
+    /// Sizes and places by name (SI, or relative to 1).
+    pub parameters: BTreeMap<String, f64>,
+}
+
+impl Change {
+    /// Effects of the catalogue that may come between two tests.
+    pub const EFFECTS: [EffectId; 6] = [
+        EffectId::AddedMass,
+        EffectId::LocalCrack,
+        EffectId::Length,
+        EffectId::Modulus,
+        EffectId::SensorPosition,
+        EffectId::AxialLoad,
+    ];
+    /// Name of a change of the joint.
+    pub const JOINT: &'static str = "joint-change";
+    /// Name of a loss.
+    pub const LOST_MASS: &'static str = "lost-mass";
+
+    /// Returns it as a truth file has it.
+    pub fn truth(&self) -> ChangeTruth {
+        let (cause, item, parameters) = match self {
+            Self::Joint { kt, kr } => (Self::JOINT, None, vec![("kt", *kt), ("kr", *kr)]),
+            Self::LostMass { item } => (Self::LOST_MASS, Some(item.clone()), Vec::new()),
+            Self::Effect(effect) => {
+                let values = effect.values().map(|(info, value)| (info.name, value));
+                (effect.id.name(), None, values.collect())
+            }
+        };
+        let parameters = parameters.into_iter();
+        ChangeTruth {
+            cause: cause.to_owned(),
+            item,
+            parameters: parameters
+                .map(|(name, value)| (name.to_owned(), value))
+                .collect(),
+        }
+    }
+}
+
+/// Returns the effects of a test with those of its changes.
+pub(super) fn all_effects(effects: &[Effect], changes: &[Change]) -> Vec<Effect> {
+    let mut all = effects.to_vec();
+    for change in changes {
+        if let Change::Effect(effect) = change {
+            all.push(effect.clone());
+        }
+    }
+    all
+}
+
+/// Refuses changes that would change nothing.
+pub(super) fn check_changes(
+    test: &TestDescription,
+    changes: &[Change],
+) -> Result<(), SimulateError> {
+    for change in changes {
+        let Change::LostMass { item } = change else {
+            continue;
+        };
+        let sensors = test.sensors.iter();
+        let weighed = sensors.filter(|sensor| sensor.mass.is_some_and(|mass| mass > 0.0));
+        let mut known: Vec<&str> = weighed.map(|sensor| sensor.name.as_str()).collect();
+        for recording in &test.recordings {
+            known.extend(recording.mass_names.iter().flatten().map(String::as_str));
+        }
+        known.sort_unstable();
+        known.dedup();
+        if !known.contains(&item.as_str()) {
+            let known = match known.is_empty() {
+                true => "nothing with a name and a mass".to_owned(),
+                false => known.join(", "),
+            };
+            let item = item.clone();
+            return Err(SimulateError::NoItem { item, known });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the recording without the fastened masses that are lost.
+pub(super) fn without_lost_masses(
+    recording: &RecordingDescription,
+    changes: &[Change],
+) -> RecordingDescription {
+    let mut left = recording.clone();
+    let names = recording.mass_names.iter().zip(&recording.masses);
+    let kept = names.filter(|(name, _)| !is_lost(name.as_deref(), changes));
+    (left.mass_names, left.masses) = kept.map(|(name, mass)| (name.clone(), *mass)).unzip();
+    left
+}
+
+/// Returns the sensors, of which those that are lost weigh nothing.
+pub(super) fn without_lost_sensors(
+    test: &TestDescription,
+    places: &[PointMass],
+    changes: &[Change],
+) -> Vec<PointMass> {
+    let mut left = places.to_vec();
+    for (place, sensor) in left.iter_mut().zip(&test.sensors) {
+        if is_lost(Some(&sensor.name), changes) {
+            place.mass = 0.0;
+        }
+    }
+    left
+}
+
+fn is_lost(name: Option<&str>, changes: &[Change]) -> bool {
+    let mut changes = changes.iter();
+    changes.any(|change| matches!(change, Change::LostMass { item } if Some(item.as_str()) == name))
+}
+
+/// Changes the joint of a specimen.
+///
+/// # Errors
+/// [`SimulateError::NoSpring`] where a spring that shall change is rigid or is not there.
+pub(super) fn change_joint(
+    specimen: &mut Specimen,
+    changes: &[Change],
+) -> Result<(), SimulateError> {
+    for change in changes {
+        let Change::Joint { kt, kr } = *change else {
+            continue;
+        };
+        let stiffnesses = specimen.joint_stiffnesses();
+        for (key, size, stiffness) in [("kt", kt, stiffnesses[0]), ("kr", kr, stiffnesses[1])] {
+            if size != 0.0 && !(stiffness > 0.0 && stiffness.is_finite()) {
+                return Err(SimulateError::NoSpring { key });
+            }
+        }
+        scale_joint(specimen, [1.0 + kt, 1.0 + kr]);
+    }
+    Ok(())
+}
+
+/// Share of the scatter's variance that all modes of a test have in common: temperature and the like.
+const COMMON_SHARE: f64 = 0.25;
+/// Modes whose scatter is drawn, more than any test has.
+const MOST_MODES: usize = 100;
+
+/// Returns the factor on the natural frequency of each mode in this test: normally distributed logarithms whose difference
+/// between two tests has the standard deviation `repeatability` (1).
+pub(super) fn set_up_factors(repeatability: f64, seed: u64) -> Vec<f64> {
+    if repeatability == 0.0 {
+        return Vec::new();
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // A stream of its own, behind those of the visits.
+    random.set_stream(1 << 41);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let std = repeatability / 2.0_f64.sqrt();
+    let common = COMMON_SHARE.sqrt() * normal();
+    let own = (1.0 - COMMON_SHARE).sqrt();
+    (0..MOST_MODES)
+        .map(|_| (std * (common + own * normal())).exp())
+        .collect()
+}

@@ -8,11 +8,14 @@
 //! "Visible" are the pairs in which the change alone has a chi square of 14.9 or more: one in a hundred false alarms and one
 //! in ten misses, for an observer who knows what to look for. A first cause is right where its group is.
 //!
-//! `cargo run --release --example compare_study -- [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--list]`
+//! `cargo run --release --example compare_study -- [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--ideal] [--list]`
 //!
 //! `--series N`: series of tests in the order of time instead, N for each delay and ten times as many in which nothing changes.
 //!
 //! `--smallest N`: the smallest change of the joint that is seen, on at most 2 N cantilevers.
+//!
+//! `--ideal`: the program is told the true structure before the change, with its joint. What it misses then, these frequencies do
+//! not tell.
 //!
 //! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
 //! of threads.
@@ -30,9 +33,17 @@ use tapjoint::study::change_check::{
     ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square,
 };
 
-const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--list]";
+const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--ideal] [--list]";
 /// Structures drawn for one pair until one of them can be.
 const ATTEMPTS: u64 = 50;
+
+/// What is drawn, and what the program is told of it.
+#[derive(Clone, Copy)]
+struct Study {
+    seed: u64,
+    /// True where the program is told the true structure before the change.
+    is_ideal: bool,
+}
 
 /// A drawn pair.
 struct Drawn {
@@ -50,7 +61,8 @@ struct Drawn {
 
 impl Drawn {
     /// Draws a pair; `None` where the drawn structure cannot be.
-    fn new(cell: ChangeClass, seed: u64, number: u64, attempt: u64) -> Option<Self> {
+    fn new(cell: ChangeClass, study: Study, number: u64, attempt: u64) -> Option<Self> {
+        let Study { seed, is_ideal } = study;
         let mut draw = ChaCha8Rng::seed_from_u64(seed);
         draw.set_stream(((cell as u64) << 40) + (number << 8) + attempt);
         let draw = &mut draw;
@@ -63,20 +75,27 @@ impl Drawn {
             repeatability,
             share: 0.5 * draw.random::<f64>(),
         };
+        let described = match is_ideal {
+            true => &structure.before,
+            false => &structure.described,
+        };
+        let mut items = structure.items.clone();
+        for (item, mass) in items.iter_mut().zip(&described.masses) {
+            item.point = *mass;
+        }
         let mut tests = |frequencies: &[f64]| -> Vec<Test> {
             (0..repeats)
                 .map(|_| {
                     let factors = scatter.factors(frequencies.len(), draw);
                     let read = frequencies.iter().zip(factors).enumerate();
-                    let modes = read.map(|(index, (frequency, factor))| MeasuredMode {
-                        mode: index + 1,
-                        frequency: frequency * factor,
-                        std: 0.05 * repeatability * frequency,
+                    let modes = read.map(|(index, (frequency, factor))| {
+                        let std = 0.05 * repeatability * frequency;
+                        MeasuredMode::of_frequency(index + 1, frequency * factor, std)
                     });
                     Test {
-                        structure: structure.described.clone(),
-                        items: structure.items.clone(),
-                        knows_joint: [false; 2],
+                        structure: described.clone(),
+                        items: items.clone(),
+                        knows_joint: [is_ideal; 2],
                         common_std: 0.01,
                         modes: modes.collect(),
                         unnumbered: Vec::new(),
@@ -189,30 +208,32 @@ impl Row {
 }
 
 fn main() -> Result<(), String> {
-    let (mut pairs, mut seed, mut cells, mut list) = (20_usize, 1_u64, Vec::new(), false);
+    let (mut pairs, mut cells, mut list) = (20_usize, Vec::new(), false);
+    let mut study = Study {
+        seed: 1,
+        is_ideal: false,
+    };
     let (mut series, mut smallest) = (None, None);
     let mut given = std::env::args().skip(1);
     while let Some(name) = given.next() {
-        if name == "--list" {
-            list = true;
-            continue;
-        }
-        let value = given.next().ok_or(USAGE)?;
+        let mut value = || given.next().ok_or(USAGE);
         match name.as_str() {
-            "--pairs" => pairs = value.parse().map_err(|_| USAGE)?,
-            "--series" => series = Some(value.parse().map_err(|_| USAGE)?),
-            "--smallest" => smallest = Some(value.parse().map_err(|_| USAGE)?),
-            "--seed" => seed = value.parse().map_err(|_| USAGE)?,
-            "--cell" => cells.push(value),
+            "--list" => list = true,
+            "--ideal" => study.is_ideal = true,
+            "--pairs" => pairs = value()?.parse().map_err(|_| USAGE)?,
+            "--series" => series = Some(value()?.parse().map_err(|_| USAGE)?),
+            "--smallest" => smallest = Some(value()?.parse().map_err(|_| USAGE)?),
+            "--seed" => study.seed = value()?.parse().map_err(|_| USAGE)?,
+            "--cell" => cells.push(value()?),
             _ => return Err(USAGE.to_owned()),
         }
     }
     if let Some(series) = series {
-        series::print_series(series, seed);
+        series::print_series(series, study.seed);
         return Ok(());
     }
     if let Some(structures) = smallest {
-        smallest::print_smallest(structures, seed);
+        smallest::print_smallest(structures, study.seed);
         return Ok(());
     }
     let mut tasks = Vec::new();
@@ -230,7 +251,7 @@ fn main() -> Result<(), String> {
         .par_iter()
         .filter_map(|&(cell, number)| {
             let drawn =
-                (0..ATTEMPTS).find_map(|attempt| Drawn::new(cell, seed, number, attempt))?;
+                (0..ATTEMPTS).find_map(|attempt| Drawn::new(cell, study, number, attempt))?;
             let found = compare(&drawn.pairs, &drawn.settings).ok()?;
             Some(Row { cell, drawn, found })
         })

@@ -58,6 +58,10 @@
 //! - **Smyth 2004**: "Linear models and empirical Bayes methods for assessing differential expression in
 //!   microarray experiments", Statistical Applications in Genetics and Molecular Biology 3, 3. Variances from
 //!   few repeats, drawn towards their common value.
+//! - **Hawkins, Qiu & Kang 2003**: "The changepoint model for statistical process control", Journal of Quality
+//!   Technology 35, 355-366. A change of the mean at an unknown test, before which nothing is declared healthy.
+//! - **Wallace 1959**: "Bounds on normal approximations to Student's and the chi-square distributions", Annals of
+//!   Mathematical Statistics 30, 1121-1130. The normal deviate as improbable as a t.
 //! - **Kass & Raftery 1995**: "Bayes factors", Journal of the American Statistical Association 90, 773-795.
 //! - **Sellke, Bayarri & Berger 2001**: "Calibration of p values for testing precise null hypotheses", The
 //!   American Statistician 55, 62-71. The highest odds against a hypothesis that a misfit gives.

@@ -24,12 +24,12 @@ const SEED: u64 = 0x5e41e5;
 
 /// Sums over the tests so far.
 #[derive(Debug, Clone)]
-pub(crate) struct Moments {
+pub(crate) struct RunningSums {
     /// Sum of the first n values, and of their squares, from n = 0.
     sums: Vec<[f64; 2]>,
 }
 
-impl Default for Moments {
+impl Default for RunningSums {
     fn default() -> Self {
         Self {
             sums: vec![[0.0; 2]],
@@ -37,7 +37,7 @@ impl Default for Moments {
     }
 }
 
-impl Moments {
+impl RunningSums {
     /// Adds the value of the next test.
     pub(crate) fn add(&mut self, value: f64) {
         let [sum, squares] = self.sums[self.sums.len() - 1];
@@ -47,7 +47,7 @@ impl Moments {
 
 /// The last tests that differ most from those before.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Unlike {
+pub(crate) struct LastDifference {
     /// Difference of the means as a normal variable with standard deviation 1.
     pub(crate) score: f64,
     /// Number of last tests.
@@ -110,11 +110,11 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(moments: &Moments, last: usize) -> Self {
-        let count = moments.sums.len() - 1;
-        let [total, squares] = moments.sums[count];
+    fn new(sums: &RunningSums, last: usize) -> Self {
+        let count = sums.sums.len() - 1;
+        let [total, squares] = sums.sums[count];
         let first = count - last;
-        let [sum, _] = moments.sums[first];
+        let [sum, _] = sums.sums[first];
         let before = sum / first as f64;
         let after = (total - sum) / last as f64;
         Self {
@@ -135,16 +135,16 @@ pub(crate) struct Step {
 }
 
 /// Returns the most probable step: that with the least sum of squares about the means before and after.
-pub(crate) fn most_probable_step(moments: &Moments, scatter: TestScatter) -> Step {
-    let count = moments.sums.len() - 1;
+pub(crate) fn most_probable_step(sums: &RunningSums, scatter: TestScatter) -> Step {
+    let count = sums.sums.len() - 1;
     let (mut last, mut least) = (1, f64::INFINITY);
     for own in 1..count {
-        let squares = Parts::new(moments, own).squares;
+        let squares = Parts::new(sums, own).squares;
         if squares < least {
             (last, least) = (own, squares);
         }
     }
-    let parts = Parts::new(moments, last);
+    let parts = Parts::new(sums, last);
     Step {
         last,
         difference: parts.difference,
@@ -153,14 +153,17 @@ pub(crate) fn most_probable_step(moments: &Moments, scatter: TestScatter) -> Ste
 }
 
 /// Returns the last tests that differ most from those before; `None` where too few tests are known.
-pub(crate) fn most_unlike(moments: &Moments, scatter: TestScatter) -> Option<Unlike> {
-    let count = moments.sums.len() - 1;
-    let mut best: Option<Unlike> = None;
+pub(crate) fn largest_difference(
+    sums: &RunningSums,
+    scatter: TestScatter,
+) -> Option<LastDifference> {
+    let count = sums.sums.len() - 1;
+    let mut best: Option<LastDifference> = None;
     if !is_known(scatter, count) {
         return None;
     }
     for last in WINDOWS.into_iter().filter(|last| *last < count) {
-        let parts = Parts::new(moments, last);
+        let parts = Parts::new(sums, last);
         let scale = Scale::new(scatter, count - last, last, parts.squares);
         let ratio = parts.difference / scale.unit;
         // A score is smaller than its t: this saves most logarithms.
@@ -169,7 +172,7 @@ pub(crate) fn most_unlike(moments: &Moments, scatter: TestScatter) -> Option<Unl
         }
         let score = normal_score(ratio, scale.freedom);
         if best.is_none_or(|best| score.abs() > best.score.abs()) {
-            best = Some(Unlike {
+            best = Some(LastDifference {
                 score,
                 last,
                 std: scale.std,
@@ -181,15 +184,15 @@ pub(crate) fn most_unlike(moments: &Moments, scatter: TestScatter) -> Option<Unl
 
 /// Returns the ends between which a single next test has a score within a limit; `None` where too few tests are known.
 pub(crate) fn single_limits(
-    moments: &Moments,
+    sums: &RunningSums,
     scatter: TestScatter,
     limit: f64,
 ) -> Option<[f64; 2]> {
-    let first = moments.sums.len() - 1;
+    let first = sums.sums.len() - 1;
     if first == 0 || !is_known(scatter, first + 1) {
         return None;
     }
-    let [sum, squares] = moments.sums[first];
+    let [sum, squares] = sums.sums[first];
     let before = sum / first as f64;
     let scale = Scale::new(scatter, first, 1, squares - first as f64 * before * before);
     let freedom = scale.freedom;
@@ -213,11 +216,11 @@ pub(crate) struct Limits {
 
 impl Limits {
     /// Draws series in which nothing changes, and takes the limits that one in 250 leaves at each test, of those that did
-    /// not leave them before. `levers` has a row for each chart: how it follows from the frequencies. The scatter of the first
+    /// not leave them before. `sensitivities` has a row for each chart: how it follows from the frequencies. The scatter of the first
     /// `known` charts is known.
-    pub(crate) fn new(levers: &DMatrix<f64>, known: usize, tests: usize) -> Self {
+    pub(crate) fn new(sensitivities: &DMatrix<f64>, known: usize, tests: usize) -> Self {
         let drawn = tests.min(DRAWN_TESTS);
-        let scatters = levers.row_iter().enumerate();
+        let scatters = sensitivities.row_iter().enumerate();
         let scatters = scatters.map(|(chart, row)| match chart < known {
             true => TestScatter::Known(row.norm()),
             false => TestScatter::AtLeast(f64::MIN_POSITIVE),
@@ -225,7 +228,7 @@ impl Limits {
         let scatters: Vec<TestScatter> = scatters.collect();
         let most: Vec<Vec<f64>> = (0..DRAWN)
             .into_par_iter()
-            .map(|series| highest_scores(levers, &scatters, drawn, series))
+            .map(|series| highest_scores(sensitivities, &scatters, drawn, series))
             .collect();
         let mut remaining = most;
         let mut by_count: Vec<Option<f64>> = Vec::with_capacity(drawn);
@@ -255,22 +258,22 @@ impl Limits {
 
 /// Returns the highest score of all charts after each test of a drawn series; 0 where too few are known.
 fn highest_scores(
-    levers: &DMatrix<f64>,
+    sensitivities: &DMatrix<f64>,
     scatters: &[TestScatter],
     tests: usize,
     series: usize,
 ) -> Vec<f64> {
     let mut draw = ChaCha8Rng::seed_from_u64(SEED);
     draw.set_stream(series as u64);
-    let mut moments = vec![Moments::default(); scatters.len()];
+    let mut sums = vec![RunningSums::default(); scatters.len()];
     let mut all = Vec::with_capacity(tests);
     for _ in 0..tests {
-        let errors = DVector::from_fn(levers.ncols(), |_, _| drawn_scatter(&mut draw));
-        let values = levers * errors;
+        let errors = DVector::from_fn(sensitivities.ncols(), |_, _| drawn_scatter(&mut draw));
+        let values = sensitivities * errors;
         let mut highest = 0.0_f64;
-        for ((moments, value), scatter) in moments.iter_mut().zip(values.iter()).zip(scatters) {
-            moments.add(*value);
-            let found = most_unlike(moments, *scatter);
+        for ((sums, value), scatter) in sums.iter_mut().zip(values.iter()).zip(scatters) {
+            sums.add(*value);
+            let found = largest_difference(sums, *scatter);
             highest = highest.max(found.map_or(0.0, |found| found.score.abs()));
         }
         all.push(highest);

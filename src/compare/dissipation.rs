@@ -108,21 +108,21 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
         return None;
     }
     let (scatter, freedom) = found.scatter(USUAL_SCATTER);
-    let levers = joint_levers(models);
+    let sensitivities = joint_sensitivities(models);
     let mut modes = Vec::new();
-    let (mut squares, mut product, mut lever_squares) = (0.0, 0.0, 0.0);
+    let (mut squares, mut product, mut sensitivity_squares) = (0.0, 0.0, 0.0);
     for one in &found.all {
         let variance = one.reading + scatter * one.scatter;
         let change = one.after - one.before;
         squares += change * change / variance;
-        if let Some(levers) = &levers {
+        if let Some(sensitivities) = &sensitivities {
             let position = models[one.pair]
                 .modes
                 .iter()
                 .position(|mode| *mode == one.mode);
-            let lever = position.map_or(0.0, |position| levers[one.pair][position]);
-            product += lever * change / variance;
-            lever_squares += lever * lever / variance;
+            let sensitivity = position.map_or(0.0, |position| sensitivities[one.pair][position]);
+            product += sensitivity * change / variance;
+            sensitivity_squares += sensitivity * sensitivity / variance;
         }
         modes.push(ModeDamping {
             pair: one.pair,
@@ -135,15 +135,15 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     let count = modes.len() as f64;
     let no_change_goodness = fisher_tail(squares / count, count, freedom);
     let (mut loss_factor, mut joint_goodness) = (None, None);
-    if lever_squares > 0.0 && modes.len() > 1 {
-        let value = product / lever_squares;
+    if sensitivity_squares > 0.0 && modes.len() > 1 {
+        let value = product / sensitivity_squares;
         let left = (squares - value * product).max(0.0) / (count - 1.0);
         let goodness = fisher_tail(left, count - 1.0, freedom);
         joint_goodness = Some(goodness);
         // What the fit leaves tells of the scatter, too.
         let both = freedom + count - 1.0;
         let share = (freedom + (count - 1.0) * left) / both;
-        let std = (share / lever_squares).sqrt();
+        let std = (share / sensitivity_squares).sqrt();
         let reach = student::quantile(0.05, both) * std;
         loss_factor = Some(Interval {
             value,
@@ -169,7 +169,7 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
 }
 
 /// Returns d ln f/d ln K of each mode of each pair, all elastic stiffnesses of the joint together; `None` where there are none.
-fn joint_levers(models: &[PairModel]) -> Option<Vec<Vec<f64>>> {
+fn joint_sensitivities(models: &[PairModel]) -> Option<Vec<Vec<f64>>> {
     let mut all = Vec::with_capacity(models.len());
     for model in models {
         let joint = model.structure().joint?;

@@ -45,8 +45,8 @@ pub use result::{
     RepeatabilityResult, StiffnessChange, VerdictKind,
 };
 pub use series::{
-    ChartPoint, Charted, ControlChart, Departure, LEAST_SERIES, LeftOutMode, MOST_SERIES, Series,
-    Watched, watch,
+    ChartPoint, ChartedQuantity, ControlChart, Departure, LEAST_SERIES, LeftOutMode, MOST_SERIES,
+    Series, WatchedSeries, watch,
 };
 pub use test::{
     CompareError, Item, ItemKind, Level, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Reading,

@@ -6,7 +6,7 @@
 //! declared healthy.
 
 use crate::change_point::{
-    Limits, Moments, TestScatter, most_probable_step, most_unlike, single_limits,
+    Limits, RunningSums, TestScatter, largest_difference, most_probable_step, single_limits,
 };
 use crate::joint::JointChange;
 use crate::level::take_one_level;
@@ -34,12 +34,12 @@ const MOST_CHANGE: f64 = 3.0;
 /// Unit of the residuals of the search for stiffnesses (1): the precision of a good reading.
 const RESIDUAL: f64 = 1e-5;
 /// A stiffness whose standard deviation exceeds that of the frequencies by this factor has no chart: the modes do not feel it.
-const MOST_LEVER: f64 = 200.0;
+const MOST_SENSITIVITY: f64 = 200.0;
 
 /// What a chart shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Charted {
+pub enum ChartedQuantity {
     /// Frequency of the mode of this number.
     Mode(usize),
     /// All frequencies together: the mean of their changes.
@@ -81,7 +81,7 @@ pub struct Departure {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ControlChart {
     /// What it shows.
-    pub quantity: Charted,
+    pub quantity: ChartedQuantity,
     /// Standard deviation of one test (%): as stated, or about the means before and after the change. `null` with too few
     /// tests.
     pub scatter_percent: Option<f64>,
@@ -125,7 +125,7 @@ impl Series {
 
 /// A series of tests, and what changed in it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Watched {
+pub struct WatchedSeries {
     /// The charts.
     pub series: Series,
     /// What changed. The tests before the step are compared with those from the step to the test that shows it. `None` where
@@ -139,7 +139,7 @@ pub struct Watched {
 ///
 /// # Errors
 /// [`CompareError`]: too few or too many tests, too few modes in common, a structure without modes.
-pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareError> {
+pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, CompareError> {
     if !(LEAST_SERIES..=MOST_SERIES).contains(&tests.len()) {
         return Err(CompareError::Series {
             count: tests.len(),
@@ -167,7 +167,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
     let count = modes.len();
     let Changes {
         quantities,
-        levers,
+        sensitivities,
         rows,
     } = Changes::new(&model, &measured);
     // A stated repeatability holds the readings' own noise, unless these are worse. Half of the variance of a difference is that of one test.
@@ -178,12 +178,18 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         (0.5 * repeatability.powi(2).max(median(&mut readings))).sqrt()
     });
     let stds: Vec<f64> = stds.collect();
-    let limits = Limits::new(&levers, if is_stated { count } else { 0 }, tests.len());
+    let limits = Limits::new(
+        &sensitivities,
+        if is_stated { count } else { 0 },
+        tests.len(),
+    );
     let charts = quantities.iter().enumerate().map(|(index, quantity)| {
         let values: Vec<f64> = rows.iter().map(|row| row[index]).collect();
-        let row = levers.row(index);
+        let row = sensitivities.row(index);
         let variances = row.iter().zip(&stds);
-        let variance: f64 = variances.map(|(lever, std)| (lever * std).powi(2)).sum();
+        let variance: f64 = variances
+            .map(|(sensitivity, std)| (sensitivity * std).powi(2))
+            .sum();
         // How much of the scatter all modes share is not stated.
         let scatter = match is_stated && index < count {
             true => TestScatter::Known(stds[index]),
@@ -210,14 +216,14 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<Watched, CompareErro
         };
         change = Some(crate::compare(&[pair], settings)?);
     }
-    Ok(Watched { series, change })
+    Ok(WatchedSeries { series, change })
 }
 
 /// Changes of all quantities.
 struct Changes {
-    quantities: Vec<Charted>,
+    quantities: Vec<ChartedQuantity>,
     /// Changes of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
-    levers: DMatrix<f64>,
+    sensitivities: DMatrix<f64>,
     /// Logarithms of all quantities over those of the first test: a row for each test.
     rows: Vec<Vec<f64>>,
 }
@@ -226,8 +232,8 @@ impl Changes {
     /// Returns the changes from the measured ones of the modes (logarithms), from the second test on.
     fn new(model: &PairModel, measured: &[[Vec<f64>; 2]]) -> Self {
         let count = model.modes.len();
-        let modes = model.modes.iter().map(|mode| Charted::Mode(*mode));
-        let levers = DMatrix::identity(count, count);
+        let modes = model.modes.iter().map(|mode| ChartedQuantity::Mode(*mode));
+        let sensitivities = DMatrix::identity(count, count);
         let mut rows = vec![vec![0.0; count + 1]];
         for [changes, _] in measured {
             let mut row = changes.clone();
@@ -235,11 +241,11 @@ impl Changes {
             rows.push(row);
         }
         let mut all = Self {
-            quantities: modes.chain([Charted::AllModes]).collect(),
-            levers: levers.insert_row(count, 1.0 / count as f64),
+            quantities: modes.chain([ChartedQuantity::AllModes]).collect(),
+            sensitivities: sensitivities.insert_row(count, 1.0 / count as f64),
             rows,
         };
-        if let Some(joint) = JointLever::new(model) {
+        if let Some(joint) = JointSensitivity::new(model) {
             let fits = measured.par_iter();
             let fits = fits.map(|[changes, _]| joint.changes(model, changes));
             // Without a fit of every test the stiffnesses have no charts.
@@ -250,13 +256,15 @@ impl Changes {
         all
     }
 
-    fn add_joint(&mut self, joint: &JointLever, fits: Vec<Vec<f64>>) {
+    fn add_joint(&mut self, joint: &JointSensitivity, fits: Vec<Vec<f64>>) {
         let known = self.quantities.len();
         self.quantities.extend(&joint.quantities);
-        let levers = self.levers.clone();
-        self.levers = levers.resize_vertically(self.quantities.len(), 0.0);
-        let mut below = self.levers.rows_mut(known, joint.lever.nrows());
-        below.copy_from(&joint.lever);
+        let sensitivities = self.sensitivities.clone();
+        self.sensitivities = sensitivities.resize_vertically(self.quantities.len(), 0.0);
+        let mut below = self
+            .sensitivities
+            .rows_mut(known, joint.sensitivity.nrows());
+        below.copy_from(&joint.sensitivity);
         self.rows[0].resize(self.quantities.len(), 0.0);
         for (row, fit) in self.rows[1..].iter_mut().zip(fits) {
             row.extend(fit);
@@ -296,19 +304,24 @@ fn left_out(all: &Pair, modes: &[usize]) -> Vec<LeftOutMode> {
 }
 
 /// Charts one quantity by its values (logarithms over the first test).
-fn chart(quantity: Charted, values: &[f64], scatter: TestScatter, limits: &Limits) -> ControlChart {
+fn chart(
+    quantity: ChartedQuantity,
+    values: &[f64],
+    scatter: TestScatter,
+    limits: &Limits,
+) -> ControlChart {
     let percent = |log: f64| 100.0 * log.exp_m1();
     let mut points = Vec::with_capacity(values.len());
     let mut departure = None;
-    let mut moments = Moments::default();
+    let mut sums = RunningSums::default();
     let (mut single, mut std) = (None, None);
     for (test, value) in values.iter().enumerate() {
         let limit = limits.at(test + 1);
         if departure.is_none() {
-            let found = limit.and_then(|limit| single_limits(&moments, scatter, limit));
+            let found = limit.and_then(|limit| single_limits(&sums, scatter, limit));
             single = found.map(|ends| ends.map(percent));
         }
-        moments.add(*value);
+        sums.add(*value);
         let mut point = ChartPoint {
             percent: percent(*value),
             score: 0.0,
@@ -316,14 +329,14 @@ fn chart(quantity: Charted, values: &[f64], scatter: TestScatter, limits: &Limit
             limit: None,
             single_limits_percent: single,
         };
-        if let Some((found, limit)) = most_unlike(&moments, scatter).zip(limit) {
+        if let Some((found, limit)) = largest_difference(&sums, scatter).zip(limit) {
             point.limit = Some(limit);
             (point.score, point.last) = (found.score, found.last);
             if departure.is_none() {
                 std = Some(found.std);
             }
             if departure.is_none() && found.score.abs() > limit {
-                let step = most_probable_step(&moments, scatter);
+                let step = most_probable_step(&sums, scatter);
                 std = Some(step.std);
                 departure = Some(Departure {
                     test,
@@ -343,14 +356,14 @@ fn chart(quantity: Charted, values: &[f64], scatter: TestScatter, limits: &Limit
 }
 
 /// How the stiffnesses of the joint follow from the frequencies.
-struct JointLever {
-    quantities: Vec<Charted>,
+struct JointSensitivity {
+    quantities: Vec<ChartedQuantity>,
     directions: Vec<usize>,
     /// Changes of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
-    lever: DMatrix<f64>,
+    sensitivity: DMatrix<f64>,
 }
 
-impl JointLever {
+impl JointSensitivity {
     /// Returns the stiffnesses that the modes feel; `None` where there are none.
     fn new(model: &PairModel) -> Option<Self> {
         let joint = JointChange::new(std::slice::from_ref(model))?;
@@ -359,8 +372,8 @@ impl JointLever {
         let mut quantities = Vec::new();
         for (direction, name) in joint.directions.iter().zip(names) {
             let quantity = match name {
-                "kt" => Charted::Kt,
-                "kr" => Charted::Kr,
+                "kt" => ChartedQuantity::Kt,
+                "kr" => ChartedQuantity::Kr,
                 _ => continue,
             };
             directions.push(*direction);
@@ -368,14 +381,14 @@ impl JointLever {
         }
         while !directions.is_empty() {
             let slopes = slopes(model, &directions, &vec![0.0; directions.len()])?;
-            let lever = slopes.pseudo_inverse(1e-12).ok()?;
-            let norms: Vec<f64> = lever.row_iter().map(|row| row.norm()).collect();
+            let sensitivity = slopes.pseudo_inverse(1e-12).ok()?;
+            let norms: Vec<f64> = sensitivity.row_iter().map(|row| row.norm()).collect();
             let worst = (0..norms.len()).max_by(|a, b| norms[*a].total_cmp(&norms[*b]))?;
-            if norms[worst] <= MOST_LEVER {
+            if norms[worst] <= MOST_SENSITIVITY {
                 return Some(Self {
                     quantities,
                     directions,
-                    lever,
+                    sensitivity,
                 });
             }
             directions.remove(worst);

@@ -1,7 +1,7 @@
 //! Tests of comparisons.
 
 use crate::{
-    CauseKind, Charted, CompareError, Comparison, Item, ItemKind, MeasuredMode, Pair,
+    CauseKind, ChartedQuantity, CompareError, Comparison, Item, ItemKind, MeasuredMode, Pair,
     RepeatabilityOrigin, Settings, Test, VerdictKind, compare, watch,
 };
 use tapjoint_beam::specimen::{Joint, Mesh, PointMass, Specimen};
@@ -498,7 +498,9 @@ fn val_a_series_shows_when_a_joint_became_softer() {
         let (_, departure) = found.series.departure().unwrap();
         assert_eq!([departure.test, departure.since], [8, 8]);
         let mut charts = found.series.charts.iter();
-        let rotation = charts.find(|one| one.quantity == Charted::Kr).unwrap();
+        let rotation = charts
+            .find(|one| one.quantity == ChartedQuantity::Kr)
+            .unwrap();
         let last = rotation.points[10].percent;
         // The scatter is 0.003 % of a frequency, and Kr moves it by a tenth as much as itself.
         assert!((last + 4.0).abs() < 0.2, "{last}");
@@ -525,7 +527,9 @@ fn recover_a_joint_that_lost_most_of_its_stiffness() {
         let factors = [&[1.0; 6][..], &[factor]].concat();
         let found = watch(&series(&factors, 1e-6), &stated(1e-4)).unwrap();
         let mut charts = found.series.charts.iter();
-        let rotation = charts.find(|one| one.quantity == Charted::Kr).unwrap();
+        let rotation = charts
+            .find(|one| one.quantity == ChartedQuantity::Kr)
+            .unwrap();
         let percent = rotation.points[6].percent;
         // Readings to 1e-6, and the errors of two meshes that do not quite cancel.
         assert!(
@@ -556,7 +560,9 @@ fn prop_what_one_test_states_is_not_taken_for_the_others() {
     tests[1].knows_joint[1] = true;
     let found = watch(&tests, &stated(2e-3)).unwrap().series;
     let mut charts = found.charts.iter();
-    let first = charts.find(|one| one.quantity == Charted::Mode(1)).unwrap();
+    let first = charts
+        .find(|one| one.quantity == ChartedQuantity::Mode(1))
+        .unwrap();
     for point in &first.points[2..] {
         assert!(point.percent.abs() < 1e-3, "{point:?}");
     }
@@ -586,7 +592,7 @@ fn prop_a_mode_that_a_test_lacks_is_left_out_and_told() {
         found
             .charts
             .iter()
-            .all(|one| one.quantity != Charted::Mode(5))
+            .all(|one| one.quantity != ChartedQuantity::Mode(5))
     );
 }
 

@@ -256,8 +256,6 @@ fn answer(
         hypotheses: hypotheses.collect(),
         damping: None,
         level: None,
-        damping: None,
-        level: None,
         repeatability: RepeatabilityResult {
             percent: 0.1,
             origin: RepeatabilityOrigin::Assumed,

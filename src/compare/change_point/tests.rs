@@ -1,10 +1,10 @@
 use super::*;
 use rand::RngExt;
 
-fn moments_of(values: &[f64]) -> Moments {
-    let mut moments = Moments::default();
-    values.iter().for_each(|value| moments.add(*value));
-    moments
+fn moments_of(values: &[f64]) -> RunningSums {
+    let mut sums = RunningSums::default();
+    values.iter().for_each(|value| sums.add(*value));
+    sums
 }
 
 /// Tails of a normal variable by tables: 1.6449 at 5 %, 2.5758 at 0.5 %, 3.2905 at 0.05 %. Those of Student's t are in
@@ -33,7 +33,7 @@ fn prop_a_test_at_its_limits_has_the_limit_as_score() {
         let ends = single_limits(&moments_of(&before), scatter, 3.4).unwrap();
         for end in ends {
             let all = [&before[..], &[end]].concat();
-            let found = most_unlike(&moments_of(&all), scatter).unwrap();
+            let found = largest_difference(&moments_of(&all), scatter).unwrap();
             assert_eq!(found.last, 1);
             // Rounding of the sums of squares.
             assert!((found.score.abs() - 3.4).abs() < 1e-6, "{}", found.score);
@@ -44,12 +44,12 @@ fn prop_a_test_at_its_limits_has_the_limit_as_score() {
 /// Equal values never differ, whatever their scatter is known to be.
 #[test]
 fn limit_equal_tests_agree() {
-    let moments = moments_of(&[0.3; 9]);
+    let sums = moments_of(&[0.3; 9]);
     for scatter in [TestScatter::Known(0.1), TestScatter::AtLeast(1e-6)] {
-        let found = most_unlike(&moments, scatter).unwrap();
+        let found = largest_difference(&sums, scatter).unwrap();
         assert!(found.score.abs() < 1e-9);
     }
-    assert!(most_unlike(&moments_of(&[0.3; 4]), TestScatter::AtLeast(1e-6)).is_none());
+    assert!(largest_difference(&moments_of(&[0.3; 4]), TestScatter::AtLeast(1e-6)).is_none());
 }
 
 /// A shift and a scale change no score.
@@ -58,7 +58,7 @@ fn prop_scores_have_no_unit() {
     let values = [0.0, 0.3, -0.1, 0.2, 1.4, 1.2, 1.5];
     let other = values.map(|value| 7.0 - 3.0 * value);
     let [one, other] = [&values, &other]
-        .map(|values| most_unlike(&moments_of(values), TestScatter::AtLeast(1e-9)).unwrap());
+        .map(|values| largest_difference(&moments_of(values), TestScatter::AtLeast(1e-9)).unwrap());
     assert_eq!([one.last, other.last], [3, 3]);
     assert!((one.score + other.score).abs() < 1e-9);
     let step = most_probable_step(&moments_of(&values), TestScatter::Known(1.0));
@@ -78,13 +78,13 @@ fn recover_limits_give_few_alarms_and_show_a_step() {
     for series in 0..SERIES {
         let mut draw = ChaCha8Rng::seed_from_u64(71);
         draw.set_stream(series);
-        let mut charts = vec![Moments::default(); 4];
+        let mut charts = vec![RunningSums::default(); 4];
         for test in 1..=TESTS {
             let mut highest = 0.0_f64;
             for chart in &mut charts {
                 let value: f64 = StandardNormal.sample(&mut draw);
                 chart.add(value);
-                let found = most_unlike(chart, TestScatter::AtLeast(1e-9));
+                let found = largest_difference(chart, TestScatter::AtLeast(1e-9));
                 highest = highest.max(found.map_or(0.0, |found| found.score.abs()));
             }
             at_risk += 1;
@@ -93,13 +93,13 @@ fn recover_limits_give_few_alarms_and_show_a_step() {
                 break;
             }
         }
-        let mut chart = Moments::default();
+        let mut chart = RunningSums::default();
         let change = draw.random_range(15..25);
         for test in 0..change + 3 {
             let value: f64 = StandardNormal.sample(&mut draw);
             chart.add(if test < change { value } else { value + 5.0 });
         }
-        let found = most_unlike(&chart, TestScatter::AtLeast(1e-9)).unwrap();
+        let found = largest_difference(&chart, TestScatter::AtLeast(1e-9)).unwrap();
         let limit = limits.at(change + 3).unwrap();
         let step = most_probable_step(&chart, TestScatter::AtLeast(1e-9));
         seen += u64::from(found.score > limit && step.last == 3);

@@ -1,6 +1,6 @@
 //! Tests of the change of dampings.
 
-use super::{USUAL_SCATTER, dampings, joint_levers};
+use super::{USUAL_SCATTER, dampings, joint_sensitivities};
 use crate::model::PairModel;
 use crate::result::DampingVerdict;
 use crate::test::{MeasuredMode, Pair, Reading, Test};
@@ -71,12 +71,17 @@ fn damped(test: &Test, dampings: &[f64]) -> Test {
 fn limit_a_beam_on_a_soft_hinge_has_all_its_energy_in_the_joint() {
     // The first mode is then a rigid body on a spring: zeta = eta/2, as of one degree of freedom.
     let soft = model(&test(joint(f64::INFINITY, 1e-3)));
-    let levers = joint_levers(&[soft]).unwrap().swap_remove(0);
-    assert!((levers[0] - 0.5).abs() < 1e-3, "{levers:?}");
+    let sensitivities = joint_sensitivities(&[soft]).unwrap().swap_remove(0);
+    assert!((sensitivities[0] - 0.5).abs() < 1e-3, "{sensitivities:?}");
     // Its higher modes bend a beam that a soft spring hardly holds.
-    assert!(levers[1..].iter().all(|lever| *lever < 1e-3), "{levers:?}");
+    assert!(
+        sensitivities[1..]
+            .iter()
+            .all(|sensitivity| *sensitivity < 1e-3),
+        "{sensitivities:?}"
+    );
     let rigid = model(&test(Joint::RIGID));
-    assert!(joint_levers(&[rigid]).is_none());
+    assert!(joint_sensitivities(&[rigid]).is_none());
 }
 
 #[test]
@@ -84,7 +89,9 @@ fn prop_the_lever_is_half_of_the_share_of_the_energy() {
     // The frequencies of a stiffness that is complex, to first order: K (1 + i eta) moves ln f by i eta d ln f/d ln K, and
     // zeta is the imaginary part of ln omega.
     let own = joint(800.0, 6.0);
-    let levers = joint_levers(&[model(&test(own))]).unwrap().swap_remove(0);
+    let sensitivities = joint_sensitivities(&[model(&test(own))])
+        .unwrap()
+        .swap_remove(0);
     let moved = |factor: f64| {
         test(Joint {
             kt: factor * own.kt,
@@ -93,10 +100,13 @@ fn prop_the_lever_is_half_of_the_share_of_the_energy() {
         })
     };
     let [above, below] = [1.001, 0.999].map(moved);
-    for ((lever, above), below) in levers.iter().zip(&above.modes).zip(&below.modes) {
+    for ((sensitivity, above), below) in sensitivities.iter().zip(&above.modes).zip(&below.modes) {
         let slope = (above.frequency / below.frequency).ln() / (1.001_f64 / 0.999).ln();
-        // The levers are differences over 2 %, and have another mesh.
-        assert!((lever - slope).abs() < 1e-3 * slope, "{lever} {slope}");
+        // The sensitivities are differences over 2 %, and have another mesh.
+        assert!(
+            (sensitivity - slope).abs() < 1e-3 * slope,
+            "{sensitivity} {slope}"
+        );
     }
 }
 
@@ -149,7 +159,7 @@ enum Scatter {
 fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
     let own = test(joint(800.0, 6.0));
     let model = model(&own);
-    let levers = joint_levers(std::slice::from_ref(&model))
+    let sensitivities = joint_sensitivities(std::slice::from_ref(&model))
         .unwrap()
         .swap_remove(0);
     let loss = 0.02;
@@ -167,7 +177,9 @@ fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
             let tests = 0..repeats;
             tests
                 .map(|_| {
-                    let ratios = levers.iter().map(|lever| 0.002 + lever * loss);
+                    let ratios = sensitivities
+                        .iter()
+                        .map(|sensitivity| 0.002 + sensitivity * loss);
                     let ratios: Vec<f64> =
                         ratios.map(|one| one * spread.sample(&mut draw)).collect();
                     damped(&own, &ratios)

@@ -38,7 +38,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
-use tapjoint_compare::{Comparison, MOST_REPEATS, Series, Watched};
+use tapjoint_compare::{Comparison, MOST_REPEATS, Series, WatchedSeries};
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::QualityVerdict;
@@ -314,7 +314,7 @@ pub fn series_of(
     name: &str,
     structure: &TestedStructure,
     tests: Vec<String>,
-    found: Watched,
+    found: WatchedSeries,
     warnings: Vec<Warning>,
 ) -> Document {
     let warnings = warnings.iter();

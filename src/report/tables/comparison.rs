@@ -2,7 +2,7 @@
 
 use super::{Table, number, page_words, words};
 use crate::document::Document;
-use crate::format::{or_missing, probability, signed_percent, significant};
+use crate::format::{or_missing, probability, signed_percent, significant, with_decimals_of};
 use crate::words::comparison::{cause, size};
 
 /// Causes below this probability are left out.
@@ -41,7 +41,7 @@ pub fn changed_modes(document: &Document) -> Option<Table> {
             row.push(number("Level (%)", signed(mode.level_percent)));
         }
         row.push(number("Scatter (%)", significant(mode.std_percent, 2)));
-        row.push(number("Change/scatter", significant(mode.z, 2)));
+        row.push(number("Change/scatter", with_decimals_of(mode.z, "0.0")));
         rows.push(row);
     }
     let mut note = "Scatter: standard deviation of the change if nothing changed.".to_owned();
@@ -70,7 +70,10 @@ pub fn changed_dampings(document: &Document) -> Option<Table> {
         row.push(number("Before (%)", significant(100.0 * mode.before, 3)));
         row.push(number("After (%)", significant(100.0 * mode.after, 3)));
         row.push(number("Scatter (%)", significant(100.0 * mode.std, 2)));
-        row.push(number("Change/scatter", significant(change / mode.std, 2)));
+        row.push(number(
+            "Change/scatter",
+            with_decimals_of(change / mode.std, "0.0"),
+        ));
         rows.push(row);
     }
     let note = "Damping ratios. Scatter: standard deviation of the difference if nothing changed.";

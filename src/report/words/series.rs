@@ -3,16 +3,16 @@
 use crate::document::SeriesSection;
 use crate::format::{capital, signed_percent};
 use crate::words::comparison::matched;
-use tapjoint_compare::{Charted, MOST_REPEATS};
+use tapjoint_compare::{ChartedQuantity, MOST_REPEATS};
 use tapjoint_numerics::stats::times;
 
 /// Returns what a chart shows, in words.
-pub fn quantity(charted: Charted) -> String {
+pub fn quantity(charted: ChartedQuantity) -> String {
     match charted {
-        Charted::Mode(mode) => format!("mode {mode}"),
-        Charted::AllModes => "all modes".to_owned(),
-        Charted::Kt => "Kt".to_owned(),
-        Charted::Kr => "Kr".to_owned(),
+        ChartedQuantity::Mode(mode) => format!("mode {mode}"),
+        ChartedQuantity::AllModes => "all modes".to_owned(),
+        ChartedQuantity::Kt => "Kt".to_owned(),
+        ChartedQuantity::Kr => "Kr".to_owned(),
     }
 }
 

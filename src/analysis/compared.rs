@@ -63,7 +63,7 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
             // A reading on a line is uniform within half a line.
             std: mode.std.unwrap_or(half_line / 3.0_f64.sqrt()),
             damping: damping_of(mode),
-            level: level_of(mode),
+            level: level_of(mode, test, analysis),
         })
     });
     let modes: Vec<MeasuredMode> = modes
@@ -97,25 +97,51 @@ fn damping_of(mode: &ModeResult) -> Option<Reading> {
     own.or(stated)
 }
 
-/// Returns the level at which the frequency of a mode was read, and how it depends on the level; `None` where its decays do not
-/// tell it.
-fn level_of(mode: &ModeResult) -> Option<Level> {
+/// Returns the level at which a mode was read, and how it depends on the level; `None` where its decays do not tell it.
+fn level_of(mode: &ModeResult, test: &TestDescription, analysis: &Analysis) -> Option<Level> {
     let reading = mode.reading.as_ref()?;
     let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
     let tells = matches!(
         curve.verdict,
         AmplitudeVerdict::Changes | AmplitudeVerdict::Steady
     );
-    let trend = curve.frequency.as_ref().filter(|_| tells)?;
+    let frequency = curve.frequency.as_ref().filter(|_| tells)?;
+    let damping = curve.damping.as_ref()?;
     let at = reading.at_amplitude.as_ref()?;
-    // From a factor of e to a factor of ten.
-    let factor = std::f64::consts::LN_10 / mode.frequency;
+    let amplitudes = curve.points.iter().map(|point| point.amplitude);
+    let low = amplitudes.clone().fold(f64::INFINITY, f64::min);
+    let high = amplitudes.fold(0.0, f64::max);
+    // Slopes are per factor of e in amplitude.
+    let per_ten = |value: f64, std: f64, factor: f64| Reading {
+        value: std::f64::consts::LN_10 * factor * value,
+        std: std::f64::consts::LN_10 * factor * std,
+    };
     Some(Level {
-        slope: Reading {
-            value: factor * trend.slope,
-            std: factor * trend.slope_std,
-        },
         amplitude: at.value,
-        sensor: at.sensor,
+        range: [low, high],
+        of: amplitude_of(mode, at.sensor, test, analysis)?,
+        frequency_slope: per_ten(frequency.slope, frequency.slope_std, mode.frequency.recip()),
+        damping_slope: per_ten(damping.slope, damping.slope_std, 1.0),
     })
+}
+
+/// Returns what an amplitude is of: sensor, unit and place, "A in m/s2 at 0.338 m".
+fn amplitude_of(
+    mode: &ModeResult,
+    sensor: usize,
+    test: &TestDescription,
+    analysis: &Analysis,
+) -> Option<String> {
+    let file = mode.recording.as_ref()?;
+    let recording = analysis
+        .recordings
+        .iter()
+        .position(|one| one.file == *file)?;
+    let response = analysis.recordings[recording].responses.get(sensor)?;
+    let described = test.recordings.get(recording);
+    let own = test.sensors.iter().find(|one| one.name == response.name);
+    let place = own.and_then(|own| described.map_or(own.position, |one| one.place_of(own)));
+    let unit = response.unit.as_deref().unwrap_or("?");
+    let place = place.map_or(String::new(), |place| format!(" at {place} m"));
+    Some(format!("{} in {unit}{place}", response.name))
 }

@@ -255,6 +255,7 @@ impl JointChange {
                 let log_density = peak.likelihood.log_density(&predicted);
                 Some(Point {
                     log_weight: log_density / excess + log_prior + log_volume,
+                    log_prior,
                     log_density,
                     values: moved.as_slice().to_vec(),
                 })

@@ -4,19 +4,22 @@
 //! decays of both tell the slope of a frequency over the logarithm of the amplitude, each is taken at the amplitude of the first
 //! test. A change of the slopes is often the first sign of a bolt that works loose.
 
-use crate::dissipation::Changes;
-use crate::likelihood::NO_FIT;
-use crate::model::PairModel;
+use crate::likelihood::{Factored, NO_FIT};
 use crate::result::{LevelResult, ModeLevel};
-use crate::test::Pair;
+use crate::test::{MeasuredMode, Pair};
+use crate::value_change::{UsualScatter, ValueChanges};
+use nalgebra::DVector;
 use tapjoint_numerics::stats::fisher_tail;
 
-/// Farthest that a frequency is moved along its slope (factors of ten in amplitude): about as far as a decay shows it.
-const FARTHEST: f64 = 1.0;
-/// Standard deviation of the difference of a slope between two tests of one state, over the slope.
-const USUAL_SCATTER: f64 = 0.25;
-/// Slopes below this scatter as much as this (1 per factor of ten): other modes in the decay pull them.
-const LEAST_SLOPE: f64 = 1e-4;
+/// How far beyond the amplitudes of its decays a mode is moved (1, factor).
+const BEYOND: f64 = 1.5;
+/// Amplitudes that differ by less than this factor are alike: slopes of a joint that slips grow with the level.
+const ALIKE: f64 = 1.5;
+/// Scatter of a slope, at least 0.01 % per factor of ten: other modes in the decay pull it.
+const USUAL: UsualScatter = UsualScatter {
+    share: 0.25,
+    least_size: 4e-4,
+};
 
 /// Change of a frequency by taking it at another level.
 pub(crate) struct Moved {
@@ -26,27 +29,22 @@ pub(crate) struct Moved {
     pub(crate) change: f64,
 }
 
-/// Takes the frequencies of all tests of a pair at the amplitudes of the first one. Returns what this changes.
+/// Takes the modes of all tests of a pair at the amplitudes of the first one. Returns what this changes.
 pub(crate) fn take_one_level(pair: &mut Pair) -> Vec<Moved> {
     let mut moved: Vec<Moved> = Vec::new();
-    let reference = pair.before[..1].to_vec();
+    let Some(first) = pair.before.first().cloned() else {
+        return moved;
+    };
     let shares = [pair.before.len(), pair.after.len()].map(|count| 1.0 / count as f64);
     let sides = [(&mut pair.before, -shares[0]), (&mut pair.after, shares[1])];
     for (tests, share) in sides {
         for mode in tests.iter_mut().flat_map(|test| &mut test.modes) {
-            let first = reference.first().and_then(|first| first.mode(mode.mode));
-            let Some((first, own)) = first.and_then(|first| first.level).zip(mode.level) else {
+            let Some(change) = first
+                .mode(mode.mode)
+                .and_then(|own| take_level_of(own, mode))
+            else {
                 continue;
             };
-            let tens = (own.amplitude / first.amplitude).log10();
-            // An amplitude of nothing has no logarithm.
-            let is_near = tens.abs() <= FARTHEST;
-            if first.sensor != own.sensor || !is_near {
-                continue;
-            }
-            let change = -own.slope.value * tens;
-            mode.frequency *= change.exp();
-            mode.std = mode.std.hypot(own.slope.std * tens * mode.frequency);
             match moved.iter_mut().find(|one| one.mode == mode.mode) {
                 Some(one) => one.change += share * change,
                 None => moved.push(Moved {
@@ -59,32 +57,57 @@ pub(crate) fn take_one_level(pair: &mut Pair) -> Vec<Moved> {
     moved
 }
 
-/// Returns the change of the frequencies' dependence on the level; `None` where the tests have none in common.
-pub(crate) fn levels(pairs: &[Pair], models: &[PairModel]) -> Option<LevelResult> {
-    let found = Changes::new(pairs, models, LEAST_SLOPE, |mode| {
-        mode.level.map(|level| level.slope)
+/// Takes a mode at the amplitude of the same mode in the first test. Returns the change of its frequency (logarithm); `None` where
+/// the decays do not show it at this amplitude.
+fn take_level_of(first: &MeasuredMode, mode: &mut MeasuredMode) -> Option<f64> {
+    let (target, own) = first.level.as_ref().zip(mode.level.as_ref())?;
+    let [low, high] = own.range;
+    let is_shown = (low / BEYOND..=high * BEYOND).contains(&target.amplitude);
+    let tens = (own.amplitude / target.amplitude).log10();
+    if target.of != own.of || !is_shown || !tens.is_finite() {
+        return None;
+    }
+    let change = -own.frequency_slope.value * tens;
+    mode.frequency *= change.exp();
+    mode.std = mode
+        .std
+        .hypot(own.frequency_slope.std * tens * mode.frequency);
+    if let Some(damping) = &mut mode.damping {
+        damping.value -= own.damping_slope.value * tens;
+        damping.std = damping.std.hypot(own.damping_slope.std * tens);
+    }
+    Some(change)
+}
+
+/// Returns the change of the frequencies' dependence on the level, for modes that all tests read at about one amplitude; `None`
+/// where there are none.
+pub(crate) fn levels(pairs: &[Pair], modes: &[Vec<usize>]) -> Option<LevelResult> {
+    let found = ValueChanges::new(pairs, modes, &USUAL, |first, mode| {
+        let own = mode.level.as_ref()?;
+        let first = first.mode(mode.mode)?.level.as_ref()?;
+        let ratio = own.amplitude / first.amplitude;
+        let is_alike = first.of == own.of && ratio < ALIKE && ratio > 1.0 / ALIKE;
+        is_alike.then_some(own.frequency_slope)
     });
     if found.all.is_empty() {
         return None;
     }
-    let (scatter, freedom) = found.scatter(USUAL_SCATTER);
-    let mut modes = Vec::new();
-    let mut squares = 0.0;
-    for one in &found.all {
-        let variance = one.reading + scatter * one.scatter;
-        squares += (one.after - one.before).powi(2) / variance;
-        modes.push(ModeLevel {
-            pair: one.pair,
-            mode: one.mode,
-            before_percent: 100.0 * one.before,
-            after_percent: 100.0 * one.after,
-            std_percent: 100.0 * variance.sqrt(),
-        });
-    }
-    let count = modes.len() as f64;
-    let no_change_goodness = fisher_tail(squares / count, count, freedom);
+    let covariance = found.covariance();
+    let stds: Vec<f64> = covariance.diagonal().iter().map(|one| one.sqrt()).collect();
+    let changes = found.all.iter().map(|one| one.after - one.before);
+    let changes = DVector::from_iterator(found.all.len(), changes);
+    let squares = Factored::new(covariance)?.product(&changes, &changes);
+    let count = found.all.len() as f64;
+    let no_change_goodness = fisher_tail(squares / count, count, found.freedom);
+    let modes = found.all.iter().zip(stds).map(|(one, std)| ModeLevel {
+        pair: one.pair,
+        mode: one.mode,
+        before_percent: 100.0 * one.before,
+        after_percent: 100.0 * one.after,
+        std_percent: 100.0 * std,
+    });
     Some(LevelResult {
-        modes,
+        modes: modes.collect(),
         has_changed: no_change_goodness < NO_FIT,
         no_change_goodness,
     })

@@ -11,7 +11,8 @@
 //!               search      evidence of causes with one size (joint: several sizes; unknown: none)
 //!               limits      the smallest change of the joint that would be seen
 //!               verdict     probabilities and the answer
-//!               dissipation changes of the dampings
+//!               value_change  changes of a value of each mode, and their scatter
+//!               dissipation   changes of the dampings
 //!               result      the answer
 //! Test, ..   -> series      control charts of many tests, and the first that differs from those before
 //!               change_point  how much the last tests differ from those before, and may by chance
@@ -36,6 +37,7 @@ mod test;
 #[cfg(test)]
 mod tests;
 mod unknown;
+mod value_change;
 mod verdict;
 
 pub use cause::CauseKind;
@@ -71,6 +73,7 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
         matched.extend(matching::match_modes(pair, index));
     }
     let modes = test::common_modes(&pairs, settings)?;
+    let level = level::levels(&pairs, &modes);
     for pair in &mut pairs {
         moved.push(level::take_one_level(pair));
     }
@@ -120,7 +123,7 @@ pub fn compare(pairs: &[Pair], settings: &Settings) -> Result<Comparison, Compar
         joint: joint.map(|joint| joint_result(&models, settings, &joint, &hypotheses, &verdict)),
         verdict,
         damping: dissipation::dampings(&pairs, &models),
-        level: level::levels(&pairs, &models),
+        level,
         repeatability: RepeatabilityResult {
             percent: 100.0 * data.mean_scatter(),
             origin: match settings.repeatability {
@@ -140,9 +143,9 @@ fn mode_changes(data: &Data<'_>, settings: &Settings, moved: &[Vec<Moved>]) -> V
     let mut all = Vec::new();
     for (index, pair) in data.pairs.iter().enumerate() {
         let is_stated = settings.repeatability.is_some();
-        let variances = likelihood::variances(pair, data.mean_scatter(), is_stated);
+        let errors = likelihood::errors(pair, data.mean_scatter(), is_stated);
         // What the descriptions tell is uncertain, too.
-        let covariance = likelihood::covariance(pair, &variances, &Predicted::nothing(pair));
+        let covariance = likelihood::covariance(pair, &errors, &Predicted::nothing(pair));
         for (k, &mode) in pair.modes.iter().enumerate() {
             let [before, after] = pair.frequencies[k];
             let std = covariance[(k, k)].sqrt();

@@ -3,7 +3,7 @@
 //! The measured change of each mode is the predicted one, plus scatter between set-ups. Its covariance is
 //! r^2 ((1 - c) I + c 1 1') + sum of g g' + (e d)^2 + (e/2)^2 d d':
 //!
-//! - r: the repeatability, or the readings where they are worse
+//! - r: the repeatability; readings that are worse, or not held in it, have a variance of their own
 //! - c: correlation of the scatter of two modes
 //! - g: change of the prediction with the joint one standard deviation aside, for each of its axes; of a sensor that was moved
 //!   also with its place aside
@@ -26,7 +26,7 @@ const REACH: f64 = 3.5;
 /// Goodness of fit below which a cause does not explain the changes.
 pub(crate) const NO_FIT: f64 = 0.01;
 /// Correlation of the scatter of two modes: temperature and a joint that settles move all frequencies in common.
-const SCATTER_CORRELATION: f64 = 0.25;
+pub(crate) const SCATTER_CORRELATION: f64 = 0.25;
 /// Error that the predicted changes of all modes have in common, over that of one.
 const COMMON_SHARE: f64 = 0.5;
 
@@ -48,8 +48,14 @@ pub(crate) fn scatters(pairs: &[PairModel], settings: &Settings) -> Vec<Scatter>
         }];
     }
     // The grid lies about what prior and repeats say together.
-    let squares: f64 = pairs.iter().map(|pair| pair.repeat_squares).sum();
-    let freedom: f64 = pairs.iter().map(|pair| pair.repeat_freedom).sum();
+    let (mut squares, mut freedom) = (0.0, 0.0);
+    for pair in pairs {
+        // Correlated modes tell less of their variance: m of them as much as m/(1 + (m - 1) c^2).
+        let others = pair.modes.len() as f64 - 1.0;
+        let repeated = 1.0 + others * SCATTER_CORRELATION * SCATTER_CORRELATION;
+        squares += pair.repeat_squares / repeated;
+        freedom += pair.repeat_freedom / repeated;
+    }
     let (mut centre, mut spread) = (USUAL_REPEATABILITY.ln(), USUAL_SPREAD);
     if freedom > 0.0 && squares > 0.0 {
         // The difference of two tests has twice the variance of one.
@@ -86,32 +92,31 @@ pub(crate) fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
     most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
 }
 
-/// Returns the variance of the measured change of each mode by scatter and readings alone.
-pub(crate) fn variances(pair: &PairModel, std: f64, is_stated: bool) -> Vec<f64> {
+/// Returns the covariance of the measured changes by scatter and readings alone.
+pub(crate) fn errors(pair: &PairModel, std: f64, is_stated: bool) -> DMatrix<f64> {
     let scatter = std * std * pair.scatter_share;
-    let of_reading = pair.reading.iter();
+    let count = pair.modes.len();
+    let mut errors = DMatrix::from_element(count, count, SCATTER_CORRELATION * scatter);
     // A stated repeatability and the scatter of repeats hold the readings' own noise. An assumed one does not.
     let holds_readings = is_stated || pair.repeat_freedom > 0.0;
-    of_reading
-        .map(|reading| match holds_readings {
+    for (k, reading) in pair.reading.iter().enumerate() {
+        errors[(k, k)] = match holds_readings {
             true => scatter.max(*reading),
             false => scatter + reading,
-        })
-        .collect()
+        };
+    }
+    errors
 }
 
 /// Returns the covariance of the measured changes: scatter and readings, and the uncertainty of what is predicted and of what
 /// the descriptions tell.
 pub(crate) fn covariance(
     pair: &PairModel,
-    variances: &[f64],
+    errors: &DMatrix<f64>,
     predicted: &Predicted,
 ) -> DMatrix<f64> {
-    let count = variances.len();
-    let mut covariance = DMatrix::from_fn(count, count, |row, column| match row == column {
-        true => variances[row],
-        false => SCATTER_CORRELATION * (variances[row] * variances[column]).sqrt(),
-    });
+    let count = pair.modes.len();
+    let mut covariance = errors.clone();
     let common = (COMMON_SHARE * pair.shape_error).powi(2);
     let both = predicted.change.iter().zip(&pair.described);
     let total: Vec<f64> = both.map(|(change, described)| change + described).collect();
@@ -155,9 +160,9 @@ impl Factored {
         })
     }
 
-    /// Returns residual' covariance^-1 residual.
-    fn chi_square(&self, residual: &DVector<f64>) -> f64 {
-        residual.dot(&self.factor.solve(residual))
+    /// Returns one' covariance^-1 other.
+    pub(crate) fn product(&self, one: &DVector<f64>, other: &DVector<f64>) -> f64 {
+        one.dot(&self.factor.solve(other))
     }
 
     /// Returns the logarithm of the density that has this chi square.
@@ -168,7 +173,7 @@ impl Factored {
 
     /// Returns the logarithm of the density of a residual.
     pub(crate) fn log_density(&self, residual: &DVector<f64>) -> f64 {
-        self.log_density_at(self.chi_square(residual))
+        self.log_density_at(self.product(residual, residual))
     }
 }
 
@@ -179,14 +184,22 @@ fn residual(pair: &PairModel, predicted: &Predicted) -> DVector<f64> {
     DVector::from_iterator(pair.measured.len(), both)
 }
 
+/// What a prediction has at one value of the repeatability.
+struct AtScatter {
+    /// Logarithm of the density of all measured changes, with the value's weight.
+    log_density: f64,
+    /// Chi square.
+    chi_square: f64,
+}
+
 /// All pairs with the values of their repeatability.
 pub(crate) struct Data<'a> {
     /// The pairs.
     pub(crate) pairs: &'a [PairModel],
     /// Values of the repeatability.
     pub(crate) scatters: Vec<Scatter>,
-    /// Variances of each mode, by value of the repeatability and by pair.
-    pub(crate) variances: Vec<Vec<Vec<f64>>>,
+    /// Covariance by scatter and readings, by value of the repeatability and by pair.
+    pub(crate) errors: Vec<Vec<DMatrix<f64>>>,
 }
 
 impl<'a> Data<'a> {
@@ -197,12 +210,12 @@ impl<'a> Data<'a> {
         let of_scatter = scatters.iter().map(|scatter| {
             let of_pair = pairs
                 .iter()
-                .map(|pair| variances(pair, scatter.std, is_stated));
+                .map(|pair| errors(pair, scatter.std, is_stated));
             of_pair.collect()
         });
         Self {
             pairs,
-            variances: of_scatter.collect(),
+            errors: of_scatter.collect(),
             scatters,
         }
     }
@@ -210,10 +223,10 @@ impl<'a> Data<'a> {
     /// Returns the probability of changes with the covariance that this prediction has; `None` where it is none.
     pub(crate) fn about(&self, reference: &[Predicted]) -> Option<Likelihood<'_>> {
         let mut factors = Vec::with_capacity(self.scatters.len());
-        for variances in &self.variances {
-            let own = self.pairs.iter().zip(variances).zip(reference);
-            let own = own.map(|((pair, variances), reference)| {
-                Factored::new(covariance(pair, variances, reference))
+        for errors in &self.errors {
+            let own = self.pairs.iter().zip(errors).zip(reference);
+            let own = own.map(|((pair, errors), reference)| {
+                Factored::new(covariance(pair, errors, reference))
             });
             factors.push(own.collect::<Option<Vec<Factored>>>()?);
         }
@@ -231,7 +244,7 @@ impl<'a> Data<'a> {
 
     /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there. Nothing
     /// where the prediction has no covariance.
-    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<(f64, f64)> {
+    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<AtScatter> {
         let likelihood = self.about(predicted);
         likelihood.map_or(Vec::new(), |own| own.by_scatter(predicted))
     }
@@ -240,12 +253,12 @@ impl<'a> Data<'a> {
     /// fitted.
     pub(crate) fn goodness(&self, predicted: &[Predicted], sizes: usize) -> f64 {
         let all = self.by_scatter(predicted);
-        let total = log_sum(all.iter().map(|one| one.0));
+        let total = log_sum(all.iter().map(|one| one.log_density));
         let count: usize = self.pairs.iter().map(|pair| pair.measured.len()).sum();
         let freedom = count.saturating_sub(sizes).max(1) as f64;
-        let shares = all.iter().filter(|one| one.0.is_finite());
+        let shares = all.iter().filter(|one| one.log_density.is_finite());
         shares
-            .map(|(log, chi_square)| (log - total).exp() * chi_square_tail(*chi_square, freedom))
+            .map(|one| (one.log_density - total).exp() * chi_square_tail(one.chi_square, freedom))
             .sum()
     }
 
@@ -254,7 +267,7 @@ impl<'a> Data<'a> {
         let all = self.by_scatter(predicted);
         let weighted = self.scatters.iter().zip(&all);
         weighted
-            .map(|(scatter, one)| scatter.log_weight.exp() * one.1)
+            .map(|(scatter, one)| scatter.log_weight.exp() * one.chi_square)
             .sum()
     }
 
@@ -277,11 +290,11 @@ pub(crate) struct Likelihood<'a> {
 impl Likelihood<'_> {
     /// Returns the logarithm of the density of all measured changes, the repeatability averaged over.
     pub(crate) fn log_density(&self, predicted: &[Predicted]) -> f64 {
-        log_sum(self.by_scatter(predicted).iter().map(|one| one.0))
+        log_sum(self.by_scatter(predicted).iter().map(|one| one.log_density))
     }
 
     /// Returns the logarithm of the density at each value of the repeatability, with its weight; and chi square there.
-    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<(f64, f64)> {
+    fn by_scatter(&self, predicted: &[Predicted]) -> Vec<AtScatter> {
         let pairs = self.data.pairs.iter().zip(predicted);
         let residuals = pairs.map(|(pair, predicted)| residual(pair, predicted));
         let residuals: Vec<DVector<f64>> = residuals.collect();
@@ -289,11 +302,14 @@ impl Likelihood<'_> {
         for (scatter, factors) in self.data.scatters.iter().zip(&self.factors) {
             let (mut log, mut total) = (scatter.log_weight, 0.0);
             for (factor, residual) in factors.iter().zip(&residuals) {
-                let chi_square = factor.chi_square(residual);
+                let chi_square = factor.product(residual, residual);
                 log += factor.log_density_at(chi_square);
                 total += chi_square;
             }
-            all.push((log, total));
+            all.push(AtScatter {
+                log_density: log,
+                chi_square: total,
+            });
         }
         all
     }
@@ -301,7 +317,7 @@ impl Likelihood<'_> {
     /// Returns the index of the repeatability that the data favour, given a prediction.
     pub(crate) fn favoured(&self, predicted: &[Predicted]) -> usize {
         let all = self.by_scatter(predicted).into_iter().enumerate();
-        let most = all.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let most = all.max_by(|a, b| a.1.log_density.total_cmp(&b.1.log_density));
         most.map_or(0, |one| one.0)
     }
 
@@ -333,8 +349,10 @@ impl Likelihood<'_> {
     /// Returns by how much the variances must grow for a prediction with this many fitted sizes to fit; 1 where it fits.
     pub(crate) fn excess(&self, predicted: &[Predicted], sizes: usize) -> f64 {
         let all = self.by_scatter(predicted);
-        let total = log_sum(all.iter().map(|one| one.0));
-        let weighted = all.iter().map(|one| (one.0 - total).exp() * one.1);
+        let total = log_sum(all.iter().map(|one| one.log_density));
+        let weighted = all
+            .iter()
+            .map(|one| (one.log_density - total).exp() * one.chi_square);
         let chi_square: f64 = weighted.sum();
         let count: usize = self.data.pairs.iter().map(|pair| pair.measured.len()).sum();
         let freedom = count.saturating_sub(sizes).max(1) as f64;

@@ -58,7 +58,7 @@ pub(crate) fn match_modes(pair: &mut Pair, index: usize) -> Vec<MatchedMode> {
             let Some(position) = test.modes.iter().position(|one| one.mode == own.mode) else {
                 continue;
             };
-            let there = test.modes[position];
+            let there = test.modes[position].clone();
             let ratio = own
                 .mode
                 .checked_sub(1)

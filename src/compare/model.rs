@@ -183,7 +183,7 @@ fn described_with(test: &Test, joint: Option<Joint>) -> Specimen {
 
 /// Fit of the joint to the frequencies of one test. Its parameters are logarithms of stiffnesses, the coupling, and the
 /// common factor of all frequencies.
-struct Level<'a> {
+struct FirstFit<'a> {
     start: &'a Specimen,
     directions: &'a [usize],
     modes: &'a [usize],
@@ -191,7 +191,7 @@ struct Level<'a> {
     common_std: f64,
 }
 
-impl Level<'_> {
+impl FirstFit<'_> {
     /// Returns measured less predicted frequencies (logarithms), and the parameters over their spread.
     fn residuals(&self, parameters: &[f64]) -> Option<Vec<f64>> {
         let count = self.directions.len();
@@ -219,7 +219,7 @@ impl Level<'_> {
     }
 }
 
-impl Problem for Level<'_> {
+impl Problem for FirstFit<'_> {
     type State = Vec<f64>;
 
     fn evaluate(&self, parameters: &[f64], _: Option<&Vec<f64>>) -> Option<Vec<f64>> {
@@ -265,7 +265,7 @@ impl PairModel {
             .iter()
             .map(|mode| log_frequency(first, *mode))
             .collect();
-        let level = Level {
+        let first_fit = FirstFit {
             start: &first.structure,
             directions: &directions,
             modes,
@@ -275,9 +275,9 @@ impl PairModel {
         let start = vec![0.0; directions.len() + 1];
         // A structure without modes has its reason here.
         log_frequencies(&first.structure, modes)?;
-        let found = minimise(&level, &start, &SearchSettings::default());
+        let found = minimise(&first_fit, &start, &SearchSettings::default());
         let parameters = found.map_or(start, |found| found.parameters);
-        let residuals = level.residuals(&parameters).unwrap_or_default();
+        let residuals = first_fit.residuals(&parameters).unwrap_or_default();
         let squares = residuals
             .iter()
             .take(modes.len())
@@ -285,7 +285,7 @@ impl PairModel {
             .sum::<f64>();
         let freedom = (modes.len() as f64 - directions.len() as f64).max(0.0);
         let misfit = ((USUAL_WEIGHT + squares) / (USUAL_WEIGHT + freedom)).sqrt() * USUAL_MISFIT;
-        let covariance = level
+        let covariance = first_fit
             .slopes(&parameters, &residuals)
             .and_then(|mut slopes| {
                 slopes
@@ -509,6 +509,24 @@ impl PairModel {
     /// Returns the change that a change of the joint makes, without its uncertainty.
     pub(crate) fn joint_change(&self, directions: &[usize], steps: &[f64]) -> Option<Vec<f64>> {
         self.joint_shifted(&self.centre, directions, steps)
+    }
+
+    /// Returns the slopes of the frequencies with respect to stiffnesses (all logarithms) near a change, a column for each
+    /// direction; `None` where the structure has no modes.
+    pub(crate) fn joint_slopes(&self, directions: &[usize], at: &[f64]) -> Option<DMatrix<f64>> {
+        let mut slopes = DMatrix::zeros(self.modes.len(), directions.len());
+        for column in 0..directions.len() {
+            let mut sides = Vec::new();
+            for step in [STEP, -STEP] {
+                let mut steps = at.to_vec();
+                steps[column] += step;
+                sides.push(self.joint_change(directions, &steps)?);
+            }
+            for row in 0..self.modes.len() {
+                slopes[(row, column)] = (sides[0][row] - sides[1][row]) / (2.0 * STEP);
+            }
+        }
+        Some(slopes)
     }
 
     fn joint_shifted(

@@ -51,7 +51,7 @@ pub struct ModeChange {
     pub change_percent: f64,
     /// Part of the change between the frequencies as they were read that other levels of the taps explain (%). It is taken out.
     pub level_percent: f64,
-    /// Part of it that the two descriptions explain (%).
+    /// Part of the change that the two descriptions explain (%).
     pub described_percent: f64,
     /// Standard deviation of the change if nothing changed (%).
     pub std_percent: f64,
@@ -204,7 +204,8 @@ pub struct DampingResult {
     pub modes: Vec<ModeDamping>,
     /// What they say.
     pub verdict: DampingVerdict,
-    /// Change of the joint's loss factor if only this changed (1); `null` where there is no elastic joint, and for one mode.
+    /// Change of the joint's loss factor (1) if only this changed, and no stiffness; `null` where there is no elastic joint, and
+    /// for one mode.
     pub loss_factor: Option<Interval>,
     /// Goodness of fit of no change (1).
     pub no_change_goodness: f64,
@@ -232,7 +233,7 @@ pub struct ModeLevel {
 /// Change of the frequencies' dependence on the level.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LevelResult {
-    /// The modes whose decays tell it in all tests.
+    /// The modes whose decays tell it in all tests, at about one amplitude.
     pub modes: Vec<ModeLevel>,
     /// True where it changed by more than repeating a test changes.
     pub has_changed: bool,

@@ -13,6 +13,8 @@ use rayon::prelude::*;
 pub(crate) struct Point {
     /// Logarithm of its weight.
     pub(crate) log_weight: f64,
+    /// Logarithm of the prior density there.
+    pub(crate) log_prior: f64,
     /// Logarithm of the density of the data there.
     pub(crate) log_density: f64,
     /// Its size or sizes, and then its place (1, lengths of the beam) where it has one.
@@ -226,6 +228,7 @@ fn at_place(data: &Data<'_>, cause: &Cause, place: f64) -> AtPlace {
         let above = known.get(k + 1).map_or(size, |one| one.0);
         weighted.push(Point {
             log_weight: log + (0.5 * (above - below)).ln(),
+            log_prior: cause.log_prior(size),
             log_density: log - cause.log_prior(size),
             values: vec![size],
         });
@@ -343,9 +346,10 @@ pub(crate) fn normalised(
         point.log_weight -= log_evidence;
     }
     points.retain(|point| point.log_weight > NEGLIGIBLE);
+    let log_posterior = |point: &Point| point.log_density + point.log_prior;
     let most = points
         .iter()
-        .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))?;
+        .max_by(|a, b| log_posterior(a).total_cmp(&log_posterior(b)))?;
     let best = predict(&most.values)?;
     Some(Posterior {
         log_evidence,

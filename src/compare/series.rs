@@ -27,8 +27,6 @@ pub const LEAST_SERIES: usize = 3;
 pub const MOST_SERIES: usize = 1000;
 /// Least repeatability where none is stated (1): no frequency is read better.
 const LEAST_REPEATABILITY: f64 = 1e-6;
-/// Step of a joint's stiffness for its influence on the frequencies (logarithm).
-const STEP: f64 = 0.01;
 /// Largest change of a stiffness (logarithm).
 const MOST_CHANGE: f64 = 3.0;
 /// Unit of the residuals of the search for stiffnesses (1): the precision of a good reading.
@@ -153,6 +151,8 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     };
     let matched = match_modes(&mut all, 0);
     let modes = common_modes(std::slice::from_ref(&all), settings)?.swap_remove(0);
+    // `compare` takes one level by itself.
+    let as_read = [all.before.clone(), all.after.clone()].concat();
     take_one_level(&mut all);
     let (first, others) = (&all.before[0], &all.after);
     let model = PairModel::new(
@@ -165,11 +165,11 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     let measured = others.par_iter().map(|test| model.beyond(first, test));
     let measured: Vec<[Vec<f64>; 2]> = measured.collect::<Result<_, _>>()?;
     let count = modes.len();
-    let Changes {
+    let SeriesChanges {
         quantities,
         sensitivities,
         rows,
-    } = Changes::new(&model, &measured);
+    } = SeriesChanges::new(&model, &measured);
     // A stated repeatability holds the readings' own noise, unless these are worse. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
     let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
@@ -208,8 +208,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     let mut change = None;
     if let Some((_, departure)) = series.departure() {
         // What comes later may be another change.
-        let numbered = [all.before, all.after].concat();
-        let (before, after) = numbered[..=departure.test].split_at(departure.since);
+        let (before, after) = as_read[..=departure.test].split_at(departure.since);
         let pair = Pair {
             before: before[before.len().saturating_sub(MOST_REPEATS)..].to_vec(),
             after: after.to_vec(),
@@ -219,16 +218,16 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     Ok(WatchedSeries { series, change })
 }
 
-/// Changes of all quantities.
-struct Changes {
+/// SeriesChanges of all quantities.
+struct SeriesChanges {
     quantities: Vec<ChartedQuantity>,
-    /// Changes of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
+    /// SeriesChanges of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
     sensitivities: DMatrix<f64>,
     /// Logarithms of all quantities over those of the first test: a row for each test.
     rows: Vec<Vec<f64>>,
 }
 
-impl Changes {
+impl SeriesChanges {
     /// Returns the changes from the measured ones of the modes (logarithms), from the second test on.
     fn new(model: &PairModel, measured: &[[Vec<f64>; 2]]) -> Self {
         let count = model.modes.len();
@@ -359,7 +358,7 @@ fn chart(
 struct JointSensitivity {
     quantities: Vec<ChartedQuantity>,
     directions: Vec<usize>,
-    /// Changes of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
+    /// SeriesChanges of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
     sensitivity: DMatrix<f64>,
 }
 
@@ -380,7 +379,7 @@ impl JointSensitivity {
             quantities.push(quantity);
         }
         while !directions.is_empty() {
-            let slopes = slopes(model, &directions, &vec![0.0; directions.len()])?;
+            let slopes = model.joint_slopes(&directions, &vec![0.0; directions.len()])?;
             let sensitivity = slopes.pseudo_inverse(1e-12).ok()?;
             let norms: Vec<f64> = sensitivity.row_iter().map(|row| row.norm()).collect();
             let worst = (0..norms.len()).max_by(|a, b| norms[*a].total_cmp(&norms[*b]))?;
@@ -438,29 +437,11 @@ impl Problem for JointFit<'_> {
     }
 
     fn linearise(&self, parameters: &[f64], residuals: &mut Vec<f64>) -> Option<Linearised> {
-        let slopes = slopes(self.model, self.directions, parameters)?;
+        let slopes = self.model.joint_slopes(self.directions, parameters)?;
         Some(Linearised::of_rows(-slopes / RESIDUAL, residuals))
     }
 
     fn bounds(&self) -> &[[f64; 2]] {
         &self.bounds
     }
-}
-
-/// Returns the slopes of the frequencies with respect to stiffnesses (all logarithms), a column for each stiffness; `None` where
-/// the structure has no modes.
-fn slopes(model: &PairModel, directions: &[usize], at: &[f64]) -> Option<DMatrix<f64>> {
-    let mut slopes = DMatrix::zeros(model.modes.len(), directions.len());
-    for column in 0..directions.len() {
-        let mut sides = Vec::new();
-        for step in [STEP, -STEP] {
-            let mut steps = at.to_vec();
-            steps[column] += step;
-            sides.push(model.joint_change(directions, &steps)?);
-        }
-        for row in 0..model.modes.len() {
-            slopes[(row, column)] = (sides[0][row] - sides[1][row]) / (2.0 * STEP);
-        }
-    }
-    Some(slopes)
 }

@@ -42,7 +42,7 @@ pub enum ItemKind {
 }
 
 /// What was measured of a mode.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredMode {
     /// Number of the mode (1 = lowest).
     pub mode: usize,
@@ -69,16 +69,20 @@ impl MeasuredMode {
     }
 }
 
-/// Level of the taps at which a frequency was read, and how it depends on the level.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Level of the taps at which a mode was read, and how it depends on the level.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Level {
+    /// Amplitude at which frequency and damping hold, in the unit of the sensor.
+    pub amplitude: f64,
+    /// Smallest and largest amplitude that the decays show.
+    pub range: [f64; 2],
+    /// What has this amplitude: sensor, place and unit. Amplitudes of others are not compared.
+    pub of: String,
     /// Relative change of the frequency per factor of ten in amplitude (1); negative where the structure is softer at higher
     /// levels.
-    pub slope: Reading,
-    /// Amplitude at which the frequency holds, in the unit of the sensor.
-    pub amplitude: f64,
-    /// Index of the sensor.
-    pub sensor: usize,
+    pub frequency_slope: Reading,
+    /// Change of the damping ratio per factor of ten in amplitude (1).
+    pub damping_slope: Reading,
 }
 
 /// A measured value.

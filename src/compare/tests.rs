@@ -682,5 +682,7 @@ fn regress_the_interval_of_a_large_change_holds_it() {
     let joint = found.joint.unwrap();
     let [kt, kr] = [joint.kt, joint.kr].map(Option::unwrap);
     assert!(kr.low < -11.5 && -11.5 < kr.high, "{kr:?}");
+    // The model knows Kr to 40 %; the change is not known better than to some percent, nor much worse.
+    assert!(kr.high - kr.low < 25.0, "{kr:?}");
     assert!(kt.low < 4.7 && 4.7 < kt.high, "{kt:?}");
 }

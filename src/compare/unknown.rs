@@ -76,13 +76,13 @@ fn log_density(data: &Data<'_>, shape: Shape, size: f64) -> f64 {
     let shared = DMatrix::from_fn(modes.len(), modes.len(), |row, column| {
         size * size * shape.correlation(modes[row], modes[column])
     });
-    let logs: Vec<f64> = (data.scatters.iter().zip(&data.variances))
-        .map(|(scatter, variances)| {
+    let logs: Vec<f64> = (data.scatters.iter().zip(&data.errors))
+        .map(|(scatter, errors)| {
             let mut covariance = shared.clone();
             let mut first = 0;
-            for (pair, variances) in data.pairs.iter().zip(variances) {
-                let own = likelihood::covariance(pair, variances, &Predicted::nothing(pair));
-                let count = variances.len();
+            for (pair, errors) in data.pairs.iter().zip(errors) {
+                let own = likelihood::covariance(pair, errors, &Predicted::nothing(pair));
+                let count = pair.modes.len();
                 let mut block = covariance.view_mut((first, first), (count, count));
                 block += own;
                 first += count;

@@ -46,8 +46,11 @@ pub fn chi_square_tail(value: f64, freedom: f64) -> f64 {
 }
 
 /// Returns the probability that the ratio of two mean squares, of `above` and `below` degrees of freedom, exceeds a value; 1
-/// without a degree of freedom.
+/// without a degree of freedom, or for a value that is no number.
 pub fn fisher_tail(value: f64, above: f64, below: f64) -> f64 {
+    if value.is_nan() {
+        return 1.0;
+    }
     FisherSnedecor::new(above, below).map_or(1.0, |fisher| fisher.sf(value))
 }
 

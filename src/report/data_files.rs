@@ -24,7 +24,8 @@ const TAPS: &str = "recording,tap,time_s,peak,unit,used,reason,pulse_width_s,fal
 /// (values without unit, or percent) follow from the estimates.
 const PERTURBATION: &str = "method,kind,percent,mode,statistic,kx,ky,kz";
 /// Heads of `changes.csv`.
-const CHANGES: &str = "pair,mode,before_Hz,after_Hz,change_percent,described_percent,std_percent,z";
+const CHANGES: &str =
+    "pair,mode,before_Hz,after_Hz,change_percent,level_percent,described_percent,std_percent,z";
 /// Heads of the rows of a series of tests.
 const SERIES: &str =
     "test,file,quantity,change_percent,score,last_tests,limit,low_percent,high_percent,differs";
@@ -164,6 +165,7 @@ pub fn render_changes_csv(document: &Document) -> Result<String, ReportError> {
             number(Some(one.before)),
             number(Some(one.after)),
             number(Some(one.change_percent)),
+            number(Some(one.level_percent)),
             number(Some(one.described_percent)),
             number(Some(one.std_percent)),
             number(Some(one.z)),

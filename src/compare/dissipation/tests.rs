@@ -1,6 +1,6 @@
 //! Tests of the change of dampings.
 
-use super::{USUAL_SCATTER, dampings, joint_sensitivities};
+use super::{USUAL, dampings, joint_slopes};
 use crate::model::PairModel;
 use crate::result::DampingVerdict;
 use crate::test::{MeasuredMode, Pair, Reading, Test};
@@ -71,17 +71,17 @@ fn damped(test: &Test, dampings: &[f64]) -> Test {
 fn limit_a_beam_on_a_soft_hinge_has_all_its_energy_in_the_joint() {
     // The first mode is then a rigid body on a spring: zeta = eta/2, as of one degree of freedom.
     let soft = model(&test(joint(f64::INFINITY, 1e-3)));
-    let sensitivities = joint_sensitivities(&[soft]).unwrap().swap_remove(0);
-    assert!((sensitivities[0] - 0.5).abs() < 1e-3, "{sensitivities:?}");
+    let slopes = joint_slopes(&[soft]).unwrap().swap_remove(0);
+    assert!((slopes[0] - 0.5).abs() < 1e-3, "{slopes:?}");
     // Its higher modes bend a beam that a soft spring hardly holds.
     assert!(
-        sensitivities[1..]
+        slopes[1..]
             .iter()
-            .all(|sensitivity| *sensitivity < 1e-3),
-        "{sensitivities:?}"
+            .all(|slope_of_mode| *slope_of_mode < 1e-3),
+        "{slopes:?}"
     );
     let rigid = model(&test(Joint::RIGID));
-    assert!(joint_sensitivities(&[rigid]).is_none());
+    assert!(joint_slopes(&[rigid]).is_none());
 }
 
 #[test]
@@ -89,9 +89,7 @@ fn prop_the_lever_is_half_of_the_share_of_the_energy() {
     // The frequencies of a stiffness that is complex, to first order: K (1 + i eta) moves ln f by i eta d ln f/d ln K, and
     // zeta is the imaginary part of ln omega.
     let own = joint(800.0, 6.0);
-    let sensitivities = joint_sensitivities(&[model(&test(own))])
-        .unwrap()
-        .swap_remove(0);
+    let slopes = joint_slopes(&[model(&test(own))]).unwrap().swap_remove(0);
     let moved = |factor: f64| {
         test(Joint {
             kt: factor * own.kt,
@@ -100,12 +98,12 @@ fn prop_the_lever_is_half_of_the_share_of_the_energy() {
         })
     };
     let [above, below] = [1.001, 0.999].map(moved);
-    for ((sensitivity, above), below) in sensitivities.iter().zip(&above.modes).zip(&below.modes) {
+    for ((slope_of_mode, above), below) in slopes.iter().zip(&above.modes).zip(&below.modes) {
         let slope = (above.frequency / below.frequency).ln() / (1.001_f64 / 0.999).ln();
-        // The sensitivities are differences over 2 %, and have another mesh.
+        // The slopes are differences over 2 %, and have another mesh.
         assert!(
-            (sensitivity - slope).abs() < 1e-3 * slope,
-            "{sensitivity} {slope}"
+            (slope_of_mode - slope).abs() < 1e-3 * slope,
+            "{slope_of_mode} {slope}"
         );
     }
 }
@@ -159,29 +157,33 @@ enum Scatter {
 fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
     let own = test(joint(800.0, 6.0));
     let model = model(&own);
-    let sensitivities = joint_sensitivities(std::slice::from_ref(&model))
+    let slopes = joint_slopes(std::slice::from_ref(&model))
         .unwrap()
         .swap_remove(0);
     let loss = 0.02;
-    let seeds = 1000;
+    let seeds = 4000;
     let mut counts = [0.0; 3];
     for seed in 0..seeds {
         let mut draw = ChaCha8Rng::seed_from_u64(seed);
         let scatter = match scatter {
             Scatter::Of(scatter) => scatter,
-            Scatter::Usual => USUAL_SCATTER * 2.0_f64.powf(draw.random_range(-1.0..1.0)),
+            Scatter::Usual => USUAL.share * 2.0_f64.powf(draw.random_range(-1.0..1.0)),
         };
         // The difference of two tests has the variance of both.
-        let spread = Normal::new(1.0, scatter / 2.0_f64.sqrt()).unwrap();
+        let one_test = scatter / 2.0_f64.sqrt();
+        // All modes have a part of it in common.
+        let share: f64 = draw.random_range(0.0..0.5);
+        let normal = Normal::new(0.0, one_test).unwrap();
         let mut side = |loss: f64| -> Vec<Test> {
             let tests = 0..repeats;
             tests
                 .map(|_| {
-                    let ratios = sensitivities
-                        .iter()
-                        .map(|sensitivity| 0.002 + sensitivity * loss);
-                    let ratios: Vec<f64> =
-                        ratios.map(|one| one * spread.sample(&mut draw)).collect();
+                    let common = share.sqrt() * normal.sample(&mut draw);
+                    let mut ratios = Vec::new();
+                    for slope in &slopes {
+                        let off = common + (1.0 - share).sqrt() * normal.sample(&mut draw);
+                        ratios.push((0.002 + slope * loss) * (1.0 + off));
+                    }
                     damped(&own, &ratios)
                 })
                 .collect()
@@ -208,15 +210,15 @@ fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
 #[test]
 fn recover_a_change_of_the_loss_factor() {
     let cases = [
-        (Scatter::Usual, 1, [0.93, 0.97]),
-        (Scatter::Of(0.2), 6, [0.93, 0.98]),
-        (Scatter::Of(0.3), 10, [0.93, 0.97]),
+        (Scatter::Usual, 1, [0.92, 0.97]),
+        (Scatter::Of(0.2), 6, [0.92, 0.98]),
+        (Scatter::Of(0.3), 10, [0.92, 0.97]),
         // The usual scatter keeps its weight beside repeats that scatter less: the interval is wider than it need be.
         (Scatter::Of(0.05), 10, [0.97, 1.0]),
     ];
     for (scatter, repeats, [least, most]) in cases {
         let [holds, quiet, found] = shares(scatter, repeats);
-        // 1000 seeds tell 95 % to within 2 % (three standard deviations).
+        // 93 to 97 %, to within 1 % (three standard deviations of 4000 seeds).
         assert!(
             holds >= least && holds <= most,
             "{scatter:?} {repeats}: {holds}"

@@ -1,7 +1,7 @@
 //! Tests of the level of the taps.
 
 use crate::test::{Level, MeasuredMode, Pair, Reading, Settings, Test};
-use crate::{Comparison, VerdictKind, compare};
+use crate::{Comparison, VerdictKind, compare, watch};
 use tapjoint_beam::specimen::{Joint, Mesh, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory};
 
@@ -29,13 +29,22 @@ fn test(slopes: [f64; MODES], amplitude: f64) -> Test {
     let solved = structure.modes(MODES, Mesh { elements: 60 }).unwrap();
     let modes = solved.frequencies().iter().zip(slopes).enumerate();
     let modes = modes.map(|(index, (frequency, slope))| MeasuredMode {
+        damping: Some(Reading {
+            value: 0.003 + 0.001 * amplitude.log10(),
+            std: 1e-5,
+        }),
         level: Some(Level {
-            slope: Reading {
+            amplitude,
+            range: [0.1 * amplitude, amplitude],
+            of: "A".to_owned(),
+            frequency_slope: Reading {
                 value: slope,
                 std: 1e-5,
             },
-            amplitude,
-            sensor: 0,
+            damping_slope: Reading {
+                value: 0.001,
+                std: 1e-5,
+            },
         }),
         ..MeasuredMode::of_frequency(
             index + 1,
@@ -70,7 +79,8 @@ const SLOPES: [f64; MODES] = [-0.01, -0.006, -0.004, -0.003, -0.002];
 fn prop_harder_taps_on_a_joint_that_slips_are_no_change() {
     let found = compared(test(SLOPES, 1.0), test(SLOPES, 5.0));
     assert_eq!(found.verdict.kind, VerdictKind::NoChange);
-    assert!(!found.level.unwrap().has_changed);
+    // At other levels slopes are not compared.
+    assert!(found.level.is_none());
     for (mode, slope) in found.modes.iter().zip(SLOPES) {
         assert!(mode.z.abs() < 1e-6, "{mode:?}");
         let explained = 100.0 * (slope * 5.0_f64.log10()).exp_m1();
@@ -78,6 +88,9 @@ fn prop_harder_taps_on_a_joint_that_slips_are_no_change() {
             (mode.level_percent - explained).abs() < 1e-3 * explained.abs(),
             "{mode:?}"
         );
+    }
+    for mode in &found.damping.unwrap().modes {
+        assert!((mode.after - mode.before).abs() < 1e-12, "{mode:?}");
     }
     // Without the slopes it looks like a change.
     let mut blind = [test(SLOPES, 1.0), test(SLOPES, 5.0)];
@@ -94,7 +107,7 @@ fn prop_harder_taps_on_a_joint_that_slips_are_no_change() {
 fn prop_amplitudes_of_two_sensors_or_far_apart_are_not_compared() {
     let mut other = test(SLOPES, 5.0);
     for mode in &mut other.modes {
-        mode.level.as_mut().unwrap().sensor = 1;
+        mode.level.as_mut().unwrap().of = "B".to_owned();
     }
     for after in [other, test(SLOPES, 20.0)] {
         let found = compared(test(SLOPES, 1.0), after);
@@ -111,4 +124,24 @@ fn prop_a_joint_that_begins_to_slip_is_told_by_the_slopes() {
     assert_eq!(level.modes.len(), MODES);
     let first = &level.modes[0];
     assert_eq!([first.before_percent, first.after_percent], [0.0, -1.0]);
+}
+
+#[test]
+fn prop_harder_taps_in_a_series_are_no_change() {
+    let tests = [1.0, 2.0, 1.0, 3.0, 2.0, 5.0].map(|amplitude| test(SLOPES, amplitude));
+    let settings = Settings {
+        repeatability: Some(5e-4),
+    };
+    let watched = watch(&tests, &settings).unwrap();
+    assert!(watched.series.first.is_none());
+    // The last test alone differs, by a softer joint and not by its taps.
+    let mut softer = tests.to_vec();
+    for mode in &mut softer[5].modes {
+        mode.frequency *= 0.99;
+    }
+    let change = watch(&softer, &settings).unwrap().change.unwrap();
+    for mode in &change.modes {
+        assert!((mode.change_percent + 1.0).abs() < 1e-6, "{mode:?}");
+        assert!(mode.level_percent < -0.05, "{mode:?}");
+    }
 }

@@ -41,7 +41,7 @@ const DEPTH: [f64; 2] = [12.0, 40.0];
 /// A reading in a recording belongs to a compared frequency within this share of it (1). Recordings of one test scatter less.
 const SAME_PEAK: f64 = 0.01;
 /// Changes that the descriptions explain are written from here on (%): less is written as zero.
-const LEAST_DESCRIBED: f64 = 5e-4;
+const LEAST_EXPLAINED: f64 = 5e-4;
 
 /// One sensor in recordings of both tests that match.
 struct Overlay<'a> {
@@ -429,9 +429,15 @@ fn panels(close_ups: &[CloseUp], is_mean: bool) -> Vec<Panel> {
         if is_mean {
             title.push_str(" in the mean");
         }
-        if change.described_percent.abs() >= LEAST_DESCRIBED {
-            let described = signed_percent(Some(change.described_percent));
-            title.push_str(&format!(" (described: {described} %)"));
+        let explained = [
+            ("described", change.described_percent),
+            ("level", change.level_percent),
+        ];
+        for (reason, percent) in explained {
+            if percent.abs() >= LEAST_EXPLAINED {
+                let percent = signed_percent(Some(percent));
+                title.push_str(&format!(" ({reason}: {percent} %)"));
+            }
         }
         if !has_one_file {
             title.push_str(&format!(", {}", one.overlay.file));
@@ -465,7 +471,7 @@ fn panels(close_ups: &[CloseUp], is_mean: bool) -> Vec<Panel> {
 fn repeated(one: &CloseUp, x: &Axis, y: &Axis) -> Series {
     let change = one.change;
     let ends = [-NORMAL_95, NORMAL_95].map(|reach| {
-        let percent = change.described_percent + reach * change.std_percent;
+        let percent = change.described_percent + change.level_percent + reach * change.std_percent;
         let place = one.readings[0].frequency * (1.0 + 0.01 * percent);
         place.clamp(x.low, x.high)
     });

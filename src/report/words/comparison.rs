@@ -87,7 +87,7 @@ pub fn answer(document: &Document) -> Vec<String> {
         sentences.push(format!("If {subject}: {}.", size(own)));
     }
     sentences.extend(seen_from(found));
-    sentences.extend(found.damping.as_ref().map(damping));
+    sentences.extend(found.damping.as_ref().map(|own| damping(own, found)));
     sentences.extend(found.level.as_ref().and_then(level));
     sentences.push(repeatability(found));
     sentences.extend(matched(&found.matched, |_| "Another test".to_owned()));
@@ -95,25 +95,40 @@ pub fn answer(document: &Document) -> Vec<String> {
 }
 
 /// Returns what the dampings say.
-fn damping(found: &DampingResult) -> String {
+fn damping(own: &DampingResult, found: &Comparison) -> String {
     let percent = |ratio: f64| significant(100.0 * ratio, 3);
-    let most = found.modes.iter().max_by(|a, b| {
+    let most = own.modes.iter().max_by(|a, b| {
         let [a, b] = [a, b].map(|one| (one.after - one.before).abs() / one.std);
         a.total_cmp(&b)
     });
-    match (found.verdict, &found.loss_factor, most) {
-        (DampingVerdict::JointDamping, Some(loss), _) => {
-            let [value, low, high] =
-                [loss.value, loss.low, loss.high].map(|one| significant(one, 2));
-            format!("The joint's damping changed: its loss factor by {value} ({low} to {high}).")
-        }
-        (DampingVerdict::Other, _, Some(most)) => format!(
-            "The damping changed, but not as a change of the joint's loss factor changes it. Mode {} changed most, from {} to {} %.",
-            most.mode,
-            percent(most.before),
-            percent(most.after)
+    let most = most.map_or(String::new(), |most| {
+        let [before, after] = [most.before, most.after].map(percent);
+        format!(
+            " Mode {} changed most, from {before} to {after} %.",
+            most.mode
+        )
+    });
+    match (own.verdict, &own.loss_factor) {
+        (DampingVerdict::NoChange, _) => format!(
+            "Damping: no change beyond a scatter of about {} % between tests.",
+            significant(own.scatter_percent, 2)
         ),
-        _ => "Damping: no change beyond what repeating a test changes.".to_owned(),
+        // The stiffness changes the shares of the energy, too.
+        (DampingVerdict::JointDamping, Some(loss))
+            if found.verdict.kind == VerdictKind::NoChange =>
+        {
+            format!(
+                "The joint's loss factor changed by {}.",
+                in_unit(loss, 1.0, "")
+            )
+        }
+        (DampingVerdict::JointDamping, _) => {
+            format!("The damping changed as the joint changes it.{most}")
+        }
+        (DampingVerdict::Other, _) if own.joint_goodness.is_some_and(|p| p < 0.01) => {
+            format!("The damping changed, but not as the joint changes it.{most}")
+        }
+        (DampingVerdict::Other, _) => format!("The damping changed.{most}"),
     }
 }
 
@@ -126,7 +141,7 @@ fn level(found: &LevelResult) -> Option<String> {
     });
     let most = most.filter(|_| found.has_changed)?;
     let [before, after] = [most.before_percent, most.after_percent].map(|one| significant(one, 2));
-    let cause = match most.after_percent < most.before_percent {
+    let cause = match most.after_percent < most.before_percent.min(0.0) {
         true => " A joint that slips more does this.",
         false => "",
     };

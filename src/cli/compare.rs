@@ -134,6 +134,12 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
     if !arguments.series.is_empty() && !(LEAST_SERIES..=MOST_SERIES).contains(&count) {
         bail!("--series: {count} tests, but a series has between {LEAST_SERIES} and {MOST_SERIES}");
     }
+    // clap does not ask for a series beside arguments that exclude one.
+    if arguments.csv.is_some() && arguments.series.is_empty() {
+        bail!(
+            "--csv holds the rows of a series; give --series, or --out, whose changes.csv has the rows of other comparisons"
+        );
+    }
     let report = arguments.out.as_deref();
     let report = report.map(|folder| OutputFolder::prepare(folder, terminal.files()));
     let outputs = Outputs {

@@ -615,12 +615,16 @@ impl Differences {
             let described = [&centre.before, &centre.after][side];
             let logs = [&centre.log_before, &centre.log_after][side];
             let mut beyond: DMatrix<f64> = DMatrix::zeros(tests.len(), count);
+            let mut predicted_first = logs.clone();
             for (row, test) in tests.iter().enumerate() {
                 let own = described_with(test, described.joint);
                 let predicted = match own == *described {
                     true => logs.clone(),
                     false => log_frequencies(&own, modes)?,
                 };
+                if row == 0 {
+                    predicted_first.clone_from(&predicted);
+                }
                 for (k, &mode) in modes.iter().enumerate() {
                     beyond[(row, k)] = log_frequency(test, mode) - predicted[k];
                     let relative = test.mode(mode).map_or(0.0, |one| one.std / one.frequency);
@@ -631,7 +635,12 @@ impl Differences {
             let sign = if side == 0 { -1.0 } else { 1.0 };
             for k in 0..count {
                 measured[k] += sign * means[k];
-                frequencies[k][side] = (means[k] + logs[k]).exp();
+                // From the first test, so that a frequency without repeats keeps its digits.
+                let first = tests[0]
+                    .mode(modes[k])
+                    .map_or(f64::NAN, |one| one.frequency);
+                let away = means[k] - beyond[(0, k)] + logs[k] - predicted_first[k];
+                frequencies[k][side] = first * away.exp();
                 squares += beyond
                     .column(k)
                     .iter()

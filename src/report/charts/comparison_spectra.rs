@@ -256,7 +256,7 @@ fn spectra(
             .position(|one| one.name == sensor)?;
         let (lines, values) = (averages.lines, averages.responses.get(index)?);
         let peaks = modes.iter().filter_map(|change| {
-            let reading = reading(recording, [change.before, change.after][side])?;
+            let reading = reading(recording, as_read(change)[side])?;
             values.get(lines.nearest(reading.frequency)).copied()
         });
         let (_, strongest) = extent(peaks)?;
@@ -270,6 +270,14 @@ fn spectra(
     Some((curves.try_into().ok()?, axis))
 }
 
+/// Returns the frequencies before and after (Hz) at the levels at which they were read.
+fn as_read(change: &ModeChange) -> [f64; 2] {
+    [
+        change.before,
+        change.after * (1.0 + 0.01 * change.level_percent),
+    ]
+}
+
 /// Returns the reading of a compared frequency (Hz) in a recording.
 fn reading(recording: &RecordingResult, frequency: f64) -> Option<&ModeReading> {
     let distance = |one: &&ModeReading| (one.frequency - frequency).abs();
@@ -281,10 +289,8 @@ fn reading(recording: &RecordingResult, frequency: f64) -> Option<&ModeReading> 
 impl<'a> CloseUp<'a> {
     fn of(change: &'a ModeChange, overlay: &'a Overlay<'a>) -> Option<Self> {
         let [before, after] = overlay.recordings;
-        let readings = [
-            reading(before, change.before)?,
-            reading(after, change.after)?,
-        ];
+        let [first, second] = as_read(change);
+        let readings = [reading(before, first)?, reading(after, second)?];
         Some(Self {
             change,
             overlay,
@@ -448,7 +454,7 @@ fn panels(close_ups: &[CloseUp], is_mean: bool) -> Vec<Panel> {
         let [low, high] = one.ends();
         let x = Axis::linear(low, high).of("frequency", "Hz");
         // The scatter of means is smaller than that of the tests that are shown.
-        let repeated = (!is_mean).then(|| repeated(one, &x, &y));
+        let repeated = repeated(one, &x, &y).filter(|_| !is_mean);
         let mut panel = Panel::new(CLOSE_UP, x, y.clone()).titled(title);
         panel = panel.with(repeated);
         for (side, curve) in levels.into_iter().enumerate() {
@@ -467,18 +473,20 @@ fn panels(close_ups: &[CloseUp], is_mean: bool) -> Vec<Panel> {
     panels
 }
 
-/// Returns the places of the peak after if nothing but what is described changed, with what repeating a test changes.
-fn repeated(one: &CloseUp, x: &Axis, y: &Axis) -> Series {
+/// Returns the places of the peak after if nothing but what is described changed, with what repeating a test changes; `None` where
+/// none of them is shown.
+fn repeated(one: &CloseUp, x: &Axis, y: &Axis) -> Option<Series> {
     let change = one.change;
+    let explained = change.described_percent + change.level_percent;
     let ends = [-NORMAL_95, NORMAL_95].map(|reach| {
-        let percent = change.described_percent + change.level_percent + reach * change.std_percent;
-        let place = one.readings[0].frequency * (1.0 + 0.01 * percent);
-        place.clamp(x.low, x.high)
+        let percent = explained + reach * change.std_percent;
+        one.readings[0].frequency * (1.0 + 0.01 * percent)
     });
-    Series {
-        x: Places::Each(ends.to_vec()),
+    let is_shown = ends[0] < x.high && ends[1] > x.low;
+    is_shown.then(|| Series {
+        x: Places::Each(ends.map(|end| end.clamp(x.low, x.high)).to_vec()),
         low: vec![y.low; 2],
         high: vec![y.high; 2],
         ..Series::new("after, if nothing changed (95 %)", Color::Data, Mark::Band)
-    }
+    })
 }

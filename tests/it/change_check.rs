@@ -20,6 +20,18 @@ use tapjoint::study::change_check::{
 const MASS: &str = "[[recording.mass]]\nname = \"L1\"\nposition = 0.2\nmass = \"20 g\"\n";
 const STRIP: &str = tapped_strip!("[[recording]]\nfile = \"taps.wav\"\ntap = 0.3\n");
 
+/// A second sensor.
+const WEIGHED: &str =
+    "[[sensor]]\nname = \"W\"\nchannel = 3\nposition = \"200 mm\"\nmass = \"8 g\"\n";
+
+fn without_joint(text: &str, kind: &str) -> String {
+    let lines = text.lines();
+    let left = lines.filter(|line| !line.starts_with("kt") && !line.starts_with("kr"));
+    left.collect::<Vec<_>>()
+        .join("\n")
+        .replace("cantilever", kind)
+}
+
 fn planned(
     text: &str,
     changes: &[Change],
@@ -103,18 +115,103 @@ fn limit_changes_of_what_is_not_there_are_refused() {
     };
     let error = planned(&format!("{STRIP}{MASS}"), &[gone], &[], 0.0, 1).unwrap_err();
     assert!(error.to_string().contains("L1"), "{error}");
-    let free = STRIP
-        .lines()
-        .filter(|line| !line.starts_with("kt") && !line.starts_with("kr"))
-        .collect::<Vec<_>>()
-        .join("\n")
-        .replace("cantilever", "free");
+    let free = without_joint(STRIP, "free");
     let joint = Change::Joint { kt: 0.0, kr: 0.1 };
     let error = planned(&free, &[joint], &[], 0.0, 1).unwrap_err();
     assert!(
         matches!(error, SimulateError::NoSpring { key: "kr" }),
         "{error}"
     );
+}
+
+#[test]
+fn limit_changes_that_change_nothing_are_refused() {
+    let weighed =
+        format!("{STRIP}{MASS}").replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    let light = format!("{STRIP}{MASS}");
+    let free = without_joint(&weighed, "free");
+    let lost = |item: &str| Change::LostMass {
+        item: item.to_owned(),
+    };
+    let moved = |offset, sensor| {
+        let values = [("offset", offset), ("sensor", sensor)];
+        Change::Effect(effect(EffectId::SensorPosition, &values))
+    };
+    let sized = |id, name, size| Change::Effect(effect(id, &[(name, size)]));
+    let placed = |id, name| Change::Effect(effect(id, &[(name, 0.0), ("position", 0.1)]));
+    let cases = [
+        (
+            &weighed,
+            vec![Change::Joint { kt: 0.0, kr: 0.0 }],
+            "give kt or kr a value other than 0",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::Modulus, "relative", 0.0)],
+            "give relative a value",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::Length, "relative", 0.0)],
+            "give relative a value",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::AxialLoad, "force", 0.0)],
+            "give force a value",
+        ),
+        (
+            &weighed,
+            vec![placed(EffectId::AddedMass, "mass")],
+            "give mass a value",
+        ),
+        (
+            &weighed,
+            vec![placed(EffectId::LocalCrack, "compliance")],
+            "give compliance a value",
+        ),
+        (&weighed, vec![moved(0.0, 2.0)], "give offset a value"),
+        (
+            &weighed,
+            vec![moved(0.05, 1.0)],
+            "sensor that weighs (the description names: W)",
+        ),
+        (
+            &light,
+            vec![moved(0.05, 1.0)],
+            "nothing with a name and a mass",
+        ),
+        (
+            &weighed,
+            vec![lost("L1"), lost("W"), lost("L1")],
+            "\"L1\" is lost twice",
+        ),
+        (
+            &weighed,
+            vec![lost("W"), moved(0.05, 2.0)],
+            "\"W\" is lost by another change",
+        ),
+        (
+            &weighed,
+            vec![moved(0.05, 2.0), lost("W")],
+            "\"W\" is lost by another change",
+        ),
+        (
+            &free,
+            vec![sized(EffectId::AxialLoad, "force", 9.0)],
+            "on a cantilever",
+        ),
+    ];
+    for (text, changes, words) in cases {
+        let error = planned(text, &changes, &[], 0.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(words), "{changes:?}: {error}");
+    }
+    planned(&weighed, &[moved(0.05, 2.0), lost("L1")], &[], 0.0, 1).unwrap();
+    // A mass that the description leaves out moves, too.
+    let mass = effect(EffectId::SensorMass, &[("mass", 0.01)]);
+    planned(&light, &[moved(0.05, 1.0)], &[mass], 0.0, 1).unwrap();
 }
 
 #[test]

@@ -386,6 +386,7 @@ fn val_the_score_counts_what_it_says() {
         ("first_right_visible", (1, 1)),
         ("kt_interval", (1, 1)),
         ("list_holds", (1, 1)),
+        ("list_holds_or_unknown", (1, 1)),
         ("named", (1, 1)),
         ("named_right", (1, 1)),
         ("named_wrongly", (0, 1)),
@@ -417,7 +418,10 @@ fn val_the_score_counts_what_it_says() {
     let scored = rates(&[(lost.clone(), found)]);
     assert_eq!(scored["first_right"], (1, 1));
     assert_eq!(scored["item_right"], (0, 1));
-    assert_eq!((scored["named"], scored["list_holds"]), ((0, 1), (1, 1)));
+    assert_eq!(scored["named"], (0, 1));
+    // The list has the modulus and unknown, but no mass.
+    let lists = [scored["list_holds"], scored["list_holds_or_unknown"]];
+    assert_eq!(lists, [(0, 1), (1, 1)]);
     let found = answer(
         VerdictKind::NoChange,
         &[],
@@ -427,6 +431,13 @@ fn val_the_score_counts_what_it_says() {
     assert_eq!(scored["first_right"], (1, 1));
     assert_eq!(scored["list_holds"], (0, 1));
     assert_eq!(scored.get("item_right"), None);
+    // Outside of the causes, unknown is what the answer should say.
+    let bed = truth(&[("bed", joint)], true);
+    for (kind, hits) in [(VerdictKind::Unknown, 1), (VerdictKind::NoChange, 0)] {
+        let scored = rates(&[(bed.clone(), answer(kind, &[], &[]))]);
+        assert_eq!(scored["list_holds"], (hits, 1), "{kind:?}");
+        assert_eq!(scored["list_holds_or_unknown"], (hits, 1), "{kind:?}");
+    }
     // Two changes: one of them is enough.
     let two = truth(&[("modulus", joint), ("joint-change", joint)], true);
     assert_eq!(
@@ -444,13 +455,21 @@ fn val_the_score_counts_what_it_says() {
     let scores = score_pairs(&cases);
     assert_eq!((scores.failed, scores.counts), (1, [0, 2, 0, 0]));
     assert_eq!((scores.first_right.hits, scores.first_right.of), (1, 1));
-    // Dealt out, the answer goes to itself or to the pair that it is wrong for.
-    let shares = (0..20).map(|seed| PairConduct::default().mutated(&cases, seed).shuffled);
-    let shares: Vec<_> = shares.collect();
-    assert!(
-        shares.contains(&Some(0.0)) && shares.contains(&Some(1.0)),
-        "{shares:?}"
-    );
+    // Dealt out, each answer goes to a pair that it is wrong for; one pair has no other.
+    let right = |cause: &str, kind| {
+        let found = answer(VerdictKind::NoChange, &[], &[(kind, "kt", [-0.2, 0.0])]);
+        (truth(&[(cause, joint)], true), found)
+    };
+    let cases = [
+        right("joint-change", JointChange),
+        right("modulus", Modulus),
+        right("added-mass", AddedMass),
+    ];
+    let shuffled = |cases: &[PairCase], seed| PairConduct::default().mutated(cases, seed).shuffled;
+    for seed in 0..20 {
+        assert_eq!(shuffled(&cases, seed), Some(0.0), "{seed}");
+        assert_eq!(shuffled(&cases[..1], seed), None, "{seed}");
+    }
 }
 
 // ---------------------------------------------------------------- the program

@@ -1,11 +1,13 @@
 //! What changes between two virtual tests of one structure, and how far the set-up scatters from test to test.
 
 use super::laboratory::SimulateError;
+use super::plan::TestPlan;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use tapjoint_beam::Assembly;
 use tapjoint_beam::effects::{Effect, EffectId, scale_joint};
 use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_description::{RecordingDescription, TestDescription};
@@ -88,33 +90,96 @@ pub(super) fn all_effects(effects: &[Effect], changes: &[Change]) -> Vec<Effect>
     all
 }
 
-/// Refuses changes that would change nothing.
-pub(super) fn check_changes(
-    test: &TestDescription,
-    changes: &[Change],
-) -> Result<(), SimulateError> {
-    for change in changes {
-        let Change::LostMass { item } = change else {
-            continue;
-        };
-        let sensors = test.sensors.iter();
-        let weighed = sensors.filter(|sensor| sensor.mass.is_some_and(|mass| mass > 0.0));
-        let mut known: Vec<&str> = weighed.map(|sensor| sensor.name.as_str()).collect();
-        for recording in &test.recordings {
-            known.extend(recording.mass_names.iter().flatten().map(String::as_str));
-        }
-        known.sort_unstable();
-        known.dedup();
-        if !known.contains(&item.as_str()) {
-            let known = match known.is_empty() {
-                true => "nothing with a name and a mass".to_owned(),
-                false => known.join(", "),
-            };
-            let item = item.clone();
-            return Err(SimulateError::NoItem { item, known });
+/// Refuses changes that would change no natural frequency. The truth would not be true.
+pub(super) fn check_changes(plan: &TestPlan<'_>) -> Result<(), SimulateError> {
+    let test = plan.description;
+    for (index, change) in plan.changes.iter().enumerate() {
+        match change {
+            Change::Joint { kt: 0.0, kr: 0.0 } => {
+                return Err(SimulateError::NoSize {
+                    change: Change::JOINT,
+                    parameters: "kt or kr".to_owned(),
+                });
+            }
+            Change::Joint { .. } => {}
+            Change::LostMass { item } => {
+                if plan.changes[..index].contains(change) {
+                    return Err(SimulateError::LostTwice { item: item.clone() });
+                }
+                check_item(test, item)?;
+            }
+            Change::Effect(effect) => check_effect(plan, effect)?,
         }
     }
     Ok(())
+}
+
+fn check_item(test: &TestDescription, item: &str) -> Result<(), SimulateError> {
+    let mut known = weighed_sensors(test);
+    for recording in &test.recordings {
+        known.extend(recording.mass_names.iter().flatten().map(String::as_str));
+    }
+    known.sort_unstable();
+    known.dedup();
+    if known.contains(&item) {
+        return Ok(());
+    }
+    Err(SimulateError::NoItem {
+        item: item.to_owned(),
+        known: listed(&known),
+    })
+}
+
+fn check_effect(plan: &TestPlan<'_>, effect: &Effect) -> Result<(), SimulateError> {
+    let (test, id) = (plan.description, effect.id);
+    let sizes = id.size_parameters();
+    if !sizes.is_empty() && sizes.iter().all(|name| effect.value(name) == Some(0.0)) {
+        return Err(SimulateError::NoSize {
+            change: id.name(),
+            parameters: sizes.join(" or "),
+        });
+    }
+    if id == EffectId::AxialLoad && test.joint.kind != Assembly::Cantilever {
+        return Err(SimulateError::NoLoad);
+    }
+    if id == EffectId::SensorPosition
+        && let Some(sensor) = moved_sensor(test, effect)
+    {
+        if is_lost(Some(sensor), plan.changes) {
+            let sensor = sensor.to_owned();
+            return Err(SimulateError::LostAndMoved { sensor });
+        }
+        let mut effects = plan.effects.iter();
+        let weighed = weighed_sensors(test);
+        if !weighed.contains(&sensor) && effects.all(|one| one.id != EffectId::SensorMass) {
+            return Err(SimulateError::WeighsNothing {
+                sensor: sensor.to_owned(),
+                known: listed(&weighed),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the name of the sensor that an effect moves; `None` where the test has none of that number.
+pub(super) fn moved_sensor<'a>(test: &'a TestDescription, effect: &Effect) -> Option<&'a str> {
+    let number = effect.value("sensor")?;
+    let mut numbered = (1..).zip(&test.sensors);
+    let (_, sensor) = numbered.find(|(own, _)| f64::from(*own) == number)?;
+    Some(&sensor.name)
+}
+
+fn weighed_sensors(test: &TestDescription) -> Vec<&str> {
+    let sensors = test.sensors.iter();
+    let weighed = sensors.filter(|sensor| sensor.mass.is_some_and(|mass| mass > 0.0));
+    weighed.map(|sensor| sensor.name.as_str()).collect()
+}
+
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => "nothing with a name and a mass".to_owned(),
+        names => names.join(", "),
+    }
 }
 
 /// Returns the recording without the fastened masses that are lost.

@@ -83,7 +83,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    check_changes(test, plan.changes)?;
+    check_changes(plan)?;
     let effects = all_effects(plan.effects, plan.changes);
     let plan = &TestPlan {
         effects: &effects,

@@ -20,6 +20,18 @@ use tapjoint::study::change_check::{
 const MASS: &str = "[[recording.mass]]\nname = \"L1\"\nposition = 0.2\nmass = \"20 g\"\n";
 const STRIP: &str = tapped_strip!("[[recording]]\nfile = \"taps.wav\"\ntap = 0.3\n");
 
+/// A second sensor.
+const WEIGHED: &str =
+    "[[sensor]]\nname = \"W\"\nchannel = 3\nposition = \"200 mm\"\nmass = \"8 g\"\n";
+
+fn without_joint(text: &str, kind: &str) -> String {
+    let lines = text.lines();
+    let left = lines.filter(|line| !line.starts_with("kt") && !line.starts_with("kr"));
+    left.collect::<Vec<_>>()
+        .join("\n")
+        .replace("cantilever", kind)
+}
+
 fn planned(
     text: &str,
     changes: &[Change],
@@ -103,18 +115,103 @@ fn limit_changes_of_what_is_not_there_are_refused() {
     };
     let error = planned(&format!("{STRIP}{MASS}"), &[gone], &[], 0.0, 1).unwrap_err();
     assert!(error.to_string().contains("L1"), "{error}");
-    let free = STRIP
-        .lines()
-        .filter(|line| !line.starts_with("kt") && !line.starts_with("kr"))
-        .collect::<Vec<_>>()
-        .join("\n")
-        .replace("cantilever", "free");
+    let free = without_joint(STRIP, "free");
     let joint = Change::Joint { kt: 0.0, kr: 0.1 };
     let error = planned(&free, &[joint], &[], 0.0, 1).unwrap_err();
     assert!(
         matches!(error, SimulateError::NoSpring { key: "kr" }),
         "{error}"
     );
+}
+
+#[test]
+fn limit_changes_that_change_nothing_are_refused() {
+    let weighed =
+        format!("{STRIP}{MASS}").replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    let light = format!("{STRIP}{MASS}");
+    let free = without_joint(&weighed, "free");
+    let lost = |item: &str| Change::LostMass {
+        item: item.to_owned(),
+    };
+    let moved = |offset, sensor| {
+        let values = [("offset", offset), ("sensor", sensor)];
+        Change::Effect(effect(EffectId::SensorPosition, &values))
+    };
+    let sized = |id, name, size| Change::Effect(effect(id, &[(name, size)]));
+    let placed = |id, name| Change::Effect(effect(id, &[(name, 0.0), ("position", 0.1)]));
+    let cases = [
+        (
+            &weighed,
+            vec![Change::Joint { kt: 0.0, kr: 0.0 }],
+            "give kt or kr a value other than 0",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::Modulus, "relative", 0.0)],
+            "give relative a value",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::Length, "relative", 0.0)],
+            "give relative a value",
+        ),
+        (
+            &weighed,
+            vec![sized(EffectId::AxialLoad, "force", 0.0)],
+            "give force a value",
+        ),
+        (
+            &weighed,
+            vec![placed(EffectId::AddedMass, "mass")],
+            "give mass a value",
+        ),
+        (
+            &weighed,
+            vec![placed(EffectId::LocalCrack, "compliance")],
+            "give compliance a value",
+        ),
+        (&weighed, vec![moved(0.0, 2.0)], "give offset a value"),
+        (
+            &weighed,
+            vec![moved(0.05, 1.0)],
+            "sensor that weighs (the description names: W)",
+        ),
+        (
+            &light,
+            vec![moved(0.05, 1.0)],
+            "nothing with a name and a mass",
+        ),
+        (
+            &weighed,
+            vec![lost("L1"), lost("W"), lost("L1")],
+            "\"L1\" is lost twice",
+        ),
+        (
+            &weighed,
+            vec![lost("W"), moved(0.05, 2.0)],
+            "\"W\" is lost by another change",
+        ),
+        (
+            &weighed,
+            vec![moved(0.05, 2.0), lost("W")],
+            "\"W\" is lost by another change",
+        ),
+        (
+            &free,
+            vec![sized(EffectId::AxialLoad, "force", 9.0)],
+            "on a cantilever",
+        ),
+    ];
+    for (text, changes, words) in cases {
+        let error = planned(text, &changes, &[], 0.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(words), "{changes:?}: {error}");
+    }
+    planned(&weighed, &[moved(0.05, 2.0), lost("L1")], &[], 0.0, 1).unwrap();
+    // A mass that the description leaves out moves, too.
+    let mass = effect(EffectId::SensorMass, &[("mass", 0.01)]);
+    planned(&light, &[moved(0.05, 1.0)], &[mass], 0.0, 1).unwrap();
 }
 
 #[test]
@@ -289,6 +386,7 @@ fn val_the_score_counts_what_it_says() {
         ("first_right_visible", (1, 1)),
         ("kt_interval", (1, 1)),
         ("list_holds", (1, 1)),
+        ("list_holds_or_unknown", (1, 1)),
         ("named", (1, 1)),
         ("named_right", (1, 1)),
         ("named_wrongly", (0, 1)),
@@ -320,7 +418,10 @@ fn val_the_score_counts_what_it_says() {
     let scored = rates(&[(lost.clone(), found)]);
     assert_eq!(scored["first_right"], (1, 1));
     assert_eq!(scored["item_right"], (0, 1));
-    assert_eq!((scored["named"], scored["list_holds"]), ((0, 1), (1, 1)));
+    assert_eq!(scored["named"], (0, 1));
+    // The list has the modulus and unknown, but no mass.
+    let lists = [scored["list_holds"], scored["list_holds_or_unknown"]];
+    assert_eq!(lists, [(0, 1), (1, 1)]);
     let found = answer(
         VerdictKind::NoChange,
         &[],
@@ -330,6 +431,13 @@ fn val_the_score_counts_what_it_says() {
     assert_eq!(scored["first_right"], (1, 1));
     assert_eq!(scored["list_holds"], (0, 1));
     assert_eq!(scored.get("item_right"), None);
+    // Outside of the causes, unknown is what the answer should say.
+    let bed = truth(&[("bed", joint)], true);
+    for (kind, hits) in [(VerdictKind::Unknown, 1), (VerdictKind::NoChange, 0)] {
+        let scored = rates(&[(bed.clone(), answer(kind, &[], &[]))]);
+        assert_eq!(scored["list_holds"], (hits, 1), "{kind:?}");
+        assert_eq!(scored["list_holds_or_unknown"], (hits, 1), "{kind:?}");
+    }
     // Two changes: one of them is enough.
     let two = truth(&[("modulus", joint), ("joint-change", joint)], true);
     assert_eq!(
@@ -347,13 +455,21 @@ fn val_the_score_counts_what_it_says() {
     let scores = score_pairs(&cases);
     assert_eq!((scores.failed, scores.counts), (1, [0, 2, 0, 0]));
     assert_eq!((scores.first_right.hits, scores.first_right.of), (1, 1));
-    // Dealt out, the answer goes to itself or to the pair that it is wrong for.
-    let shares = (0..20).map(|seed| PairConduct::default().mutated(&cases, seed).shuffled);
-    let shares: Vec<_> = shares.collect();
-    assert!(
-        shares.contains(&Some(0.0)) && shares.contains(&Some(1.0)),
-        "{shares:?}"
-    );
+    // Dealt out, each answer goes to a pair that it is wrong for; one pair has no other.
+    let right = |cause: &str, kind| {
+        let found = answer(VerdictKind::NoChange, &[], &[(kind, "kt", [-0.2, 0.0])]);
+        (truth(&[(cause, joint)], true), found)
+    };
+    let cases = [
+        right("joint-change", JointChange),
+        right("modulus", Modulus),
+        right("added-mass", AddedMass),
+    ];
+    let shuffled = |cases: &[PairCase], seed| PairConduct::default().mutated(cases, seed).shuffled;
+    for seed in 0..20 {
+        assert_eq!(shuffled(&cases, seed), Some(0.0), "{seed}");
+        assert_eq!(shuffled(&cases[..1], seed), None, "{seed}");
+    }
 }
 
 // ---------------------------------------------------------------- the program

@@ -26,18 +26,20 @@ pub struct PairConduct {
     pub commitment: Option<String>,
     /// Pairs that were compared again under other names of their files, with the same answer.
     pub renamed: usize,
-    /// Share of first causes right by answers dealt out to other pairs; `None` without a pair with one change.
+    /// Share of first causes right by answers dealt out to other pairs; `None` of one pair, and without a pair with one change.
     pub shuffled: Option<f64>,
 }
 
 impl PairConduct {
-    /// Adds what the answers earn once they are dealt out to other pairs.
+    /// Adds what the answers earn once they are dealt out to other pairs: each goes to the next pair of a shuffled order, so
+    /// that none stays where it was.
     pub fn mutated(self, cases: &[PairCase], seed: u64) -> Self {
         let mut order: Vec<usize> = (0..cases.len()).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-        let dealt = cases.iter().zip(order);
+        let next = order.iter().cycle().skip(1);
+        let dealt = order.iter().zip(next).filter(|(to, from)| to != from);
         let dealt: Vec<PairCase> = dealt
-            .map(|((truth, _), from)| (truth.clone(), cases[from].1.clone()))
+            .map(|(to, from)| (cases[*to].0.clone(), cases[*from].1.clone()))
             .collect();
         Self {
             shuffled: score_pairs(&dealt).first_right.value(),
@@ -80,8 +82,10 @@ pub struct PairScores {
     pub named_right: Rate,
     /// All pairs: a wrong name, which any name is where nothing changed or something outside of the causes.
     pub named_wrongly: Rate,
-    /// Visible changes: the name, the group or the list has a right cause; `unknown` is right for all.
+    /// Visible changes: the name, the group or the list has a right cause. For one outside of the causes it is `unknown`.
     pub list_holds: Rate,
+    /// `list_holds`, where `unknown` is right for all.
+    pub list_holds_or_unknown: Rate,
     /// Nothing: named, unknown, or a list without `no-change`.
     pub nothing_called_change: Rate,
     /// Outside of the causes: named.
@@ -154,15 +158,15 @@ impl Answered<'_> {
     }
 
     fn list_holds(&self) -> bool {
-        match self.verdict().kind {
-            VerdictKind::NoChange => false,
-            VerdictKind::Unknown => true,
-            _ => self
-                .verdict()
-                .effects
-                .iter()
-                .any(|kind| self.is_right(*kind) || *kind == CauseKind::Unknown),
+        match self.truth.kind() {
+            PairKind::Outside => self.says_unknown(),
+            _ => self.name_is_right(),
         }
+    }
+
+    fn says_unknown(&self) -> bool {
+        let verdict = self.verdict();
+        verdict.kind == VerdictKind::Unknown || verdict.effects.contains(&CauseKind::Unknown)
     }
 
     /// Returns true where the item of the right first cause is right; `None` where none is about an item.
@@ -224,6 +228,10 @@ pub fn score_pairs(cases: &[PairCase]) -> PairScores {
         named_right: Rate::of(&single, |one| one.is_named().then(|| one.name_is_right())),
         named_wrongly: Rate::of(&all, |one| Some(one.is_named() && !one.name_is_right())),
         list_holds: Rate::of(&all, |one| one.is_visible().then(|| one.list_holds())),
+        list_holds_or_unknown: Rate::of(&all, |one| {
+            one.is_visible()
+                .then(|| one.list_holds() || one.says_unknown())
+        }),
         nothing_called_change: Rate::of(&nothing, |one| Some(one.is_called_change())),
         outside_named: Rate::of(&outside, |one| Some(one.is_named())),
         outside_unknown: Rate::of(&outside, |one| {
@@ -267,6 +275,11 @@ pub fn pair_rows(scores: &PairScores) -> Vec<Row> {
         ),
         ("named_wrongly", "any pair: a wrong name", s.named_wrongly),
         ("list_holds", "visible: the answer holds it", s.list_holds),
+        (
+            "list_holds_or_unknown",
+            "the same, or says unknown",
+            s.list_holds_or_unknown,
+        ),
         (
             "nothing_called_change",
             "nothing: called a change",

@@ -379,6 +379,11 @@ pub(super) fn checksum_list(earlier: &str, new: &[(PathBuf, PathBuf)]) -> io::Re
         .collect())
 }
 
+/// Returns the names of the files in a list of checksums.
+pub(super) fn listed_files(list: &str) -> Vec<String> {
+    checksums(list).into_keys().collect()
+}
+
 /// Returns checksums by file name; empty if one line has another form.
 fn checksums(list: &str) -> BTreeMap<String, String> {
     let lines = list.lines().map(|line| {

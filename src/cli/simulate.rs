@@ -3,8 +3,8 @@
 use super::Outcome;
 use super::arguments::{StiffnessArguments, repeatability};
 use super::input::{effect_at, read_model};
-use super::laboratory::{LaboratoryArguments, laboratory_lines, within};
-use super::overwrite::{CHECKSUMS, Expanded};
+use super::laboratory::{LaboratoryArguments, laboratory_lines};
+use super::overwrite::{CHECKSUMS, Expanded, listed_files};
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
@@ -24,9 +24,10 @@ use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
 use tapjoint::report::wrapped;
 use tapjoint::simulate::{
-    Change, ChangeTruth, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest,
-    nominal_description, plan_test, truth_of, wav_name,
+    Change, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest, nominal_description,
+    plan_test, truth_of, wav_name,
 };
+use tapjoint::study::change_check::PlantedChange;
 use tapjoint::study::updated_model::described_effects;
 
 const EXAMPLES: &str = "Examples:
@@ -172,7 +173,16 @@ fn joint_change(parameters: &str) -> Result<Change, String> {
             }
         };
         let [lowest, highest] = JOINT_CHANGE;
-        let value = within(Dimension::Ratio, lowest, highest)(value.trim())?;
+        let value = parse_quantity(value.trim(), Dimension::Ratio)
+            .map_err(|error| format!("{}: {error}", key.trim()))?;
+        if !(lowest..=highest).contains(&value) {
+            return Err(format!(
+                "{}: give {} % to {} %",
+                key.trim(),
+                100.0 * lowest,
+                100.0 * highest
+            ));
+        }
         if size.replace(value).is_some() {
             return Err(format!(
                 "`joint-change` is given `{}` twice; give it once",
@@ -265,6 +275,16 @@ pub(super) fn run(
         .with_context(|| format!("{}: cannot be read", file.name))?;
     let given = arguments.stiffness.given(file.test.joint.kind)?;
     let laboratory = arguments.laboratory.resolve()?;
+    if !arguments.changes.is_empty() {
+        for place in SIDES.map(|side| arguments.out.join(side)) {
+            if place.exists() && !place.is_dir() {
+                bail!(
+                    "{}: is a file, but a folder is needed for one of the two tests; move it away, or give another --out",
+                    place.display()
+                );
+            }
+        }
+    }
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
     let mut effects =
         described_effects(&file.test).map_err(|error| effect_at(&file.name, &error))?;
@@ -290,10 +310,12 @@ pub(super) fn run(
     if !arguments.no_truth {
         output.add(TRUTH, &lines_of(&serde_json::to_value(&made.truth)?)?)?;
     }
-    let folder = output.publish()?;
-    terminal.say(&summary(&made.truth, &made.test, &folder))?;
+    let stale = earlier_files(&output);
+    let (folder, left) = output.publish_without(stale)?;
+    let nothing = "Nothing planted: the description is the truth";
+    terminal.say(&summary(&made, &folder, nothing))?;
     terminal.write_json(&serde_json::json!({ "truth": made.truth }))?;
-    Ok(Outcome::Answered)
+    left.map_or(Ok(Outcome::Answered), Err)
 }
 
 /// Makes the tests before and after a change.
@@ -323,7 +345,11 @@ fn run_pair(
         fs::create_dir_all(output.place_of(side))?;
     }
     record(&made, plan.laboratory, &output, &terminal)?;
-    let changes: Vec<ChangeTruth> = arguments.changes.iter().map(Change::truth).collect();
+    let changes: Vec<PlantedChange> = arguments
+        .changes
+        .iter()
+        .map(|change| PlantedChange::of_test(change, plan.description))
+        .collect();
     let [before, after] = &made;
     let truth = serde_json::json!({
         "version": before.truth.version,
@@ -337,8 +363,10 @@ fn run_pair(
     if !arguments.no_truth {
         output.add(TRUTH, &lines_of(&truth)?)?;
     }
-    let folder = output.publish()?;
-    let mut text = summary(&before.truth, &before.test, &folder.join(SIDES[0]));
+    let stale = earlier_files(&output);
+    let (folder, left) = output.publish_without(stale)?;
+    let nothing = "Nothing planted before the change";
+    let mut text = summary(before, &folder.join(SIDES[0]), nothing);
     let _ = writeln!(
         text,
         "\nAfter the change, in {}\n",
@@ -346,15 +374,42 @@ fn run_pair(
     );
     text.push_str(&recording_lines(&after.truth, &after.test));
     for change in changes {
-        let mut values: Vec<String> = change.item.into_iter().collect();
         let sizes = change.parameters.iter();
-        values.extend(sizes.map(|(name, value)| format!("{name} {value}")));
+        let sizes = sizes.map(|(name, value)| match name.as_str() {
+            "kt" | "kr" | "relative" => format!("{name} {} %", percent(*value)),
+            "mass" => format!("{name} {value} kg"),
+            "position" | "sensor_shift" => format!("{name} {value} m"),
+            "force" => format!("{name} {value} N"),
+            _ => format!("{name} {value}"),
+        });
+        let values: Vec<String> = change.item.iter().cloned().chain(sizes).collect();
         let line = format!("Changed: {} ({})", change.cause, values.join(", "));
         text.push_str(&with_minus_signs(&wrapped(&line, 2)));
     }
+    let scatter = percent(plan.repeatability);
+    let _ = writeln!(text, "Repeatability: {scatter} %");
     terminal.say(&text)?;
     terminal.write_json(&serde_json::json!({ "truth": truth }))?;
-    Ok(Outcome::Answered)
+    left.map_or(Ok(Outcome::Answered), Err)
+}
+
+/// Returns a relative value in percent, without digits that the computer adds.
+fn percent(value: f64) -> f64 {
+    (1e8 * value).round() / 1e6
+}
+
+/// Returns the files of earlier virtual tests in the folder, of one test or of a pair.
+fn earlier_files(output: &OutputFolder) -> Vec<String> {
+    let list = output.earlier(CHECKSUMS).unwrap_or_default();
+    let mut files = listed_files(&list);
+    files.retain(|name| {
+        let own = SIDES
+            .iter()
+            .find_map(|side| name.strip_prefix(side)?.strip_prefix('/'))
+            .unwrap_or(name);
+        !own.contains('/') && (own == DESCRIPTION || own == TRUTH || own.ends_with(".wav"))
+    });
+    files
 }
 
 /// A description as it was read.
@@ -556,8 +611,9 @@ fn recording_lines(truth: &Truth, test: &VirtualTest) -> String {
     text
 }
 
-/// Describes the virtual test: recordings, joint, planted effects and laboratory.
-fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
+/// Describes the virtual test: recordings, joint, planted effects, in the words `nothing` if there are none, and laboratory.
+fn summary(made: &Made, folder: &Path, nothing: &str) -> String {
+    let (truth, test) = (&made.truth, &made.test);
     let mut text = format!(
         "Virtual test of \"{}\" in {}\n\n",
         truth.name,
@@ -578,7 +634,7 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
         let _ = write!(text, "\n{}", wrapped(&line, 2));
     }
     if truth.effects.is_empty() {
-        text.push_str("Nothing planted: the description is the truth\n");
+        let _ = writeln!(text, "{nothing}");
     }
     for effect in &truth.effects {
         let id = EffectId::ALL.iter().find(|id| id.name() == effect.effect);

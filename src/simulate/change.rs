@@ -5,8 +5,6 @@ use super::plan::TestPlan;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde::Serialize;
-use std::collections::BTreeMap;
 use tapjoint_beam::Assembly;
 use tapjoint_beam::effects::{Effect, EffectId, scale_joint};
 use tapjoint_beam::specimen::{PointMass, Specimen};
@@ -31,18 +29,6 @@ pub enum Change {
     Effect(Effect),
 }
 
-/// A change as `truth.json` has it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChangeTruth {
-    /// Name of the cause.
-    pub cause: String,
-    /// Name of the item that it is about.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub item: Option<String>,
-    /// Sizes and places by name (SI, or relative to 1).
-    pub parameters: BTreeMap<String, f64>,
-}
-
 impl Change {
     /// Effects of the catalogue that may come between two tests.
     pub const EFFECTS: [EffectId; 6] = [
@@ -57,26 +43,6 @@ impl Change {
     pub const JOINT: &'static str = "joint-change";
     /// Name of a loss.
     pub const LOST_MASS: &'static str = "lost-mass";
-
-    /// Returns it as a truth file has it.
-    pub fn truth(&self) -> ChangeTruth {
-        let (cause, item, parameters) = match self {
-            Self::Joint { kt, kr } => (Self::JOINT, None, vec![("kt", *kt), ("kr", *kr)]),
-            Self::LostMass { item } => (Self::LOST_MASS, Some(item.clone()), Vec::new()),
-            Self::Effect(effect) => {
-                let values = effect.values().map(|(info, value)| (info.name, value));
-                (effect.id.name(), None, values.collect())
-            }
-        };
-        let parameters = parameters.into_iter();
-        ChangeTruth {
-            cause: cause.to_owned(),
-            item,
-            parameters: parameters
-                .map(|(name, value)| (name.to_owned(), value))
-                .collect(),
-        }
-    }
 }
 
 /// Returns the effects of a test with those of its changes.
@@ -162,7 +128,7 @@ fn check_effect(plan: &TestPlan<'_>, effect: &Effect) -> Result<(), SimulateErro
 }
 
 /// Returns the name of the sensor that an effect moves; `None` where the test has none of that number.
-pub(super) fn moved_sensor<'a>(test: &'a TestDescription, effect: &Effect) -> Option<&'a str> {
+pub fn moved_sensor<'a>(test: &'a TestDescription, effect: &Effect) -> Option<&'a str> {
     let number = effect.value("sensor")?;
     let mut numbered = (1..).zip(&test.sensors);
     let (_, sensor) = numbered.find(|(own, _)| f64::from(*own) == number)?;

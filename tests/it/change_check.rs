@@ -62,11 +62,6 @@ fn prop_a_change_is_the_structure_described_so() {
     let with_mass = format!("{STRIP}{MASS}");
     let description = described(STRIP);
     let (kt, kr) = (description.joint.kt.unwrap(), description.joint.kr.unwrap());
-    let added = effect(EffectId::AddedMass, &[("mass", 0.01), ("position", 0.3)]);
-    let crack = effect(
-        EffectId::LocalCrack,
-        &[("compliance", 0.02), ("position", 0.1)],
-    );
     let mut softer = String::new();
     for line in STRIP.lines() {
         let line = match line.split_once(" = ") {
@@ -81,20 +76,35 @@ fn prop_a_change_is_the_structure_described_so() {
         item: "L1".to_owned(),
     };
     let joint = Change::Joint { kt: -0.1, kr: 0.05 };
+    let planted = |id, values: &[(&str, f64)]| Change::Effect(effect(id, values));
+    let added = planted(EffectId::AddedMass, &[("mass", 0.02), ("position", 0.2)]);
+    let added_text = with_mass.clone();
+    let modulus = planted(EffectId::Modulus, &[("relative", 0.02)]);
+    let modulus_before = format!("modulus = {:?}", description.beam.modulus);
+    let stiffer = STRIP.lines().map(|line| match line.starts_with("modulus") {
+        true => format!("modulus = {:?}\n", 1.02 * description.beam.modulus),
+        false => format!("{line}\n"),
+    });
+    let stiffer: String = stiffer.collect();
+    assert!(!stiffer.contains(&modulus_before));
+    let weighed = STRIP.replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    let moved = planted(
+        EffectId::SensorPosition,
+        &[("offset", 0.05), ("sensor", 2.0)],
+    );
+    let moved_text = weighed.replace("200 mm", "250 mm");
     let cases = [
-        (with_mass.as_str(), vec![lost], STRIP, vec![]),
-        (STRIP, vec![joint], softer.as_str(), vec![]),
-        (
-            STRIP,
-            vec![Change::Effect(added.clone()), Change::Effect(crack.clone())],
-            STRIP,
-            vec![added, crack],
-        ),
+        (with_mass.as_str(), vec![lost], STRIP),
+        (STRIP, vec![joint], softer.as_str()),
+        (STRIP, vec![added], added_text.as_str()),
+        (STRIP, vec![modulus], stiffer.as_str()),
+        (weighed.as_str(), vec![moved], moved_text.as_str()),
     ];
-    for (text, changes, other, effects) in cases {
+    for (text, changes, other) in cases {
         let changed = frequencies(&planned(text, &changes, &[], 0.0, 1).unwrap());
-        let same = frequencies(&planned(other, &[], &effects, 0.0, 1).unwrap());
+        let same = frequencies(&planned(other, &[], &[], 0.0, 1).unwrap());
         let unchanged = frequencies(&planned(text, &[], &[], 0.0, 1).unwrap());
+        assert_eq!([changed.len(), same.len()], [5, 5], "{changes:?}");
         for (mode, (a, b)) in changed.iter().zip(&same).enumerate() {
             assert!(
                 (a / b - 1.0).abs() < 1e-12,
@@ -236,6 +246,24 @@ fn prop_frequencies_of_two_tests_differ_by_the_repeatability() {
 }
 
 #[test]
+fn prop_modes_of_a_test_share_a_quarter_of_the_scatter() {
+    const TESTS: u64 = 200;
+    let still = frequencies(&planned(STRIP, &[], &[], 0.0, 0).unwrap());
+    let (mut variance, mut covariance) = (0.0, 0.0);
+    for seed in 0..TESTS {
+        let test = frequencies(&planned(STRIP, &[], &[], 1e-3, seed).unwrap());
+        let logs: Vec<f64> = test.iter().zip(&still).map(|(a, b)| (a / b).ln()).collect();
+        let sum: f64 = logs.iter().sum();
+        let squares: f64 = logs.iter().map(|log| log * log).sum();
+        variance += squares / 5.0;
+        covariance += (sum * sum - squares) / 20.0;
+    }
+    let share = covariance / variance;
+    // The mean of ten correlations over 200 tests has a standard deviation of about 0.04.
+    assert!((share - 0.25).abs() < 0.12, "{share}");
+}
+
+#[test]
 fn prop_a_campaign_deals_out_all_classes_and_hides_them_in_the_description() {
     let campaign = PairCampaign {
         pairs: 14,
@@ -282,6 +310,29 @@ fn val_truths_are_read_as_they_are_written() {
     let read = parse_pair_truths(unknown).unwrap();
     assert!(read.doubts[0].contains("joint-change"), "{:?}", read.doubts);
     assert_eq!(read.truths[0].kind(), PairKind::Outside);
+    let slips = r#"[{"name": "a", "seen": true, "changes": [
+        {"cause": "sensor-position", "parameters": {"offset": 0.01}},
+        {"cause": "modulus", "item": "A", "size": 1, "parameters": {"relativ": 0.01}}]}]"#;
+    let doubts = parse_pair_truths(slips).unwrap().doubts.join("\n");
+    for words in [
+        "key `seen` is not known",
+        "key `size` is not known",
+        "`offset` is no parameter of `sensor-position` and is left out; allowed: sensor_shift",
+        "`relativ` is no parameter of `modulus`",
+        "`sensor-position` has no `item`",
+        "`modulus` is about no item",
+        "no pair says whether its change is `visible`",
+    ] {
+        assert!(doubts.contains(words), "{words}: {doubts}");
+    }
+    let wrong = r#"[{"name": "a", "changes": [], "visible": 3}]"#;
+    let error = parse_pair_truths(wrong).unwrap_err().to_string();
+    assert!(
+        !error.contains("no list")
+            && error.contains("\"item\"")
+            && error.contains("\"repeatability\""),
+        "{error}"
+    );
     for (text, words) in [
         ("{}", "no list of truths"),
         (r#"[{"name": "a"}]"#, "missing field `changes`"),
@@ -543,12 +594,16 @@ fn prop_kept_pairs_are_what_was_sealed_and_score_the_same_again() {
     assert!(first.contains(&seal), "{first}");
     let file = |out: &str, name: &str| fs::read(folder.path().join(out).join(name)).unwrap();
     let before = ["cases.csv", "score.json"].map(|name| file("blind-check", name));
+    // A picture of a check of the diagnosis, made by tapjoint.
+    let stale = folder.path().join("blind-check/reliability.png");
+    fs::copy(folder.path().join("blind-check/confusion.png"), &stale).unwrap();
     // Again over its own files, with other threads.
     run(
         folder.path(),
         &[&drawn[..], &["--keep", "kept", "--threads", "2"]].concat(),
     );
     let after = ["cases.csv", "score.json"].map(|name| file("blind-check", name));
+    assert!(!stale.exists());
     assert!(
         before == after,
         "another number of threads changes the answers"
@@ -586,6 +641,88 @@ fn regress_pairs_that_cannot_be_compared_have_no_answer() {
 }
 
 #[test]
+fn regress_a_moved_sensor_is_scored_and_the_summary_says_what_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let weighed = STRIP.replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    fs::write(folder.path().join("strip.toml"), weighed).unwrap();
+    let said = run(
+        folder.path(),
+        &[
+            "simulate",
+            "strip.toml",
+            "--out",
+            "pair",
+            "--change",
+            "sensor-position:offset=50mm,sensor=2",
+            "--change",
+            "joint-change:kt=-10%",
+            "--repeatability",
+            "0.1%",
+        ],
+    );
+    for words in [
+        "Nothing planted before the change",
+        "(W, sensor_shift 0.05 m)",
+        "(kr 0 %, kt \u{2212}10 %)",
+        "Repeatability: 0.1 %",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(!said.contains("is the truth"), "{said}");
+    let text = fs::read_to_string(folder.path().join("pair/truth.json")).unwrap();
+    let truth: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let list = serde_json::json!([{"name": "a", "changes": truth["changes"], "visible": true}]);
+    let read = parse_pair_truths(&list.to_string()).unwrap();
+    assert!(read.doubts.is_empty(), "{:?}", read.doubts);
+    let moved = &read.truths[0].changes[0];
+    assert_eq!(moved.item.as_deref(), Some("W"));
+    assert_eq!(moved.parameters["sensor_shift"], 0.05);
+}
+
+#[test]
+fn regress_a_folder_holds_the_last_virtual_test_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("strip.toml"), STRIP).unwrap();
+    let single = ["simulate", "strip.toml", "--out", "v"];
+    let pair = [&single[..], &["--change", "joint-change:kr=-5%"]].concat();
+    let has = |name: &str| folder.path().join("v").join(name).is_file();
+    run(folder.path(), &pair);
+    fs::write(folder.path().join("v/before/notes.txt"), "mine").unwrap();
+    assert!(has("before/taps.wav") && has("truth.json"));
+    run(folder.path(), &[&single[..], &["--no-truth"]].concat());
+    assert!(has("test.toml") && has("taps.wav") && has("before/notes.txt"));
+    for gone in [
+        "before/test.toml",
+        "before/taps.wav",
+        "after/test.toml",
+        "truth.json",
+    ] {
+        assert!(!has(gone), "{gone}");
+    }
+    run(folder.path(), &pair);
+    assert!(has("after/taps.wav") && !has("test.toml") && !has("taps.wav"));
+    fs::write(folder.path().join("strip.toml"), STRIP).unwrap();
+    fs::create_dir(folder.path().join("q")).unwrap();
+    fs::write(folder.path().join("q/before"), "").unwrap();
+    let mut command = Command::cargo_bin("tapjoint").unwrap();
+    let arguments = [
+        "simulate",
+        "strip.toml",
+        "--out",
+        "q",
+        "--change",
+        "joint-change:kr=-5%",
+    ];
+    command.current_dir(folder.path()).args(arguments);
+    let error = command.assert().code(2).get_output().stderr.clone();
+    let error = String::from_utf8(error).unwrap();
+    assert!(
+        error.contains("is a file, but a folder is needed"),
+        "{error}"
+    );
+}
+
+#[test]
 fn regress_bad_changes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("strip.toml"), STRIP).unwrap();
@@ -594,7 +731,7 @@ fn regress_bad_changes_are_refused() {
         ("joint-change:ktr=1%", "has no parameter `ktr`"),
         ("joint-change:kt=1%,kt=2%", "twice"),
         ("joint-change:kt", "has no value"),
-        ("joint-change:kt=-100%", "from -0.99 to 100"),
+        ("joint-change:kt=-100%", "kt: give -99 % to 10000 %"),
         ("lost-mass", "item=NAME"),
         ("lost-mass:item=L9", "nothing that weighs is named \"L9\""),
         ("density:relative=1%", "is no change between two tests"),

@@ -32,9 +32,20 @@ pub enum TruthError {
     /// No JSON list of pairs of tests.
     #[error(
         "this is no list of truths ({source}); write a JSON list of \
-         {{\"name\": \"...\", \"changes\": [{{\"cause\": \"...\", \"parameters\": {{...}}}}]}}, one for each pair of tests"
+         {{\"name\": \"...\", \"changes\": [{{\"cause\": \"...\", \"item\": \"...\", \"parameters\": {{...}}}}], \
+         \"visible\": true, \"repeatability\": 0.001}}, one for each pair of tests"
     )]
     PairShape {
+        /// The parser's message, with line and column.
+        source: serde_json::Error,
+    },
+    /// A list with an entry of another form.
+    #[error(
+        "{source}; write each pair as \
+         {{\"name\": \"...\", \"changes\": [{{\"cause\": \"...\", \"item\": \"...\", \"parameters\": {{...}}}}], \
+         \"visible\": true, \"repeatability\": 0.001}}; all but name, changes and cause may be left out"
+    )]
+    PairEntry {
         /// The parser's message, with line and column.
         source: serde_json::Error,
     },

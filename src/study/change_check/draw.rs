@@ -1,6 +1,6 @@
 //! Draws a structure, its description, and a change that comes between two tests.
 //!
-//! The description is wrong by its tolerances and by one effect that both tests share. Sizes are drawn from small to
+//! The description is wrong by its tolerances and, in four of five pairs, by one effect that both tests share. Sizes are drawn from small to
 //! large.
 
 use super::truth::PlantedChange;
@@ -260,7 +260,7 @@ pub fn structure(draw: &mut ChaCha8Rng, class: ChangeClass) -> Option<(Specimen,
     Some((specimen, items))
 }
 
-/// Draws the structure as it is: off by tolerances, and by one effect that the description lacks. The order of its masses is
+/// Draws the structure as it is: off by tolerances, and mostly by one effect that the description lacks. The order of its masses is
 /// that of the items.
 fn actual(draw: &mut ChaCha8Rng, described: &Specimen) -> Specimen {
     let mut truth = described.clone();

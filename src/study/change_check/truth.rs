@@ -7,8 +7,12 @@
 use super::draw::OUTSIDE;
 use crate::blind_check::TruthError;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
+use tapjoint_beam::effects::{Effect, EffectId};
 use tapjoint_compare::CauseKind;
+use tapjoint_description::TestDescription;
+use tapjoint_simulate::{Change, moved_sensor};
 
 /// Causes that a comparison may name.
 const CAUSES: [CauseKind; 8] = [
@@ -45,6 +49,44 @@ impl PlantedChange {
             item: None,
             parameters: BTreeMap::new(),
         }
+    }
+
+    /// Returns a change of this virtual test.
+    pub fn of_test(change: &Change, test: &TestDescription) -> Self {
+        match change {
+            Change::Joint { kt, kr } => {
+                let mut planted = Self::of(Some(CauseKind::JointChange));
+                planted.set(&[("kt", *kt), ("kr", *kr)]);
+                planted
+            }
+            Change::LostMass { item } => Self {
+                item: Some(item.clone()),
+                ..Self::of(Some(CauseKind::LostMass))
+            },
+            Change::Effect(effect) => Self::of_effect(effect, test),
+        }
+    }
+
+    fn of_effect(effect: &Effect, test: &TestDescription) -> Self {
+        let mut planted = Self {
+            cause: effect.id.name().to_owned(),
+            item: None,
+            parameters: BTreeMap::new(),
+        };
+        for (info, value) in effect.values() {
+            planted.set(&[(info.name, value)]);
+        }
+        if effect.id == EffectId::SensorPosition {
+            planted.item = moved_sensor(test, effect).map(str::to_owned);
+            let sizes = &mut planted.parameters;
+            sizes.remove("sensor");
+            if let Some(offset) = sizes.remove("offset") {
+                sizes.insert("sensor_shift".to_owned(), offset);
+            }
+            // 0 means all recordings.
+            sizes.retain(|name, value| !(name == "recording" && *value == 0.0));
+        }
+        planted
     }
 
     /// Adds sizes.
@@ -127,8 +169,10 @@ pub struct PairTruthFile {
 /// # Errors
 /// [`TruthError`] where the text is no such list, names a pair twice, or has a repeatability that no test has.
 pub fn parse_pair_truths(text: &str) -> Result<PairTruthFile, TruthError> {
-    let truths: Vec<PairTruth> =
+    let entries: Vec<Value> =
         serde_json::from_str(text).map_err(|source| TruthError::PairShape { source })?;
+    let truths: Vec<PairTruth> =
+        serde_json::from_str(text).map_err(|source| TruthError::PairEntry { source })?;
     let mut doubts = Vec::new();
     for (index, truth) in truths.iter().enumerate() {
         let name = &truth.name;
@@ -152,8 +196,75 @@ pub fn parse_pair_truths(text: &str) -> Result<PairTruthFile, TruthError> {
                 ));
             }
         }
+        let found = doubts_of(truth, &entries[index]).into_iter();
+        doubts.extend(found.map(|doubt| format!("\"{name}\": {doubt}")));
+    }
+    let mut changed = truths.iter().filter(|truth| !truth.changes.is_empty());
+    if changed.clone().next().is_some() && changed.all(|truth| truth.visible.is_none()) {
+        doubts.push(
+            "no pair says whether its change is `visible`, so that the figures of visible changes stay empty; add \
+             \"visible\": true or false where that is known"
+                .to_owned(),
+        );
     }
     Ok(PairTruthFile { truths, doubts })
+}
+
+/// Names what may be a slip of the pen: keys and parameters that are not used, and an item that is not named.
+fn doubts_of(truth: &PairTruth, entry: &Value) -> Vec<String> {
+    let mut doubts = unknown_keys(entry, &["name", "changes", "visible", "repeatability"]);
+    for (index, change) in truth.changes.iter().enumerate() {
+        let keys = unknown_keys(&entry["changes"][index], &["cause", "item", "parameters"]);
+        doubts.extend(keys);
+        // Changes outside of the causes have parameters of their own.
+        let Some(kind) = change.kind() else {
+            continue;
+        };
+        let cause = kind.name();
+        let allowed: &[&str] = match kind {
+            CauseKind::JointChange => &["kt", "kr"],
+            CauseKind::LostMass => &["mass"],
+            CauseKind::AddedMass => &["mass", "position"],
+            CauseKind::LocalCrack => &["compliance", "position"],
+            CauseKind::SensorPosition => &["sensor_shift", "recording"],
+            CauseKind::AxialLoad => &["force"],
+            _ => &["relative"],
+        };
+        let given = change.parameters.keys();
+        for name in given.filter(|name| !allowed.contains(&name.as_str())) {
+            doubts.push(format!(
+                "`{name}` is no parameter of `{cause}` and is left out; allowed: {}",
+                allowed.join(", ")
+            ));
+        }
+        let is_about_item = matches!(kind, CauseKind::LostMass | CauseKind::SensorPosition);
+        match change.item {
+            None if is_about_item => doubts.push(format!(
+                "`{cause}` has no `item`, so that the item of the answer is not scored; add the name of the sensor or mass"
+            )),
+            Some(_) if !is_about_item => doubts.push(format!(
+                "`{cause}` is about no item, so that `item` is left out; only lost-mass and sensor-position have one"
+            )),
+            _ => {}
+        }
+    }
+    doubts
+}
+
+fn unknown_keys(entry: &Value, known: &[&str]) -> Vec<String> {
+    let keys = entry
+        .as_object()
+        .into_iter()
+        .flat_map(|object| object.keys());
+    let unknown = keys.filter(|key| !known.contains(&key.as_str()));
+    unknown
+        .map(|key| {
+            format!(
+                "the key `{key}` is not known and is left out; known: {}",
+                known.join(", ")
+            )
+        })
+        .collect()
 }
 
 /// Returns the truths as a list, one line for each.

@@ -148,6 +148,7 @@ fn regress_titles_of_close_ups_have_the_change_and_where_it_was_read_best() {
         "mode 4: \u{2212}0.10 %, full.wav",
         "mode 5: +0.050 %, full.wav",
     ];
+    assert_eq!(titles.len(), expected.len(), "{titles:?}");
     for (title, expected) in titles.iter().zip(expected) {
         assert!(title.starts_with(expected), "{titles:?}");
     }

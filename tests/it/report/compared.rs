@@ -340,7 +340,7 @@ fn prop_a_report_on_a_comparison_has_its_files_alone() {
     let rows = text_of(&files, "changes.csv");
     assert_eq!(rows.lines().count(), 1 + CHANGES.len());
     assert!(
-        rows.contains("\n1,2,118.04,117.56784,-0.4,-0.3,0.05,"),
+        rows.contains("\n1,2,118.04,117.56784,-0.4,0,-0.3,0.05,"),
         "{rows}"
     );
 }

@@ -1,7 +1,6 @@
 //! `tapjoint blind-check`: the success rate of the diagnosis on tests with an unknown effect.
 
 use super::Outcome;
-use super::change_check;
 use super::input::{TestFile, read_test};
 use super::output::failed;
 use super::overwrite::{CHECKSUMS, Expanded};
@@ -46,7 +45,7 @@ pub(super) struct BlindCheckArguments {
     /// tolerances and, in four of five pairs, by one effect that both tests share. From test to test the natural frequencies scatter, by 0.01 to
     /// 0.4 %; half of the comparisons, at random, are told how much
     #[arg(long, conflicts_with_all = ["one_recording", "drift"])]
-    compare: bool,
+    pub(super) compare: bool,
     /// Number of virtual tests, or of pairs. Of 19 tests, 10 have one effect, 5 none, 2 two effects, and 2 an effect
     /// outside the catalogue
     #[arg(
@@ -167,9 +166,6 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    if arguments.compare {
-        return change_check::run(arguments, seed, terminal);
-    }
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
     let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,

@@ -182,6 +182,9 @@ fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outco
         Command::Plan(arguments) => plan::run(arguments, seed, terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, seed, terminal),
         Command::Compare(arguments) => compare::run(arguments, terminal),
+        Command::BlindCheck(arguments) if arguments.compare => {
+            change_check::run(arguments, seed, terminal)
+        }
         Command::BlindCheck(arguments) => blind_check::run(arguments, seed, terminal),
         Command::Resolution(arguments) => resolution::run(arguments, seed, terminal),
         Command::Reproduce(_) => program::print_reproduction(terminal),

@@ -36,6 +36,7 @@ pub mod words {
     pub(crate) mod sizes;
 }
 
+pub use charts::comparison_spectra::ComparedRecordings;
 pub use data_files::{
     render_changes_csv, render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
     render_perturbation_csv, render_series_csv, render_taps_csv,
@@ -46,9 +47,8 @@ pub use document::{
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
-    ComparedRecordings, MODEL_FILE, earlier_files, render_cloud_picture, render_compared,
-    render_comparison_picture, render_frf_picture, render_json, render_run, render_schema,
-    render_spectrum_picture,
+    MODEL_FILE, earlier_files, render_cloud_picture, render_compared, render_comparison_picture,
+    render_frf_picture, render_json, render_run, render_schema, render_spectrum_picture,
 };
 pub use text::{
     render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,

@@ -7,6 +7,7 @@ use serde_json::Value;
 use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint_signal::spectral::FrfEstimator;
 
+use crate::charts::comparison_spectra::ComparedRecordings;
 use crate::charts::diagnosis::{gap, place_map};
 use crate::charts::joint::{cloud, frequencies, shapes};
 use crate::charts::modes::{amplitude, stabilisation};
@@ -46,15 +47,6 @@ pub fn render_run(
         files.push(ReportFile::of("perturbation.csv", text));
     }
     Ok(files)
-}
-
-/// Recordings of the two tests whose spectra are shown over each other; empty where tests have none.
-#[derive(Debug, Clone, Default)]
-pub struct ComparedRecordings {
-    /// Those of the first test before.
-    pub before: Vec<RecordingResult>,
-    /// Those of the first test after.
-    pub after: Vec<RecordingResult>,
 }
 
 /// All files of a report on a comparison: `report.html`, `report.json`, and the pictures as PNG and as SVG. A comparison has

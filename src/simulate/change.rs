@@ -1,7 +1,6 @@
 //! What changes between two virtual tests of one structure, and how far the set-up scatters from test to test.
 
 use super::laboratory::SimulateError;
-use super::plan::TestPlan;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -45,21 +44,13 @@ impl Change {
     pub const LOST_MASS: &'static str = "lost-mass";
 }
 
-/// Returns the effects of a test with those of its changes.
-pub(super) fn all_effects(effects: &[Effect], changes: &[Change]) -> Vec<Effect> {
-    let mut all = effects.to_vec();
-    for change in changes {
-        if let Change::Effect(effect) = change {
-            all.push(effect.clone());
-        }
-    }
-    all
-}
-
 /// Refuses changes that would change no natural frequency. The truth would not be true.
-pub(super) fn check_changes(plan: &TestPlan<'_>) -> Result<(), SimulateError> {
-    let test = plan.description;
-    for (index, change) in plan.changes.iter().enumerate() {
+pub(super) fn check_changes(
+    test: &TestDescription,
+    effects: &[Effect],
+    changes: &[Change],
+) -> Result<(), SimulateError> {
+    for (index, change) in changes.iter().enumerate() {
         match change {
             Change::Joint { kt: 0.0, kr: 0.0 } => {
                 return Err(SimulateError::NoSize {
@@ -69,12 +60,15 @@ pub(super) fn check_changes(plan: &TestPlan<'_>) -> Result<(), SimulateError> {
             }
             Change::Joint { .. } => {}
             Change::LostMass { item } => {
-                if plan.changes[..index].contains(change) {
+                if changes[..index].contains(change) {
                     return Err(SimulateError::LostTwice { item: item.clone() });
                 }
                 check_item(test, item)?;
             }
-            Change::Effect(effect) => check_effect(plan, effect)?,
+            Change::Effect(effect) => {
+                check_effect(test, effect)?;
+                check_move(test, effects, changes, effect)?;
+            }
         }
     }
     Ok(())
@@ -96,8 +90,8 @@ fn check_item(test: &TestDescription, item: &str) -> Result<(), SimulateError> {
     })
 }
 
-fn check_effect(plan: &TestPlan<'_>, effect: &Effect) -> Result<(), SimulateError> {
-    let (test, id) = (plan.description, effect.id);
+fn check_effect(test: &TestDescription, effect: &Effect) -> Result<(), SimulateError> {
+    let id = effect.id;
     let sizes = id.size_parameters();
     if !sizes.is_empty() && sizes.iter().all(|name| effect.value(name) == Some(0.0)) {
         return Err(SimulateError::NoSize {
@@ -105,24 +99,35 @@ fn check_effect(plan: &TestPlan<'_>, effect: &Effect) -> Result<(), SimulateErro
             parameters: sizes.join(" or "),
         });
     }
-    if id == EffectId::AxialLoad && test.joint.kind != Assembly::Cantilever {
-        return Err(SimulateError::NoLoad);
+    match id == EffectId::AxialLoad && test.joint.kind != Assembly::Cantilever {
+        true => Err(SimulateError::NoLoad),
+        false => Ok(()),
     }
-    if id == EffectId::SensorPosition
-        && let Some(sensor) = moved_sensor(test, effect)
-    {
-        if is_lost(Some(sensor), plan.changes) {
-            let sensor = sensor.to_owned();
-            return Err(SimulateError::LostAndMoved { sensor });
-        }
-        let mut effects = plan.effects.iter();
-        let weighed = weighed_sensors(test);
-        if !weighed.contains(&sensor) && effects.all(|one| one.id != EffectId::SensorMass) {
-            return Err(SimulateError::WeighsNothing {
-                sensor: sensor.to_owned(),
-                known: listed(&weighed),
-            });
-        }
+}
+
+/// Refuses to move a sensor whose mass is lost or not known.
+fn check_move(
+    test: &TestDescription,
+    effects: &[Effect],
+    changes: &[Change],
+    change: &Effect,
+) -> Result<(), SimulateError> {
+    if change.id != EffectId::SensorPosition {
+        return Ok(());
+    }
+    let Some(sensor) = moved_sensor(test, change) else {
+        return Ok(());
+    };
+    if is_lost(Some(sensor), changes) {
+        let sensor = sensor.to_owned();
+        return Err(SimulateError::LostAndMoved { sensor });
+    }
+    let weighed = weighed_sensors(test);
+    if !weighed.contains(&sensor) && effects.iter().all(|one| one.id != EffectId::SensorMass) {
+        return Err(SimulateError::WeighsNothing {
+            sensor: sensor.to_owned(),
+            known: listed(&weighed),
+        });
     }
     Ok(())
 }

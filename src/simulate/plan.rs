@@ -3,8 +3,7 @@
 
 use super::chain::Signal;
 use super::change::{
-    Change, all_effects, change_joint, check_changes, set_up_factors, without_lost_masses,
-    without_lost_sensors,
+    Change, change_joint, check_changes, set_up_factors, without_lost_masses, without_lost_sensors,
 };
 use super::hammer::{TapPlan, Tip};
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
@@ -83,8 +82,13 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    check_changes(plan)?;
-    let effects = all_effects(plan.effects, plan.changes);
+    check_changes(test, plan.effects, plan.changes)?;
+    let mut effects = plan.effects.to_vec();
+    for change in plan.changes {
+        if let Change::Effect(effect) = change {
+            effects.push(effect.clone());
+        }
+    }
     let plan = &TestPlan {
         effects: &effects,
         ..plan.clone()

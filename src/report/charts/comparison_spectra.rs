@@ -8,7 +8,6 @@ use crate::format::{signed_percent, unit_words};
 use crate::picture::{
     Axis, Block, Chart, Color, InPage, Mark, Panel, Places, Rule, Series, extent,
 };
-use crate::run::ComparedRecordings;
 use crate::short_names::ends_of_paths;
 use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint_compare::ModeChange;
@@ -68,6 +67,15 @@ struct CloseUp<'a> {
     change: &'a ModeChange,
     overlay: &'a Overlay<'a>,
     readings: [&'a ModeReading; 2],
+}
+
+/// Recordings of the two tests whose spectra are shown over each other; empty where tests have none.
+#[derive(Debug, Clone, Default)]
+pub struct ComparedRecordings {
+    /// Those of the first test before.
+    pub before: Vec<RecordingResult>,
+    /// Those of the first test after.
+    pub after: Vec<RecordingResult>,
 }
 
 /// The spectra of the first tests before and after over each other; `None` where they have no spectra of the same sensor, or

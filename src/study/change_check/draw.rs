@@ -3,7 +3,7 @@
 //! The description is wrong by its tolerances and, in four of five pairs, by one effect that both tests share. Sizes are drawn from small to
 //! large.
 
-use super::truth::PlantedChange;
+use super::truth::{OUTSIDE, PlantedChange};
 use crate::blind_check::{log_uniform, normal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -87,8 +87,6 @@ impl ChangeClass {
 /// Chi square of a visible change: one in a hundred false alarms and one in ten misses, for an observer who knows what to
 /// look for.
 pub const VISIBLE: f64 = 14.9;
-/// Kinds of changes outside of the causes, as truth files name them.
-pub const OUTSIDE: [&str; 4] = ["second-support", "mass-patch", "soft-patch", "three-masses"];
 
 /// Elements of the true structure.
 const MESH: Mesh = Mesh { elements: 80 };

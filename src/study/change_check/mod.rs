@@ -14,9 +14,7 @@ mod record;
 mod score;
 mod truth;
 
-pub use draw::{
-    ChangeClass, ChangedStructure, OUTSIDE, SetUpScatter, VISIBLE, chi_square, structure,
-};
+pub use draw::{ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square, structure};
 pub use record::{DrawnPair, PairCampaign};
 pub use score::{PairAnswer, PairCase, PairConduct, PairScores, pair_rows, score_pairs};
 pub use truth::{

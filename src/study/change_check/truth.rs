@@ -4,7 +4,6 @@
 //! causes. `"visible"` says whether the change shows at all, and `"repeatability"` is what the comparison is told. Both may
 //! be left out.
 
-use super::draw::OUTSIDE;
 use crate::blind_check::TruthError;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -13,6 +12,10 @@ use tapjoint_beam::effects::{Effect, EffectId};
 use tapjoint_compare::CauseKind;
 use tapjoint_description::TestDescription;
 use tapjoint_simulate::{Change, moved_sensor};
+
+/// Kinds of changes outside of the causes, as truth files name them.
+pub(super) const OUTSIDE: [&str; 4] =
+    ["second-support", "mass-patch", "soft-patch", "three-masses"];
 
 /// Causes that a comparison may name.
 const CAUSES: [CauseKind; 8] = [

@@ -1,9 +1,8 @@
 //! `tapjoint blind-check --compare`: the success rate of `tapjoint compare` on pairs of tests with a withheld change.
 
 use super::Outcome;
-use super::blind_check::{
-    AGAIN, BlindCheckArguments, RELIABILITY, rename_recordings, renamed, unlisted, write_test,
-};
+use super::blind_check::{BlindCheckArguments, RELIABILITY};
+use super::blind_tests::{AGAIN, Listed, rename_recordings, renamed, write_test};
 use super::input::{TestFile, read_test};
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
@@ -221,26 +220,14 @@ fn elsewhere(
     if truths.is_empty() {
         bail!("{name}: holds no pair of tests");
     }
-    for truth in &truths {
-        for side in SIDES {
-            let path = folder.join(&truth.name).join(side).join("test.toml");
-            if !path.is_file() {
-                bail!(
-                    "{}: is missing, but {name} names the pair \"{}\"; each pair is a folder of that name with \
-                     before/test.toml and after/test.toml",
-                    path.display(),
-                    truth.name
-                );
-            }
-        }
-    }
     let names: Vec<&str> = truths.iter().map(|truth| truth.name.as_str()).collect();
-    for unlisted in unlisted(folder, &names, "before/test.toml") {
-        terminal.warn(&format!(
-            "{}: {name} does not name this pair, so it is left out",
-            folder.join(unlisted).display()
-        ));
-    }
+    let listed = Listed {
+        truth,
+        what: "pair",
+        names: &names,
+        descriptions: &["before/test.toml", "after/test.toml"],
+    };
+    listed.check(folder, terminal)?;
     // Warnings of the descriptions appear in the order of the file.
     let mut read = Vec::with_capacity(truths.len());
     for truth in &truths {

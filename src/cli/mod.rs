@@ -15,6 +15,7 @@ mod staging;
 mod terminal;
 
 mod blind_check;
+mod blind_tests;
 mod change_check;
 mod compare;
 mod diagnose;

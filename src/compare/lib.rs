@@ -24,6 +24,8 @@
 mod cause;
 mod change_point;
 mod dissipation;
+#[cfg(test)]
+mod fixture;
 mod joint;
 mod level;
 mod likelihood;

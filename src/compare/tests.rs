@@ -1,66 +1,17 @@
 //! Tests of comparisons.
 
+use crate::fixture::{self, BEAM, cantilever, pair, springs, test};
 use crate::{
-    CauseKind, ChartedQuantity, CompareError, Comparison, Item, ItemKind, MeasuredMode, Pair,
+    CauseKind, ChartedQuantity, CompareError, Comparison, Item, ItemKind, Pair,
     RepeatabilityOrigin, Settings, Test, VerdictKind, compare, watch,
 };
-use tapjoint_beam::specimen::{Joint, Mesh, PointMass, Specimen};
+use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory};
 
-const BEAM: Beam = Beam {
-    length: 0.4,
-    width: 0.02,
-    thickness: 0.005,
-    modulus: 205e9,
-    density: 7850.0,
-    poisson: 0.3,
-};
 const MODES: usize = 6;
 
-fn cantilever(joint: Joint) -> Specimen {
-    let lap = Default::default();
-    Specimen::jointed(
-        BeamTheory::Euler,
-        &BEAM,
-        Assembly::Cantilever,
-        &lap,
-        Some(joint),
-    )
-}
-
-fn springs() -> Joint {
-    let stiffness = BEAM.bending_stiffness();
-    Joint {
-        kt: 1500.0 * stiffness / BEAM.length.powi(3),
-        kr: 10.0 * stiffness / BEAM.length,
-        coupling: 0.0,
-    }
-}
-
 fn frequencies(structure: &Specimen) -> Vec<f64> {
-    let mesh = Mesh { elements: 100 };
-    structure.modes(MODES, mesh).unwrap().frequencies().to_vec()
-}
-
-fn test(structure: &Specimen, items: &[Item], frequencies: &[f64]) -> Test {
-    let modes = frequencies.iter().enumerate();
-    Test {
-        structure: structure.clone(),
-        items: items.to_vec(),
-        knows_joint: [false; 2],
-        common_std: 0.01,
-        modes: modes
-            .map(|(index, frequency)| MeasuredMode::of_frequency(index + 1, *frequency, 0.0))
-            .collect(),
-        unnumbered: Vec::new(),
-    }
-}
-
-fn pair(before: Test, after: Test) -> Pair {
-    Pair {
-        before: vec![before],
-        after: vec![after],
-    }
+    fixture::frequencies(structure, MODES)
 }
 
 fn stated(repeatability: f64) -> Settings {

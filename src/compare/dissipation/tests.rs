@@ -1,57 +1,29 @@
 //! Tests of the change of dampings.
 
 use super::{USUAL, dampings, joint_slopes};
+use crate::fixture::{self, cantilever, frequencies, joint, pair};
 use crate::model::PairModel;
 use crate::result::DampingVerdict;
-use crate::test::{MeasuredMode, Pair, Reading, Test};
+use crate::test::{Pair, Reading, Test};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use tapjoint_beam::specimen::{Joint, Mesh, Specimen};
-use tapjoint_beam::{Assembly, Beam, BeamTheory};
+use tapjoint_beam::specimen::Joint;
 
-const BEAM: Beam = Beam {
-    length: 0.4,
-    width: 0.02,
-    thickness: 0.005,
-    modulus: 205e9,
-    density: 7850.0,
-    poisson: 0.3,
-};
 const MODES: [usize; 5] = [1, 2, 3, 4, 5];
 
+/// A test whose description states the joint.
 fn test(joint: Joint) -> Test {
-    let kind = Assembly::Cantilever;
-    let lap = Default::default();
-    let structure = Specimen::jointed(BeamTheory::Euler, &BEAM, kind, &lap, Some(joint));
-    let solved = structure.modes(MODES.len(), Mesh { elements: 60 }).unwrap();
-    let modes = MODES.iter().zip(solved.frequencies());
-    let modes = modes.map(|(mode, frequency)| MeasuredMode::of_frequency(*mode, *frequency, 0.0));
+    let structure = cantilever(joint);
+    let frequencies = frequencies(&structure, MODES.len());
     Test {
-        modes: modes.collect(),
-        structure,
-        items: Vec::new(),
         knows_joint: [true; 2],
-        common_std: 0.01,
-        unnumbered: Vec::new(),
-    }
-}
-
-/// Stiffnesses in those of the beam.
-fn joint(translation: f64, rotation: f64) -> Joint {
-    let stiffness = BEAM.bending_stiffness();
-    Joint {
-        kt: translation * stiffness / BEAM.length.powi(3),
-        kr: rotation * stiffness / BEAM.length,
-        coupling: 0.0,
+        ..fixture::test(&structure, &[], &frequencies)
     }
 }
 
 fn model(test: &Test) -> PairModel {
-    let pair = Pair {
-        before: vec![test.clone()],
-        after: vec![test.clone()],
-    };
+    let pair = pair(test.clone(), test.clone());
     PairModel::new(&pair, &MODES).unwrap()
 }
 

@@ -1,76 +1,41 @@
 //! Tests of the level of the taps.
 
-use crate::test::{Level, MeasuredMode, Pair, Reading, Settings, Test};
+use crate::fixture::{self, cantilever, frequencies, pair, springs};
+use crate::test::{Level, Reading, Settings, Test};
 use crate::{Comparison, VerdictKind, compare, watch};
-use tapjoint_beam::specimen::{Joint, Mesh, Specimen};
-use tapjoint_beam::{Assembly, Beam, BeamTheory};
 
-const BEAM: Beam = Beam {
-    length: 0.4,
-    width: 0.02,
-    thickness: 0.005,
-    modulus: 205e9,
-    density: 7850.0,
-    poisson: 0.3,
-};
 const MODES: usize = 5;
 
 /// Returns a test whose frequencies fall by these shares per factor of ten in amplitude, read at an amplitude.
 fn test(slopes: [f64; MODES], amplitude: f64) -> Test {
-    let stiffness = BEAM.bending_stiffness();
-    let joint = Joint {
-        kt: 1500.0 * stiffness / BEAM.length.powi(3),
-        kr: 10.0 * stiffness / BEAM.length,
-        coupling: 0.0,
-    };
-    let kind = Assembly::Cantilever;
-    let lap = Default::default();
-    let structure = Specimen::jointed(BeamTheory::Euler, &BEAM, kind, &lap, Some(joint));
-    let solved = structure.modes(MODES, Mesh { elements: 60 }).unwrap();
-    let modes = solved.frequencies().iter().zip(slopes).enumerate();
-    let modes = modes.map(|(index, (frequency, slope))| MeasuredMode {
-        damping: Some(Reading {
-            value: 0.003 + 0.001 * amplitude.log10(),
-            std: 1e-5,
-        }),
-        level: Some(Level {
+    let structure = cantilever(springs());
+    let mut frequencies = frequencies(&structure, MODES);
+    for (frequency, slope) in frequencies.iter_mut().zip(slopes) {
+        *frequency *= (slope * amplitude.log10()).exp();
+    }
+    let mut test = fixture::test(&structure, &[], &frequencies);
+    for (mode, slope) in test.modes.iter_mut().zip(slopes) {
+        mode.damping = Some(read(0.003 + 0.001 * amplitude.log10()));
+        mode.level = Some(Level {
             amplitude,
             range: [0.1 * amplitude, amplitude],
             of: "A".to_owned(),
-            frequency_slope: Reading {
-                value: slope,
-                std: 1e-5,
-            },
-            damping_slope: Reading {
-                value: 0.001,
-                std: 1e-5,
-            },
-        }),
-        ..MeasuredMode::of_frequency(
-            index + 1,
-            frequency * (slope * amplitude.log10()).exp(),
-            0.0,
-        )
-    });
-    Test {
-        modes: modes.collect(),
-        structure,
-        items: Vec::new(),
-        knows_joint: [false; 2],
-        common_std: 0.01,
-        unnumbered: Vec::new(),
+            frequency_slope: read(slope),
+            damping_slope: read(0.001),
+        });
     }
+    test
+}
+
+fn read(value: f64) -> Reading {
+    Reading { value, std: 1e-5 }
 }
 
 fn compared(before: Test, after: Test) -> Comparison {
-    let pair = Pair {
-        before: vec![before],
-        after: vec![after],
-    };
     let settings = Settings {
         repeatability: Some(5e-4),
     };
-    compare(&[pair], &settings).unwrap()
+    compare(&[pair(before, after)], &settings).unwrap()
 }
 
 const SLOPES: [f64; MODES] = [-0.01, -0.006, -0.004, -0.003, -0.002];

@@ -1,7 +1,7 @@
 //! How often a comparison of two tests is right, on drawn pairs of tests (frequencies, not recordings) of many kinds.
 //!
-//! Every class of changes is a cell. The model is wrong by the tolerances of a description and by one effect that both
-//! tests share. The scatter between tests has long tails (Student's with four degrees of freedom), and a part of it
+//! Every class of changes is a cell. The model is wrong by the tolerances of a description. In four of
+//! five pairs it also lacks an effect that both tests share. The scatter between tests has long tails (Student's with four degrees of freedom), and a part of it
 //! is common to all modes. Half of the pairs state their repeatability, a quarter has three tests on either side, and a
 //! quarter knows nothing of it.
 //!
@@ -26,11 +26,11 @@ mod smallest;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tapjoint::compare::{
-    CauseKind, Comparison, MeasuredMode, Pair, Settings, Test, VerdictKind, compare,
-};
+use tapjoint::compare::{CauseKind, Comparison, MeasuredMode, Pair, Settings, Test, compare};
+use tapjoint::study::blind_check::Rate;
 use tapjoint::study::change_check::{
-    ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square,
+    AnsweredPair, ChangeClass, ChangedStructure, PairAnswer, PairCase, PairTruth, SetUpScatter,
+    VISIBLE, chi_square, score_pairs,
 };
 
 const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--ideal] [--list]";
@@ -117,93 +117,29 @@ impl Drawn {
             repeatability,
         })
     }
-
-    /// Returns the true causes; empty for nothing, and for one that the program does not know.
-    fn causes(&self) -> Vec<CauseKind> {
-        let changes = self.structure.changes.iter();
-        changes.filter_map(|change| change.kind()).collect()
-    }
-
-    /// Counts whether the intervals of a true single cause hold its sizes: Kt, Kr, mass, position.
-    fn count_intervals(&self, found: &Comparison, mut count: impl FnMut(usize, bool)) {
-        let [change] = &self.structure.changes[..] else {
-            return;
-        };
-        let kind = change.kind();
-        let Some(own) = found.hypotheses.iter().find(|one| Some(one.effect) == kind) else {
-            return;
-        };
-        for (index, name) in ["kt", "kr", "mass", "position"].into_iter().enumerate() {
-            let truth = change.parameters.get(name);
-            // A mass is told only where it is seen at all.
-            let is_told =
-                index < 2 || (kind == Some(CauseKind::AddedMass) && self.chi_square > 30.0);
-            if let (Some(truth), Some(value), true) = (truth, own.parameters.get(name), is_told) {
-                count(index, (value.low..=value.high).contains(truth));
-            }
-        }
-    }
 }
 
 struct Row {
     cell: ChangeClass,
     drawn: Drawn,
+    truth: PairTruth,
     found: Comparison,
 }
 
-/// Hits among cases.
-#[derive(Default, Clone, Copy)]
-struct Rate {
-    hits: usize,
-    cases: usize,
-}
-
-impl Rate {
-    fn count(&mut self, hit: bool) {
-        self.hits += usize::from(hit);
-        self.cases += 1;
-    }
-}
-
-impl std::fmt::Display for Rate {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.cases == 0 {
-            return write!(f, "-");
-        }
-        let share = 100.0 * self.hits as f64 / self.cases as f64;
-        write!(f, "{share:.1} % ({} of {})", self.hits, self.cases)
-    }
-}
-
 impl Row {
-    fn is_named(&self) -> bool {
-        matches!(
-            self.found.verdict.kind,
-            VerdictKind::Named | VerdictKind::Group
-        )
-    }
-
-    fn is_right(&self, kind: CauseKind) -> bool {
-        self.drawn.causes().iter().any(|own| own.is_like(kind))
-    }
-
-    fn first_is_right(&self) -> bool {
-        let mut causes = self.found.hypotheses.iter();
-        let first = causes.find(|one| one.effect != CauseKind::NoChange);
-        first.is_some_and(|first| self.is_right(first.effect))
-    }
-
-    /// The list of the answer holds the truth.
-    fn holds(&self) -> bool {
-        let verdict = &self.found.verdict;
-        match verdict.kind {
-            VerdictKind::Unknown => true,
-            VerdictKind::NoChange => self.drawn.chi_square < VISIBLE,
-            _ => verdict
-                .effects
-                .iter()
-                .any(|kind| self.is_right(*kind) || *kind == CauseKind::Unknown),
+    fn answer(&self) -> AnsweredPair<'_> {
+        AnsweredPair {
+            truth: &self.truth,
+            found: &self.found,
         }
+    }
+}
+
+/// Returns a rate as text: "96.1 % (245 of 255)".
+fn shown(rate: Rate) -> String {
+    match rate.value() {
+        Some(share) => format!("{:.1} % ({} of {})", 100.0 * share, rate.hits, rate.of),
+        None => "-".to_owned(),
     }
 }
 
@@ -253,7 +189,18 @@ fn main() -> Result<(), String> {
             let drawn =
                 (0..ATTEMPTS).find_map(|attempt| Drawn::new(cell, study, number, attempt))?;
             let found = compare(&drawn.pairs, &drawn.settings).ok()?;
-            Some(Row { cell, drawn, found })
+            let truth = PairTruth {
+                name: String::new(),
+                changes: drawn.structure.changes.clone(),
+                visible: Some(drawn.chi_square >= VISIBLE),
+                repeatability: drawn.settings.repeatability,
+            };
+            Some(Row {
+                cell,
+                drawn,
+                truth,
+                found,
+            })
         })
         .collect();
     if list {
@@ -293,71 +240,71 @@ fn print_scores(rows: &[Row]) {
         if own.is_empty() {
             continue;
         }
-        let (mut visible, mut first, mut named) =
-            (Rate::default(), Rate::default(), Rate::default());
-        let (mut wrong, mut list, mut called) = (Rate::default(), Rate::default(), Rate::default());
-        for row in own {
-            let is_visible = row.drawn.chi_square >= VISIBLE;
-            visible.count(is_visible);
-            let kinds = &row.found.verdict.effects;
-            let is_wrong = row.is_named() && !kinds.iter().any(|kind| row.is_right(*kind));
-            wrong.count(is_wrong);
-            called.count(row.is_named() || row.found.verdict.kind == VerdictKind::Unknown);
-            if is_visible {
-                first.count(row.first_is_right());
-                named.count(row.is_named());
-                list.count(row.holds());
-            }
-        }
-        println!(
-            "{:16} {:>20} {:>20} {:>20} {:>20} {:>20} {:>20}",
-            cell.name(),
-            visible.to_string(),
-            first.to_string(),
-            named.to_string(),
-            wrong.to_string(),
-            list.to_string(),
-            called.to_string()
-        );
+        let visible = |row: &&Row| row.answer().is_visible();
+        let seen: Vec<&Row> = own.iter().copied().filter(visible).collect();
+        let rates = [
+            Rate::of(&own, |row| Some(row.answer().is_visible())),
+            Rate::of(&seen, |row| Some(row.answer().first_is_right())),
+            Rate::of(&seen, |row| Some(row.answer().is_named())),
+            Rate::of(&own, |row| Some(is_wrong(row))),
+            Rate::of(&seen, |row| Some(row.answer().list_holds())),
+            Rate::of(&own, |row| Some(row.answer().is_called_change())),
+        ];
+        let columns = rates.map(|rate| format!(" {:>20}", shown(rate)));
+        println!("{:16}{}", cell.name(), columns.concat());
     }
-    let (mut first, mut wrong) = (Rate::default(), Rate::default());
-    let mut held: [Rate; 4] = Default::default();
-    let mut bins = [(0.0, Rate::default()); 5];
+    let of_cases: Vec<PairCase> = rows
+        .iter()
+        .map(|row| {
+            let answer = PairAnswer::Compared(Box::new(row.found.clone()));
+            (row.truth.clone(), answer)
+        })
+        .collect();
+    let scores = score_pairs(&of_cases);
+    let single = rows.iter().filter(|row| row.cell.cause().is_some());
+    let wrong = Rate::of(single, |row| {
+        row.answer().is_visible().then(|| is_wrong(row))
+    });
+    println!(
+        "first cause of visible single changes {}, named wrongly {}",
+        shown(scores.first_right_visible),
+        shown(wrong)
+    );
+    let intervals = [
+        ("Kt", scores.kt_interval),
+        ("Kr", scores.kr_interval),
+        ("visible mass", scores.mass_interval),
+        ("visible position", scores.place_interval),
+    ];
+    for (name, rate) in intervals {
+        println!("95 % interval of {name} holds {}", shown(rate));
+    }
+    print_calibration(rows);
+}
+
+fn is_wrong(row: &Row) -> bool {
+    row.answer().is_named() && !row.answer().name_is_right()
+}
+
+/// Prints what is stated of the first cause of all, with those that are like it, and how often it is right.
+fn print_calibration(rows: &[Row]) {
+    let mut bins: [Vec<(f64, bool)>; 5] = Default::default();
     for row in rows {
-        let is_single = row.drawn.causes().len() == 1;
-        if is_single && row.drawn.chi_square >= VISIBLE {
-            first.count(row.first_is_right());
-            let kinds = &row.found.verdict.effects;
-            wrong.count(row.is_named() && !kinds.iter().any(|kind| row.is_right(*kind)));
-        }
-        row.drawn
-            .count_intervals(&row.found, |index, holds| held[index].count(holds));
-        // What is stated of the first cause of all.
         let top = &row.found.hypotheses[0];
         let right = match top.effect {
-            CauseKind::NoChange => {
-                row.drawn.causes().is_empty() && row.cell == ChangeClass::Nothing
-            }
+            CauseKind::NoChange => row.cell == ChangeClass::Nothing,
             CauseKind::Unknown => row.cell == ChangeClass::Outside,
-            kind => row.is_right(kind),
+            kind => row.answer().is_right(kind),
         };
-        let together: f64 = row
-            .found
-            .hypotheses
-            .iter()
-            .filter(|one| one.effect.is_like(top.effect))
-            .map(|one| one.probability)
-            .sum();
-        let bin = ((together * 5.0) as usize).min(4);
-        bins[bin].0 += together;
-        bins[bin].1.count(right);
+        let alike = row.found.hypotheses.iter();
+        let alike = alike.filter(|one| one.effect.is_like(top.effect));
+        let together: f64 = alike.map(|one| one.probability).sum();
+        bins[((together * 5.0) as usize).min(4)].push((together, right));
     }
-    println!("first cause of visible single changes {first}, named wrongly {wrong}");
-    for (name, rate) in ["Kt", "Kr", "mass", "position"].iter().zip(held) {
-        println!("95 % interval of {name} holds {rate}");
-    }
-    for (sum, rate) in bins.iter().filter(|one| one.1.cases > 0) {
-        println!("stated {:.3} right {rate}", sum / rate.cases as f64);
+    for bin in bins.iter().filter(|bin| !bin.is_empty()) {
+        let mean = bin.iter().map(|one| one.0).sum::<f64>() / bin.len() as f64;
+        let rate = Rate::of(bin, |one| Some(one.1));
+        println!("stated {mean:.3} right {}", shown(rate));
     }
 }
 

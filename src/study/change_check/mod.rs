@@ -16,7 +16,9 @@ mod truth;
 
 pub use draw::{ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square, structure};
 pub use record::{DrawnPair, PairCampaign};
-pub use score::{PairAnswer, PairCase, PairConduct, PairScores, pair_rows, score_pairs};
+pub use score::{
+    AnsweredPair, PairAnswer, PairCase, PairConduct, PairScores, pair_rows, score_pairs,
+};
 pub use truth::{
     PairKind, PairTruth, PairTruthFile, PlantedChange, pair_truths_json, parse_pair_truths,
 };

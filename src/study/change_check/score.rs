@@ -105,13 +105,17 @@ pub struct PairScores {
 }
 
 /// A pair with an answer.
-struct Answered<'a> {
-    truth: &'a PairTruth,
-    found: &'a Comparison,
+#[derive(Debug, Clone, Copy)]
+pub struct AnsweredPair<'a> {
+    /// What changed.
+    pub truth: &'a PairTruth,
+    /// The answer.
+    pub found: &'a Comparison,
 }
 
-impl Answered<'_> {
-    fn is_visible(&self) -> bool {
+impl AnsweredPair<'_> {
+    /// Returns true where the change alone is noticed against the scatter.
+    pub fn is_visible(&self) -> bool {
         self.truth.visible == Some(true)
     }
 
@@ -119,12 +123,13 @@ impl Answered<'_> {
         &self.found.verdict
     }
 
-    fn is_named(&self) -> bool {
+    /// Returns true where a cause or a group of causes is named.
+    pub fn is_named(&self) -> bool {
         matches!(self.verdict().kind, VerdictKind::Named | VerdictKind::Group)
     }
 
     /// Returns true for a cause that frequencies hardly separate from what changed.
-    fn is_right(&self, kind: CauseKind) -> bool {
+    pub fn is_right(&self, kind: CauseKind) -> bool {
         let changes = self.truth.changes.iter();
         changes
             .filter_map(|change| change.kind())
@@ -137,19 +142,22 @@ impl Answered<'_> {
         causes.find(|one| one.effect != CauseKind::NoChange)
     }
 
-    fn first_is_right(&self) -> bool {
+    /// Returns true where the most probable cause of a change is right.
+    pub fn first_is_right(&self) -> bool {
         self.first()
             .is_some_and(|first| self.is_right(first.effect))
     }
 
-    fn name_is_right(&self) -> bool {
+    /// Returns true where a cause of the answer is right.
+    pub fn name_is_right(&self) -> bool {
         self.verdict()
             .effects
             .iter()
             .any(|kind| self.is_right(*kind))
     }
 
-    fn is_called_change(&self) -> bool {
+    /// Returns true where the answer is a name, `unknown`, or a list without `no-change`.
+    pub fn is_called_change(&self) -> bool {
         match self.verdict().kind {
             VerdictKind::NoChange => false,
             VerdictKind::Named | VerdictKind::Group | VerdictKind::Unknown => true,
@@ -157,7 +165,8 @@ impl Answered<'_> {
         }
     }
 
-    fn list_holds(&self) -> bool {
+    /// Returns true where the name, the group or the list has a right cause. For one outside of the causes it is `unknown`.
+    pub fn list_holds(&self) -> bool {
         match self.truth.kind() {
             PairKind::Outside => self.says_unknown(),
             _ => self.name_is_right(),
@@ -182,7 +191,7 @@ impl Answered<'_> {
     }
 
     /// Returns true where the interval of a parameter of the true single cause holds its true value; `None` without both.
-    fn holds(&self, kind: CauseKind, name: &str) -> Option<bool> {
+    pub fn holds(&self, kind: CauseKind, name: &str) -> Option<bool> {
         let [change] = &self.truth.changes[..] else {
             return None;
         };
@@ -208,8 +217,8 @@ pub fn score_pairs(cases: &[PairCase]) -> PairScores {
         };
         counts[index] += 1;
         if let Some(found) = answer.found() {
-            kind.push(Answered { truth, found });
-            all.push(Answered { truth, found });
+            kind.push(AnsweredPair { truth, found });
+            all.push(AnsweredPair { truth, found });
         }
     }
     let joint = CauseKind::JointChange;

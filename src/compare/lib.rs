@@ -11,9 +11,9 @@
 //!               search      evidence of causes with one size (joint: several sizes; unknown: none)
 //!               limits      the smallest change of the joint that would be seen
 //!               verdict     probabilities and the answer
-//!               value_change  changes of a value of each mode, and their scatter
-//!               dissipation   changes of the dampings
-//!               result      the answer
+//!               value_change  changes of another value of each mode, and their scatter
+//!               dissipation  changes of the dampings
+//!               result      the answer in numbers
 //! Test, ..   -> series      control charts of many tests, and the first that differs from those before
 //!               change_point  how much the last tests differ from those before, and may by chance
 //! ```

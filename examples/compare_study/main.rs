@@ -14,8 +14,8 @@
 //!
 //! `--smallest N`: the smallest change of the joint that is seen, on at most 2 N cantilevers.
 //!
-//! `--ideal`: the program is told the true structure before the change, with its joint. What it misses then, these frequencies do
-//! not tell.
+//! `--ideal`: the program is told the true structure before the change, with its joint. These frequencies do not tell what it
+//! then misses.
 //!
 //! `--pairs`: pairs of each cell (20); of `nothing` four times as many. The same seed gives the same answers, whatever the number
 //! of threads.

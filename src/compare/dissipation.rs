@@ -1,7 +1,7 @@
 //! Changes of the dampings, which no frequency shows.
 //!
-//! A joint that dissipates damps each mode by its share of the joint's strain energy, which is the slope of the frequency with
-//! respect to the stiffness (Rayleigh's quotient):
+//! A joint that dissipates damps each mode in proportion to its share of the strain energy. Half of this share is the slope of
+//! the frequency with respect to the stiffness (Rayleigh's quotient):
 //!
 //! zeta_n = eta/2 (strain energy of the joint/strain energy)_n = eta d ln f_n/d ln K
 //!

@@ -1,7 +1,7 @@
 //! One level of the taps for all tests, and changes of how frequencies depend on it.
 //!
-//! A joint that slips is softer at higher levels. Two tests at different levels then differ although nothing changed. Where the
-//! decays of both tell the slope of a frequency over the logarithm of the amplitude, each is taken at the amplitude of the first
+//! A joint that slips is softer at higher levels. Two tests at different levels then differ although nothing changed. Decays tell
+//! the slope of a frequency over the logarithm of the amplitude. With it each frequency is taken at the amplitude of the first
 //! test. A change of the slopes is often the first sign of a bolt that works loose.
 
 use crate::likelihood::{Factored, NO_FIT};

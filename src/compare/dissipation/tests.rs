@@ -124,8 +124,8 @@ enum Scatter {
     Usual,
 }
 
-/// Returns the share of seeds whose interval holds the loss factor, of those that say no change without one, and of those that
-/// find the joint's damping with one.
+/// Returns three shares of the seeds: the interval holds the loss factor; without a change the answer is no change; with one it
+/// is the joint's damping.
 fn shares(scatter: Scatter, repeats: usize) -> [f64; 3] {
     let own = test(joint(800.0, 6.0));
     let model = model(&own);

@@ -4,6 +4,7 @@
 //! their own; such a mode is kept only if the data call for it. The fit itself is the maximum-likelihood one of
 //! [`fit_modes`].
 
+use super::decays::CollectedDecays;
 use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
@@ -367,25 +368,26 @@ pub(super) struct FreeDecays {
 }
 
 impl FreeDecays {
-    /// Transforms the decays (`samples` of each) and the forces before them onto the lines of their band.
+    /// Transforms the decays and the forces before them onto the lines of their band.
     ///
     /// # Errors
     /// [`FitError`]: too few lines.
-    pub(super) fn new(
-        samples: usize,
-        lines: &Lines,
-        decays: Vec<Decay>,
-        forces: Vec<TapForce>,
-    ) -> Result<Self, FitError> {
-        let band = (lines.low, lines.high);
+    pub(super) fn new(collected: CollectedDecays) -> Result<Self, FitError> {
+        let CollectedDecays {
+            samples,
+            band,
+            decays,
+            forces,
+        } = collected;
         let rate = decays.first().map_or(0.0, |decay| decay.sample_rate);
         let mut responses = FreeDecayCollector::new(rate, samples, &[band])?;
         for decay in &decays {
             responses.add_tap(&decay.responses)?;
         }
         let mut pulses = FreeDecayCollector::new(rate, samples, &[band])?;
+        let mut next = forces.iter().peekable();
         for tap in 0..decays.len() {
-            let force = forces.iter().find(|force| force.tap == tap);
+            let force = next.next_if(|force| force.tap == tap);
             let force = force.map_or(&[][..], |force| &force.samples);
             // The force before time zero stands at the end of the block: on multiples of rate/block a transform
             // cannot tell a time from one a block later.

@@ -10,8 +10,10 @@
 //! writes.
 
 mod amplitude;
+mod averages;
 mod checks;
 mod compared;
+mod decays;
 mod explained;
 mod fits;
 mod found;
@@ -26,6 +28,7 @@ mod mode_file;
 mod modes;
 mod observations;
 mod observed_mode;
+mod pulse_window;
 mod quiet;
 mod recording_result;
 mod results;

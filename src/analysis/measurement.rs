@@ -1,15 +1,16 @@
 //! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
 
+use super::averages::{Averages, LONG, TapSums, WindowChange};
+use super::decays::{CollectedDecays, DecayCollector};
 use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation};
+use super::pulse_window::PulseWindow;
 use super::quiet::PreTriggerNoise;
 use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
-use std::f64::consts::TAU;
+use std::ops::Range;
 use tapjoint_description::WindowKind;
-use tapjoint_numerics::stats::{median, root_mean_square};
-use tapjoint_signal::modal::amplitude::Decay;
-use tapjoint_signal::modal::fit::TapForce;
+use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::modal::{
     CompositeLevel, GRIDS, GridFrequency, MainsSettings, ModeReading, PeakLabel, PeakSettings,
     ReadBy, find_peaks, label_combinations, label_steady_lines, read_peaks, set_strengths,
@@ -17,8 +18,8 @@ use tapjoint_signal::modal::{
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, RUNG_DOWN,
-    SpectralAverager, SpectralError, Transformer, Window, apply_force_window, band_limited,
-    choose_window, exponential_to, largest_smooth_block, measure_decay,
+    SpectralError, Window, band_limited, choose_window, exponential_to, largest_smooth_block,
+    measure_decay,
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
 
@@ -209,24 +210,8 @@ fn lines_for(
     Lines::zoom(band, rate, block, available)
 }
 
-/// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
-/// each). Taps beyond it are left out of them.
-const MOST_KEPT: usize = 1 << 24;
-
-/// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
-const AFTER_TRIGGER: f64 = 5e-3;
-/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
-const LEAST_SAMPLES: u64 = 64;
-
-/// Averages over the accepted taps, and what is read from the transforms besides.
-struct Averages {
-    averages: AveragedSpectra,
-    /// Every tap's own transforms without a hammer, up to a bound on memory: their phases differ, so that they cannot be
-    /// averaged.
-    transforms: Vec<Vec<Complex64>>,
-    /// H1 of every response by the force without its window; `None` without a hammer.
-    ungated: Option<Vec<Vec<Complex64>>>,
-}
+/// Most taps from which the decay in the records is taken, evenly spread: more would hardly find a slower one.
+const MOST_LOOKED_AT: usize = 32;
 
 /// Data that every step of one recording's measurement needs.
 struct Stage<'a> {
@@ -269,14 +254,19 @@ impl<'a> Stage<'a> {
     }
 
     /// Samples of all channels in a range of frames of one file, each channel's mean in the file taken out.
-    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+    fn read(&self, range: Range<u64>, into: &mut [Vec<f64>]) -> Result<(), RecordingError> {
         let start = range.start;
-        let mut channels = self.recording.read_channels(&self.channels, range)?;
-        for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
+        self.recording.read_into(&self.channels, range, into)?;
+        for (samples, &channel) in into.iter_mut().zip(&self.channels) {
             let mean = self.recording.mean_at(channel, start);
             samples.iter_mut().for_each(|x| *x -= mean);
         }
-        Ok(channels)
+        Ok(())
+    }
+
+    /// Reads a tap's record from its start to the end of a block.
+    fn read_record(&self, tap: &Tap, into: &mut [Vec<f64>]) -> Result<(), RecordingError> {
+        self.read(tap.record.start..tap.usable_from() + self.gate, into)
     }
 
     /// The taps whose records are averaged: with a force those that are whole.
@@ -287,18 +277,15 @@ impl<'a> Stage<'a> {
             .filter(move |tap| !has_force || tap.is_whole())
     }
 
-    fn record(&self, tap: &Tap) -> Result<Vec<Vec<f64>>, RecordingError> {
-        self.read(tap.usable_from()..tap.usable_from() + self.gate)
-    }
-
     /// The quiet stretch before the first tap, at most a block.
     fn quiet(&self) -> Result<PreTriggerNoise, RecordingError> {
         let quiet = self.taps.quiet.clone();
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
-        let mut force = self.read(start..quiet.end)?;
+        let mut force = vec![Vec::new(); self.channels.len()];
+        self.read(start..quiet.end, &mut force)?;
         let responses = force.split_off(usize::from(self.has_force));
         let rate = self.recording.sample_rate();
-        let windows = self.averaged().filter_map(|tap| pulse_window(tap, rate));
+        let windows = self.averaged().filter_map(|tap| PulseWindow::of(tap, rate));
         let energy: f64 = windows.map(PulseWindow::energy).sum();
         let count = self.averaged().count().max(1) as f64;
         let mains = &self.settings.mains;
@@ -323,8 +310,15 @@ impl<'a> Stage<'a> {
             .collect();
         // The decay of each response inside the band, the largest over the accepted taps.
         let mut checks = vec![DecayCheck::NOTHING; noise.len()];
-        for tap in self.taps.accepted() {
-            let responses = self.record(tap)?.split_off(usize::from(self.has_force));
+        let taps: Vec<&Tap> = self.taps.accepted().collect();
+        let mut record = vec![Vec::new(); self.channels.len()];
+        for number in 0..taps.len().min(MOST_LOOKED_AT) {
+            let tap = taps[number * taps.len() / taps.len().min(MOST_LOOKED_AT)];
+            self.read(
+                tap.usable_from()..tap.usable_from() + self.gate,
+                &mut record,
+            )?;
+            let responses = &record[usize::from(self.has_force)..];
             for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
                 let found = measure_decay(&band_limited(samples, rate, band), noise);
                 if found.remaining >= check.remaining {
@@ -344,14 +338,18 @@ impl<'a> Stage<'a> {
             Some(WindowKind::Hann) => Window::Hann,
             Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
         };
+        drop(record);
+        let (sums, decays) = self.sums(window, &quiet)?;
         let Averages {
             averages,
             transforms,
-            ungated,
-        } = self.averages(window)?;
+            window_change,
+        } = sums;
         let level = self.level(&averages, &quiet, window);
         let mut readings = self.readings(&level, &averages, &transforms, &quiet, window);
-        let stabilisation = match self.free_decays()? {
+        drop(transforms);
+        let decays = decays.and_then(|decays| FreeDecays::new(decays).ok());
+        let stabilisation = match decays {
             Some(decays) => {
                 let hum = quiet.hum_beside(&readings, &self.lines, &self.settings.mains);
                 decays.fit(&mut readings, &self.lines, &self.settings.kinds, hum)
@@ -367,7 +365,7 @@ impl<'a> Stage<'a> {
         label_combinations(&mut readings);
         set_strengths(&mut readings, &self.settings.kinds, true);
         Ok(MeasuredSpectra {
-            force_window: self.force_window(&readings, &averages, ungated.as_deref()),
+            force_window: self.force_window(&readings, window_change),
             averages,
             window,
             decay: Some(decay),
@@ -379,81 +377,85 @@ impl<'a> Stage<'a> {
         })
     }
 
-    fn averages(&self, window: Window) -> Result<Averages, RecordingError> {
+    /// Reads every accepted tap once: averages of the spectra, and the decays for the fits.
+    fn sums(
+        &self,
+        window: Window,
+        quiet: &PreTriggerNoise,
+    ) -> Result<(Averages, Option<CollectedDecays>), RecordingError> {
         let rate = self.recording.sample_rate();
-        let mut averager = SpectralAverager::new(self.lines, self.responses());
-        let mut whole = SpectralAverager::new(self.lines, self.responses());
-        let transformer = Transformer::new(rate, self.lines, self.gate as usize);
-        let mut kept: Vec<Vec<Complex64>> = Vec::new();
-        for tap in self.averaged() {
-            let mut samples = self.record(tap)?;
-            let mut ungated = None;
-            let gate = pulse_window(tap, rate).filter(|_| self.has_force);
-            if let (Some(gate), Some(force)) = (gate, samples.first_mut()) {
-                remove_offset(force, rate);
-                let mut copy = force.clone();
-                window.apply(&mut copy, rate);
-                ungated = Some(transformer.transform(&copy));
-                gate.apply(force);
-            }
-            let mut transforms: Vec<Vec<Complex64>> = samples
-                .iter_mut()
-                .map(|samples| {
-                    window.apply(samples, rate);
-                    transformer.transform(samples)
-                })
-                .collect();
-            let responses = transforms.split_off(usize::from(self.has_force));
-            averager.add(transforms.first().map(Vec::as_slice), &responses);
-            if let Some(force) = ungated {
-                whole.add(Some(&force), &responses);
-            }
-            if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
-                // Time zero is moved to the trigger. The quiet stretch before it tilts the phase, and a fit of few
-                // lines could not follow that tilt as a background.
-                let delay = tap.time - tap.usable_from() as f64 / rate;
-                for mut transform in responses {
-                    for (line, value) in transform.iter_mut().enumerate() {
-                        let turn = TAU * self.lines.frequency(line) * delay;
-                        *value *= Complex64::from_polar(1.0, turn);
-                    }
-                    kept.push(transform);
+        let taps: Vec<&Tap> = self.taps.accepted().collect();
+        let mut sums = TapSums::new(
+            self.lines,
+            rate,
+            self.gate,
+            window,
+            self.has_force,
+            self.responses(),
+            taps.len(),
+        );
+        let mut decays =
+            DecayCollector::new(&taps, rate, self.gate, self.has_force, self.responses());
+        let mut record = vec![Vec::new(); self.channels.len()];
+        let mut next = record.clone();
+        if let Some(first) = taps.first() {
+            self.read_record(first, &mut next)?;
+        }
+        for (number, tap) in taps.iter().enumerate() {
+            std::mem::swap(&mut record, &mut next);
+            let mut add = || {
+                if let Some(decays) = &mut decays {
+                    decays.add(tap, &record);
                 }
+                if !self.has_force || tap.is_whole() {
+                    let skipped = (tap.usable_from() - tap.record.start) as usize;
+                    for samples in &mut record {
+                        samples.drain(..skipped.min(samples.len()));
+                    }
+                    sums.add(tap, &mut record);
+                }
+            };
+            // Of long records the next one is read meanwhile.
+            match taps.get(number + 1) {
+                Some(following) if self.gate > LONG => {
+                    rayon::join(add, || self.read_record(following, &mut next)).1?;
+                }
+                Some(following) => {
+                    add();
+                    self.read_record(following, &mut next)?;
+                }
+                None => add(),
+            }
+            if let Some(decays) = decays.as_mut().filter(|decays| decays.needs_highest_peak()) {
+                let averages = sums.so_far();
+                let level = self.level(&averages, quiet, window);
+                let peaks = find_peaks(&level, &self.settings.peaks);
+                let places = peaks.iter().map(|peak| self.lines.frequency(peak.index));
+                let highest = places.max_by(f64::total_cmp);
+                decays.settle(highest.unwrap_or(self.lines.high));
             }
         }
-        // At least one tap was accepted, or there would be no axis.
-        let averages = averager
-            .finish()
-            .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
-        Ok(Averages {
-            averages,
-            transforms: kept,
-            ungated: whole.finish().and_then(|whole| whole.h1),
-        })
+        let decays = decays.and_then(|decays| decays.finish(&self.lines));
+        Ok((sums.finish(), decays))
     }
 
     /// Length of the force window, and the change that it makes to H1 at the resonances.
     fn force_window(
         &self,
         readings: &[ModeReading],
-        averages: &AveragedSpectra,
-        ungated: Option<&[Vec<Complex64>]>,
+        change: Option<WindowChange>,
     ) -> Option<ForceWindow> {
-        let (gated, ungated) = (averages.h1.as_deref()?, ungated?);
+        let change = change?;
         let mut largest: Option<f64> = None;
         for reading in readings.iter().filter(|reading| reading.label.is_none()) {
-            let line = averages.lines.nearest(reading.frequency);
-            let (mut change, mut all) = (0.0, 0.0);
-            for (with, without) in gated.iter().zip(ungated) {
-                change += (with[line] - without[line]).norm_sqr();
-                all += without[line].norm_sqr();
-            }
-            if all > 0.0 {
-                largest = Some(f64::max(largest.unwrap_or(0.0), (change / all).sqrt()));
+            let line = self.lines.nearest(reading.frequency);
+            let (changed, whole) = (change.changed[line], change.whole[line]);
+            if whole > 0.0 {
+                largest = Some(f64::max(largest.unwrap_or(0.0), (changed / whole).sqrt()));
             }
         }
         let rate = self.recording.sample_rate();
-        let windows = self.averaged().filter_map(|tap| pulse_window(tap, rate));
+        let windows = self.averaged().filter_map(|tap| PulseWindow::of(tap, rate));
         let lengths: Vec<f64> = windows.map(PulseWindow::length).collect();
         Some(ForceWindow {
             length: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64 / rate,
@@ -528,132 +530,7 @@ impl<'a> Stage<'a> {
         readings
     }
 
-    /// First frame of the decay after a tap.
-    fn begin(&self, tap: &Tap) -> u64 {
-        let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
-        let trigger = (tap.time * self.recording.sample_rate()).round();
-        let begin = tap.pulse_end.unwrap_or((trigger + after) as u64);
-        // Samples that were cut off are no decay.
-        begin.max(tap.usable_from())
-    }
-
-    /// Reads the decays; `None` where they are too short for a fit.
-    fn free_decays(&self) -> Result<Option<FreeDecays>, RecordingError> {
-        let taps: Vec<&Tap> = self.taps.accepted().collect();
-        let lengths = taps
-            .iter()
-            .map(|tap| (tap.usable_from() + self.gate).saturating_sub(self.begin(tap)));
-        let shortest = lengths.min().unwrap_or(0);
-        let samples = match largest_smooth_block(shortest as usize) {
-            Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
-            _ => return Ok(None),
-        };
-        let most = MOST_KEPT / (samples * self.responses()).max(1);
-        let (mut decays, mut forces) = (Vec::new(), Vec::new());
-        for (number, tap) in taps.into_iter().take(most.max(1)).enumerate() {
-            let (decay, force) = self.decay(tap, samples)?;
-            forces.extend(force.map(|samples| TapForce {
-                tap: number,
-                start: -(samples.len() as f64) / decay.sample_rate,
-                samples,
-                sample_rate: decay.sample_rate,
-            }));
-            decays.push(decay);
-        }
-        Ok(FreeDecays::new(samples, &self.lines, decays, forces).ok())
-    }
-
     fn responses(&self) -> usize {
         self.channels.len() - usize::from(self.has_force)
     }
-
-    /// The decay after a tap, and the force before it.
-    fn decay(
-        &self,
-        tap: &Tap,
-        samples: usize,
-    ) -> Result<(Decay, Option<Vec<f64>>), RecordingError> {
-        let rate = self.recording.sample_rate();
-        let begin = self.begin(tap);
-        let mut channels = self.read(tap.record.start..begin + samples as u64)?;
-        let before = (begin - tap.record.start) as usize;
-        let responses = channels.split_off(usize::from(self.has_force));
-        let force = channels.pop().filter(|_| tap.is_whole());
-        let force = force.map(|mut force| {
-            remove_offset(&mut force, rate);
-            if let Some(window) = pulse_window(tap, rate) {
-                window.apply(&mut force);
-            }
-            force.truncate(before);
-            force
-        });
-        let decay = Decay {
-            start: begin as f64 / rate - tap.time,
-            sample_rate: rate,
-            responses: responses
-                .into_iter()
-                .map(|x| x[before.min(x.len())..].to_vec())
-                .collect(),
-        };
-        Ok((decay, force))
-    }
-}
-
-/// Window about the pulse of a tap in its record (samples): zero before `start`, unity for `length`
-/// from there, a taper of the pulse's own length after it.
-#[derive(Clone, Copy)]
-struct PulseWindow {
-    start: usize,
-    length: usize,
-    taper: usize,
-}
-
-/// The ringing of a filter ahead of a pulse lasts no longer than this (s), or eight samples.
-const AHEAD_OF_PULSE: f64 = 2e-3;
-
-/// The force window of a tap, from just before the trigger to the end of the pulse. It goes on for as long again,
-/// since the search for that end may stop early. Noise and offset of the hammer before and after would ripple through
-/// every quotient. `None` without a hammer.
-fn pulse_window(tap: &Tap, sample_rate: f64) -> Option<PulseWindow> {
-    let trigger = (tap.time * sample_rate).round() as u64;
-    let pulse = tap.pulse_end?.saturating_sub(trigger).max(1) as usize;
-    let into = trigger.saturating_sub(tap.record.start) as usize;
-    let ahead = ((AHEAD_OF_PULSE * sample_rate) as usize).max(8).min(into);
-    Some(PulseWindow {
-        start: into - ahead,
-        length: ahead + 2 * pulse,
-        taper: pulse,
-    })
-}
-
-impl PulseWindow {
-    fn apply(self, force: &mut [f64]) {
-        let start = self.start.min(force.len());
-        force[..start].fill(0.0);
-        apply_force_window(&mut force[start..], self.length, self.taper);
-    }
-
-    /// Length of the window (samples), half of its taper included.
-    fn length(self) -> f64 {
-        self.length as f64 + 0.5 * self.taper as f64
-    }
-
-    /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.
-    fn energy(self) -> f64 {
-        self.length as f64 + 0.375 * self.taper as f64
-    }
-}
-
-/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
-/// median is the level at rest, and short beside the drift of its amplifier.
-const OFFSET_STRETCH: f64 = 0.2;
-
-/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
-/// that level: the pulses are in it, and over the force window the difference amounts to a percent
-/// of a pulse's momentum.
-fn remove_offset(force: &mut [f64], sample_rate: f64) {
-    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
-    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
-    let rest = median(&mut about);
-    force.iter_mut().for_each(|x| *x -= rest);
 }

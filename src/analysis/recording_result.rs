@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use tapjoint_beam::specimen::PointMass;
 use tapjoint_description::SensorKind;
 use tapjoint_signal::modal::ModeReading;
-use tapjoint_signal::recording::{ChannelInfo, Format, Recording, RecordingError};
+use tapjoint_signal::recording::{ChannelInfo, Extremes, Format, Recording, RecordingError};
 use tapjoint_signal::taps::{TapSource, Taps};
 
 /// One recording.
@@ -88,7 +88,7 @@ pub struct Overview {
     pub low: Vec<f64>,
     /// Largest value of each piece.
     pub high: Vec<f64>,
-    /// The samples about each tap.
+    /// The samples about each of the first 200 taps.
     pub close_ups: Vec<CloseUp>,
 }
 
@@ -138,18 +138,29 @@ const OVERVIEW_PIECES: u64 = 2400;
 pub(super) fn overview(recording: &Recording, channel: usize) -> Result<Overview, RecordingError> {
     let piece = recording.frames().div_ceil(OVERVIEW_PIECES).max(1) as usize;
     let mean = recording.mean(channel);
-    let (mut low, mut high) = (Vec::new(), Vec::new());
-    for block in recording.blocks(&[channel], piece * 16) {
-        let block = block?.samples;
-        for samples in block.iter().flat_map(|samples| samples.chunks(piece)) {
-            low.push(samples.iter().copied().fold(f64::INFINITY, f64::min) - mean);
-            high.push(samples.iter().copied().fold(f64::NEG_INFINITY, f64::max) - mean);
+    let (mut pieces, mut length) = (Vec::new(), piece);
+    match recording.outline(channel) {
+        // Of a long recording the extremes are known.
+        Some(outline) if outline.length <= piece => {
+            let together = piece.div_ceil(outline.length);
+            length = together * outline.length;
+            pieces.extend(outline.pieces.chunks(together).map(|pieces| {
+                let pieces = pieces.iter().copied();
+                pieces.fold(Extremes::NONE, Extremes::with)
+            }));
+        }
+        _ => {
+            for block in recording.blocks(&[channel], piece * 16) {
+                let block = block?.samples;
+                let samples = block.iter().flat_map(|samples| samples.chunks(piece));
+                pieces.extend(samples.map(Extremes::of));
+            }
         }
     }
     Ok(Overview {
-        step: piece as f64 / recording.sample_rate(),
-        low,
-        high,
+        step: length as f64 / recording.sample_rate(),
+        low: pieces.iter().map(|piece| piece.low - mean).collect(),
+        high: pieces.iter().map(|piece| piece.high - mean).collect(),
         close_ups: Vec::new(),
     })
 }
@@ -161,7 +172,10 @@ const AFTER: f64 = 30e-3;
 /// Shown after a second hit (s): its pulse.
 const AFTER_SECOND: f64 = 10e-3;
 
-/// The samples about each tap.
+/// Most taps whose samples are kept for the page, the first ones: each takes some kilobytes.
+const MOST_CLOSE_UPS: usize = 200;
+
+/// The samples about the first taps.
 pub(super) fn close_ups(
     recording: &Recording,
     source: &TapSource,
@@ -172,8 +186,9 @@ pub(super) fn close_ups(
         TapSource::Responses(responses) => (None, responses),
     };
     let rate = recording.sample_rate();
-    let mut all = Vec::with_capacity(taps.taps.len());
-    for tap in &taps.taps {
+    let shown_taps = &taps.taps[..taps.taps.len().min(MOST_CLOSE_UPS)];
+    let mut all = Vec::with_capacity(shown_taps.len());
+    for tap in shown_taps {
         let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
         let after = second.map_or(AFTER, |second| second.max(AFTER));
         let first = ((tap.time - BEFORE) * rate).round().max(0.0) as u64;

@@ -6,13 +6,13 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use claxon::frame::{Block, FrameReader};
 use claxon::input::ReadBytes;
 
 use super::error::{RecordingError, RecordingWarning, short, unreadable};
 use super::health::{HealthMeter, check_rate};
+use super::kept::KeptSamples;
 use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, read_fully};
 
 /// Bytes of the block of metadata that states rate, channels and bits.
@@ -52,6 +52,7 @@ pub(super) fn open_flac(
     // The positive end of the format; the negative one lies a step farther.
     let full_scale = 1.0 - info.step();
     let mut meters = vec![HealthMeter::new(Some(full_scale)); info.channels];
+    let mut kept = KeptSamples::new(info.channels);
     let mut buffer = Vec::new();
     let mut samples = Vec::new();
     let mut cut = false;
@@ -68,10 +69,11 @@ pub(super) fn open_flac(
             Err(_) if info.promised > 0 && source.frames >= info.promised => break,
             Err(problem) => return Err(problem),
         };
-        for (channel, meter) in (0..).zip(&mut meters) {
+        for (channel, meter) in meters.iter_mut().enumerate() {
             samples.clear();
-            samples.extend(block.channel(channel).iter().map(|x| info.value(*x)));
+            samples.extend(block.channel(channel as u32).iter().map(|x| info.value(*x)));
             meter.add(&samples);
+            kept.add(channel, &samples);
         }
         source.places.push(place);
         source.frames += u64::from(block.duration());
@@ -108,7 +110,7 @@ pub(super) fn open_flac(
             .map(|meter| ChannelInfo::unscaled(None, None, meter))
             .collect(),
         warnings,
-        source: Arc::new(source),
+        source: kept.or_file(source),
         parts: Vec::new(),
     })
 }

@@ -1,9 +1,11 @@
 //! Quality of a channel's samples, gathered in one pass, and the checks that samples and rates must pass.
 
 use super::error::{RecordingError, short};
+use super::outline::{Extremes, Outline};
 use super::text::LARGEST;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Longest list of places kept for one channel and one fault; beyond it only the count grows.
 const PLACES_KEPT: usize = 32;
@@ -58,6 +60,9 @@ const MIN_ACTIVITY_QUANTA: f64 = 8.0;
 /// Weight of the newest step in the running mean of steps: a memory of about 16 samples, half of
 /// the shortest dropout.
 const ACTIVITY_WEIGHT: f64 = 1.0 / 16.0;
+
+/// Samples that are added together where nothing about them is remarkable.
+const PIECE: usize = 64;
 
 /// Part of the recording that may stand still before standing still is taken for the channel's
 /// rest (a gated or noise-free channel) instead of lost samples.
@@ -195,6 +200,9 @@ pub struct ChannelHealth {
     /// All samples are equal: nothing was connected, or nothing was recorded.
     #[serde(skip)]
     pub constant: bool,
+    /// Extremes piece by piece, in the units of the file; none of joined files.
+    #[serde(skip)]
+    pub(super) outline: Arc<Outline>,
 }
 
 impl ChannelHealth {
@@ -219,6 +227,7 @@ impl ChannelHealth {
     /// Returns the health of samples, `frames` of them, that are followed by `others` of another file.
     pub(super) fn followed_by(&self, frames: u64, other: &Self, others: u64) -> Self {
         let mut both = self.clone();
+        both.outline = Arc::default();
         let (own, more) = (frames as f64, others as f64);
         let total = own + more;
         let difference = other.mean - self.mean;
@@ -329,6 +338,9 @@ pub(super) struct HealthMeter {
     low: Side,
     /// Samples in all runs that are long enough for a dropout.
     still_samples: u64,
+    outline: Outline,
+    /// Weights of the steps of a piece in the running mean at its end.
+    weights: [f64; PIECE],
     /// The result as far as it is known; its values at the extremes come at the end.
     health: ChannelHealth,
 }
@@ -414,6 +426,11 @@ impl Side {
     fn holds(&self, value: f64) -> bool {
         value * self.sign == self.level
     }
+
+    /// Returns true where the level lies so far above a value that [`raise`](Self::raise) would not count it.
+    fn is_above(&self, value: f64) -> bool {
+        value * self.sign < self.level - NEAR_LEVEL * self.level.abs()
+    }
 }
 
 impl HealthMeter {
@@ -430,6 +447,10 @@ impl HealthMeter {
             high: Side::new(1.0),
             low: Side::new(-1.0),
             still_samples: 0,
+            outline: Outline::default(),
+            weights: std::array::from_fn(|place| {
+                ACTIVITY_WEIGHT * (1.0 - ACTIVITY_WEIGHT).powi((PIECE - 1 - place) as i32)
+            }),
             health: ChannelHealth::default(),
         }
     }
@@ -444,46 +465,101 @@ impl HealthMeter {
         if samples.is_empty() {
             return;
         }
+        self.outline.add(samples);
         let added = samples.len() as f64;
         let before = self.count as f64;
-        let mean = samples.iter().sum::<f64>() / added;
-        let squares: f64 = samples.iter().map(|x| (x - mean) * (x - mean)).sum();
+        let mean = sum_of(samples, |x| x) / added;
+        let squares = sum_of(samples, |x| (x - mean) * (x - mean));
         let difference = mean - self.health.mean;
         let total = before + added;
         self.health.mean += difference * added / total;
         self.sum_of_squares += squares + difference * difference * before * added / total;
-        for value in samples.iter().copied() {
-            let at = self.count;
-            self.count += 1;
-            if self.full_scale.is_some_and(|level| value.abs() >= level) {
-                self.health.full_scale_samples += 1;
-                self.health.first_full_scale.get_or_insert(at);
+        let (pieces, rest) = samples.as_chunks::<PIECE>();
+        for piece in pieces {
+            match self.is_ordinary(piece) {
+                true => self.add_ordinary(piece),
+                false => piece.iter().for_each(|value| self.add_sample(*value)),
             }
-            // The first sample has no step; it begins a run.
-            let step = if at > 0 {
-                (value - self.last).abs()
-            } else {
-                0.0
-            };
-            if at > 0 && step == 0.0 {
-                self.run.len += 1;
-            } else {
-                if at > 0 {
-                    self.quantum = self.quantum.min(step);
-                    self.end_run(step);
-                }
-                self.high.raise(value);
-                self.low.raise(value);
-                self.run = Run {
-                    start: at,
-                    len: 1,
-                    entry: step,
-                    activity: self.activity,
-                };
-            }
-            self.activity += ACTIVITY_WEIGHT * (step - self.activity);
-            self.last = value;
         }
+        rest.iter().for_each(|value| self.add_sample(*value));
+    }
+
+    fn add_sample(&mut self, value: f64) {
+        let at = self.count;
+        self.count += 1;
+        if self.full_scale.is_some_and(|level| value.abs() >= level) {
+            self.health.full_scale_samples += 1;
+            self.health.first_full_scale.get_or_insert(at);
+        }
+        // The first sample has no step; it begins a run.
+        let step = if at > 0 {
+            (value - self.last).abs()
+        } else {
+            0.0
+        };
+        if at > 0 && step == 0.0 {
+            self.run.len += 1;
+        } else {
+            if at > 0 {
+                self.quantum = self.quantum.min(step);
+                self.end_run(step);
+            }
+            self.high.raise(value);
+            self.low.raise(value);
+            self.run = Run {
+                start: at,
+                len: 1,
+                entry: step,
+                activity: self.activity,
+            };
+        }
+        self.activity += ACTIVITY_WEIGHT * (step - self.activity);
+        self.last = value;
+    }
+
+    /// Returns true for samples of which no two neighbours are equal and none comes near an extreme: they only move the
+    /// running values.
+    fn is_ordinary(&self, piece: &[f64; PIECE]) -> bool {
+        let Extremes { low, high } = Extremes::of(piece);
+        let full = self.full_scale.unwrap_or(f64::INFINITY);
+        let mut repeats = piece[0] == self.last;
+        for (before, value) in piece.iter().zip(&piece[1..]) {
+            repeats |= before == value;
+        }
+        self.count > 0
+            && !repeats
+            && self.high.is_above(high)
+            && self.low.is_above(low)
+            && high.max(-low) < full
+    }
+
+    /// Adds samples as [`add_sample`](Self::add_sample) does, all of them together.
+    fn add_ordinary(&mut self, piece: &[f64; PIECE]) {
+        let mut steps = [0.0; PIECE];
+        steps[0] = (piece[0] - self.last).abs();
+        for (step, pair) in steps[1..].iter_mut().zip(piece.windows(2)) {
+            *step = (pair[1] - pair[0]).abs();
+        }
+        self.quantum = self.quantum.min(steps[0]);
+        self.end_run(steps[0]);
+        let smallest = Extremes::of(&steps).low;
+        self.quantum = self.quantum.min(smallest);
+        // The running mean a <- (1 - w) a + w s, all steps at once.
+        let mut activity = self.activity * (1.0 - ACTIVITY_WEIGHT).powi(PIECE as i32);
+        for (step, weight) in steps.iter().zip(&self.weights) {
+            activity += weight * step;
+        }
+        let entry = steps[PIECE - 1];
+        let before_entry = (activity - ACTIVITY_WEIGHT * entry) / (1.0 - ACTIVITY_WEIGHT);
+        self.activity = activity;
+        self.count += PIECE as u64;
+        self.last = piece[PIECE - 1];
+        self.run = Run {
+            start: self.count - 1,
+            len: 1,
+            entry,
+            activity: before_entry,
+        };
     }
 
     /// Judges the run that ends with a step of magnitude `exit` (0 at the end of the recording).
@@ -539,6 +615,7 @@ impl HealthMeter {
         }
         self.end_run(0.0);
         let mut health = self.health;
+        health.outline = Arc::new(self.outline);
         (health.maximum, health.minimum) = (self.high.level, -self.low.level);
         health.rms = (self.sum_of_squares / self.count as f64).sqrt();
         health.peak = health.maximum.abs().max(health.minimum.abs());
@@ -565,4 +642,16 @@ impl HealthMeter {
         }
         health
     }
+}
+
+/// Sum of a term over some values. Eight sums run side by side, for each addition waits for the last.
+fn sum_of(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
+    let mut sums = [0.0; 8];
+    let (lanes, rest) = values.as_chunks::<8>();
+    for values in lanes {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += term(*value);
+        }
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|value| term(*value)).sum::<f64>()
 }

@@ -27,11 +27,15 @@ mod flac;
 mod function_text;
 mod health;
 mod joined;
+mod kept;
 mod lvm;
 mod mat;
+mod outline;
 mod resample;
 mod response_files;
 mod responses;
+#[cfg(test)]
+mod sweeps;
 mod text;
 mod uff;
 mod units;
@@ -42,6 +46,7 @@ pub use error::{RecordingError, RecordingWarning};
 pub use health::{ChannelHealth, EqualRun};
 pub use joined::MOST_FILES;
 pub use mat::{VariableRole, Variables};
+pub use outline::{Extremes, Outline};
 pub use response_files::open_frequency_responses;
 pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
 pub use text::Separator;
@@ -410,6 +415,13 @@ impl Recording {
             .map_or(0.0, |info| info.health.mean)
     }
 
+    /// Extremes of a channel piece by piece (its unit); `None` for a joined or an unknown channel.
+    pub fn outline(&self, channel: usize) -> Option<Outline> {
+        let info = self.channels.get(channel)?;
+        let outline = &info.health.outline;
+        (!outline.pieces.is_empty()).then(|| outline.scaled(info.scale))
+    }
+
     /// The doubts about this recording: of the file as a whole, then channel by channel. Those about a joined recording
     /// are those of its [`parts`](Self::parts).
     pub fn warnings(&self) -> Vec<RecordingWarning> {
@@ -441,16 +453,31 @@ impl Recording {
         channels: &[usize],
         range: Range<u64>,
     ) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let mut samples = vec![Vec::new(); channels.len()];
+        self.read_into(channels, range, &mut samples)?;
+        Ok(samples)
+    }
+
+    /// [`read_channels`](Self::read_channels) into `samples`, one vector for each channel, whose room is used again.
+    ///
+    /// # Errors
+    /// Those of [`read_channels`](Self::read_channels).
+    pub fn read_into(
+        &self,
+        channels: &[usize],
+        range: Range<u64>,
+        samples: &mut [Vec<f64>],
+    ) -> Result<(), RecordingError> {
         self.check_channels(channels)?;
         let end = range.end.min(self.frames);
         let start = range.start.min(end);
-        let mut samples = vec![Vec::new(); channels.len()];
+        samples.iter_mut().for_each(Vec::clear);
         if start < end {
             let mut cursor = self.source.cursor(start)?;
-            cursor.read(channels, end - start, &mut samples)?;
+            cursor.read(channels, end - start, samples)?;
         }
-        self.scale(channels, &mut samples);
-        Ok(samples)
+        self.scale(channels, samples);
+        Ok(())
     }
 
     /// The whole recording in blocks of `block` samples (at least 1), the last one shorter. After

@@ -7,10 +7,10 @@
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_finite};
+use super::kept::KeptSamples;
 use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, read_fully};
 
 /// More chunks than this are taken for garbage: real files have a dozen.
@@ -47,16 +47,20 @@ pub(super) fn open_wav(
     let all: Vec<usize> = (0..source.channels).collect();
     let mut meters = vec![HealthMeter::new(source.coding.full_scale()); source.channels];
     let per_block = (PASS_SAMPLES / source.channels).max(1) as u64;
+    let mut kept = KeptSamples::new(source.channels);
     let mut cursor = source.reader(0)?;
+    let mut block = vec![Vec::new(); all.len()];
     while cursor.at < frames {
         let start = cursor.at;
-        let mut block = vec![Vec::new(); all.len()];
+        block.iter_mut().for_each(Vec::clear);
         cursor.read(&all, per_block, &mut block)?;
         for ((channel, samples), meter) in block.iter().enumerate().zip(&mut meters) {
             check_finite(&file, sample_rate, channel, start, samples)?;
             meter.add(samples);
+            kept.add(channel, samples);
         }
     }
+    drop(cursor);
     let channels = meters.into_iter();
     Ok(Recording {
         name: file,
@@ -67,7 +71,7 @@ pub(super) fn open_wav(
             .map(|meter| ChannelInfo::unscaled(None, None, meter))
             .collect(),
         warnings,
-        source: Arc::new(source),
+        source: kept.or_file(source),
         parts: Vec::new(),
     })
 }
@@ -164,7 +168,6 @@ impl WavSource {
             reader: opened.map_err(|source| unreadable(&self.file, source))?,
             at,
             bytes: Vec::new(),
-            values: Vec::new(),
         })
     }
 
@@ -183,11 +186,12 @@ impl WavSource {
         let (mut low_bits_zero, mut fits) = (true, true);
         let mut cursor = self.reader(0)?;
         while cursor.at < ALIGNMENT_FRAMES {
-            let block = cursor.next_interleaved(ALIGNMENT_FRAMES - cursor.at)?;
-            if block.is_empty() {
+            if cursor.next_bytes(ALIGNMENT_FRAMES - cursor.at)? == 0 {
                 break;
             }
-            for value in block {
+            let mut values = Vec::new();
+            (0..self.channels).for_each(|channel| cursor.decode(channel, &mut values));
+            for value in &values {
                 let steps = value * 2_f64.powi(i32::from(valid) - 1);
                 low_bits_zero &= steps == steps.trunc();
                 fits &= (-limit..limit).contains(value);
@@ -212,8 +216,8 @@ struct WavCursor<'a> {
     reader: File,
     /// The next frame.
     at: u64,
+    /// Bytes that were read last.
     bytes: Vec<u8>,
-    values: Vec<f64>,
 }
 
 impl Cursor for WavCursor<'_> {
@@ -223,12 +227,11 @@ impl Cursor for WavCursor<'_> {
         limit: u64,
         into: &mut [Vec<f64>],
     ) -> Result<(), RecordingError> {
-        let count = self.source.channels;
         let end = self.source.frames.min(self.at.saturating_add(limit));
         while self.at < end {
-            let values = self.next_interleaved(end - self.at)?;
+            self.next_bytes(end - self.at)?;
             for (channel, samples) in channels.iter().zip(into.iter_mut()) {
-                samples.extend(values.iter().skip(*channel).step_by(count));
+                self.decode(*channel, samples);
             }
         }
         Ok(())
@@ -236,12 +239,11 @@ impl Cursor for WavCursor<'_> {
 }
 
 impl WavCursor<'_> {
-    /// The next frames, at most `limit` and at most one block, channel after channel; integers with full scale 1.
-    fn next_interleaved(&mut self, limit: u64) -> Result<&[f64], RecordingError> {
+    /// Reads the bytes of the next frames, at most `limit` and at most one block; returns the number of frames.
+    fn next_bytes(&mut self, limit: u64) -> Result<u64, RecordingError> {
         let source = self.source;
         let per_block = (BLOCK_BYTES / source.frame_bytes).max(1);
         let frames = limit.min(per_block).min(source.frames - self.at);
-        self.values.clear();
         self.bytes.resize((frames * source.frame_bytes) as usize, 0);
         let got = read_fully(&mut self.reader, &mut self.bytes)
             .map_err(|error| unreadable(&source.file, error))?;
@@ -249,33 +251,40 @@ impl WavCursor<'_> {
             let lost = self.at + got as u64 / source.frame_bytes;
             return Err(RecordingError::changed(&source.file, lost));
         }
-        let values = &mut self.values;
-        match source.coding {
-            Coding::Float { bits: 32 } => {
-                let (samples, _) = self.bytes.as_chunks::<4>();
-                values.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
-            }
-            Coding::Float { .. } => {
-                let (samples, _) = self.bytes.as_chunks::<8>();
-                values.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
-            }
+        self.at += frames;
+        Ok(frames)
+    }
+
+    /// Appends the samples of a channel in the bytes that were read last; integers with full scale 1.
+    fn decode(&self, channel: usize, into: &mut Vec<f64>) {
+        let coding = self.source.coding;
+        let first = channel * coding.bytes() as usize;
+        let frames = self.bytes.chunks_exact(self.source.frame_bytes as usize);
+        let samples = frames.map(|frame| &frame[first..]);
+        match coding {
+            Coding::Float { bits: 32 } => into.extend(samples.map(|x| {
+                let bytes = x.first_chunk::<4>().copied().unwrap_or_default();
+                f64::from(f32::from_le_bytes(bytes))
+            })),
+            Coding::Float { .. } => into.extend(samples.map(|x| {
+                let bytes = x.first_chunk::<8>().copied().unwrap_or_default();
+                f64::from_le_bytes(bytes)
+            })),
             Coding::Integer { bits: 8, .. } => {
-                values.extend(self.bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
+                into.extend(samples.map(|x| (f64::from(x[0]) - 128.0) / 128.0));
             }
             Coding::Integer { bits, full, .. } => {
                 let full_scale = 2_f64.powi(i32::from(full) - 1);
                 let width = usize::from(bits / 8);
-                for sample in self.bytes.chunks_exact(width) {
+                into.extend(samples.map(|x| {
                     // Filled from the high end and shifted down again, so that the sign extends itself.
                     let mut padded = [0_u8; 4];
-                    padded[4 - width..].copy_from_slice(sample);
+                    padded[4 - width..].copy_from_slice(&x[..width]);
                     let value = i32::from_le_bytes(padded) >> (32 - bits);
-                    values.push(f64::from(value) / full_scale);
-                }
+                    f64::from(value) / full_scale
+                }));
             }
         }
-        self.at += frames;
-        Ok(&self.values)
     }
 }
 

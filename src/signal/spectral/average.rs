@@ -53,24 +53,31 @@ impl SpectralAverager {
             lines,
             taps: 0,
             force_power: vec![0.0; points],
-            cross: vec![vec![Complex64::ZERO; points]; responses],
+            cross: vec![Vec::new(); responses],
             response_power: vec![vec![0.0; points]; responses],
         }
     }
 
+    /// Number of taps so far.
+    pub fn taps(&self) -> usize {
+        self.taps
+    }
+
     /// Adds one tap: the force's transform (if there is a hammer) and each response's.
-    pub fn add(&mut self, force: Option<&[Complex64]>, responses: &[Vec<Complex64>]) {
+    pub fn add(&mut self, force: Option<&[Complex64]>, responses: &[impl AsRef<[Complex64]>]) {
         self.taps += 1;
-        if let Some(force) = force {
-            add_power(&mut self.force_power, force);
+        for (power, response) in self.response_power.iter_mut().zip(responses) {
+            add_power(power, response.as_ref());
         }
-        let sums = self.response_power.iter_mut().zip(&mut self.cross);
-        for ((power, cross), response) in sums.zip(responses) {
-            add_power(power, response);
-            if let Some(force) = force {
-                for ((sum, f), x) in cross.iter_mut().zip(force).zip(response) {
-                    *sum += f.conj() * x;
-                }
+        let Some(force) = force else {
+            return;
+        };
+        add_power(&mut self.force_power, force);
+        for (cross, response) in self.cross.iter_mut().zip(responses) {
+            // Nothing was in memory for it before the first force.
+            cross.resize(force.len(), Complex64::ZERO);
+            for ((sum, f), x) in cross.iter_mut().zip(force).zip(response.as_ref()) {
+                *sum += f.conj() * x;
             }
         }
     }
@@ -83,6 +90,7 @@ impl SpectralAverager {
             add_all(sum, values);
         }
         for (sum, values) in self.cross.iter_mut().zip(&other.cross) {
+            sum.resize(values.len().max(sum.len()), Complex64::ZERO);
             add_all(sum, values);
         }
     }

@@ -5,6 +5,7 @@
 //! padding adds lines, never resolution.
 
 mod average;
+mod thinning;
 mod transform;
 mod window;
 
@@ -12,6 +13,7 @@ pub use average::{
     AveragedSpectra, FrfEstimator, LinePowers, LineQuality, SpectralAverager, TapRecord,
     average_records, random_error,
 };
+pub use thinning::Thinning;
 pub(crate) use transform::kaiser_beta;
 pub use transform::{Transformer, Workspace, band_limited, transform_block};
 pub use window::{

@@ -197,32 +197,13 @@ impl Decimator {
         factor: usize,
         length: usize,
     ) -> Self {
-        // The low-pass has odd length, is symmetric, and unity at 0 Hz.
         let pass = width / 2.0;
         let stop = sample_rate / factor as f64 - width / 2.0;
-        let transition = TAU * (stop - pass) / sample_rate;
-        // Kaiser's length: (A - 7.95)/(2.285 transition).
-        let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
-        let cut_off = PI * (pass + stop) / sample_rate;
-        let beta = kaiser_beta(STOP_BAND_DB);
-        let mut filter: Vec<f64> = (-half..=half)
-            .map(|n| {
-                let sinc = if n == 0 {
-                    cut_off / PI
-                } else {
-                    (cut_off * n as f64).sin() / (PI * n as f64)
-                };
-                let edge = n as f64 / (half as f64 + 1.0);
-                sinc * bessel_i0(beta * (1.0 - edge * edge).sqrt()) / bessel_i0(beta)
-            })
-            .collect();
-        let sum: f64 = filter.iter().sum();
-        filter.iter_mut().for_each(|tap| *tap /= sum);
         Decimator {
             oscillator: (0..length)
                 .map(|n| Complex64::from_polar(1.0, phase(centre / sample_rate, n as f64)))
                 .collect(),
-            filter,
+            filter: low_pass(pass, stop, sample_rate),
             factor,
         }
     }
@@ -254,6 +235,30 @@ impl Decimator {
             })
             .collect()
     }
+}
+
+/// A low-pass filter with Kaiser's window, which passes up to `pass` and stops from `stop` (Hz) on: of odd length,
+/// symmetric, unity at 0 Hz.
+pub(super) fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
+    let transition = TAU * (stop - pass) / sample_rate;
+    // Kaiser's length: (A - 7.95)/(2.285 transition).
+    let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
+    let cut_off = PI * (pass + stop) / sample_rate;
+    let beta = kaiser_beta(STOP_BAND_DB);
+    let mut filter: Vec<f64> = (-half..=half)
+        .map(|n| {
+            let sinc = if n == 0 {
+                cut_off / PI
+            } else {
+                (cut_off * n as f64).sin() / (PI * n as f64)
+            };
+            let edge = n as f64 / (half as f64 + 1.0);
+            sinc * bessel_i0(beta * (1.0 - edge * edge).sqrt()) / bessel_i0(beta)
+        })
+        .collect();
+    let sum: f64 = filter.iter().sum();
+    filter.iter_mut().for_each(|tap| *tap /= sum);
+    filter
 }
 
 /// Magnitude over time of what `samples` have between `low` and `high` (Hz): mixed down, filtered and

@@ -63,6 +63,11 @@ impl SecondHit {
     }
 }
 
+/// Least height of a candidate for a second hit, over the tap's peak.
+pub(super) fn least_candidate(settings: &TapSettings) -> f64 {
+    CANDIDATE * settings.double_hit_warning
+}
+
 /// The largest second hit in the force about an event, from `double_hit_warning` of the peak up.
 ///
 /// `own` ends where the next event may begin; only there an excursion counts whatever its form.

@@ -16,7 +16,7 @@ use std::fmt;
 use std::ops::Range;
 
 use crate::recording::{Recording, RecordingError};
-use double_hit::second_hit;
+use double_hit::{least_candidate, second_hit};
 use nalgebra::{DMatrix, DVector};
 use search::{Force, Survey, find_pulses, find_rises};
 use tapjoint_numerics::stats::{median, root_mean_square};
@@ -506,10 +506,9 @@ fn tap(
     });
     let start = event.trigger.saturating_sub(before);
     let record = start..end.max(start);
-    // Least distance of two taps (frames).
-    let least = (settings.least_distance * rate) as u64;
+    let least = least_distance(recording, settings);
     let (mut pulse_end, mut pulse, mut second) = (None, None, None);
-    if let Some(force) = force_of(recording, source, found, index, &record, least)? {
+    if let Some(force) = force_of(recording, source, found, index, &record, settings)? {
         let own = force.index(record.end.min(event.trigger + least));
         let end = force.pulse_end(event, own);
         let start = force.index(record.start);
@@ -548,8 +547,16 @@ fn tap(
     })
 }
 
+/// Least distance of two taps (frames).
+fn least_distance(recording: &Recording, settings: &TapSettings) -> u64 {
+    (settings.least_distance * recording.sample_rate()) as u64
+}
+
+/// Surroundings of a tap whose disturbances are compared with a second hit (least distances of two taps).
+const SURROUNDINGS: u64 = 4;
+
 /// The force over an event's record and ahead of it, as far as that belongs to no other event; `None`
-/// without a hammer. `least` is the least distance of two taps (frames). Pulses that no sensor answers are taken out:
+/// without a hammer. Pulses that no sensor answers are taken out:
 /// they are no hits of the structure.
 fn force_of(
     recording: &Recording,
@@ -557,8 +564,9 @@ fn force_of(
     found: &Found,
     index: usize,
     record: &Range<u64>,
-    least: u64,
+    settings: &TapSettings,
 ) -> Result<Option<Force>, RecordingError> {
+    let least = least_distance(recording, settings);
     let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
         return Ok(None);
     };
@@ -574,9 +582,14 @@ fn force_of(
         end = end.saturating_sub(least).max(end.min(trigger + least));
     }
     let longest = (SEARCHED * recording.sample_rate()) as u64;
-    let frames = first..end.min(trigger + longest);
-    let mut force = Force::read(recording, *channel, survey, frames)?;
-    for (other, event) in events.iter().enumerate() {
+    let end = end.min(trigger + longest);
+    // Beyond the tap's surroundings only what may be a second hit is read.
+    let near = end.min(trigger + SURROUNDINGS * least);
+    let end = survey.last_reaching(least_candidate(settings) * events[index].peak, near..end);
+    let mut force = Force::read(recording, *channel, survey, first..end)?;
+    let inside = events.partition_point(|event| event.trigger + least < first)
+        ..events.partition_point(|event| event.trigger < end + least);
+    for (event, other) in events[inside.clone()].iter().zip(inside) {
         if other != index && !event.answered {
             let start = force.index(event.trigger.saturating_sub(least / 100));
             let end = force.index(event.trigger + least);
@@ -609,6 +622,11 @@ fn overload(
         let hair = 1e-9 * info.health.peak;
         let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
         let high = high.map_or(f64::INFINITY, |high| high - hair);
+        let outline = recording.outline(channel).unwrap_or_default();
+        let mut pieces = outline.pieces[outline.pieces_of(record.clone())].iter();
+        if !pieces.any(|piece| piece.high >= high || piece.low <= low) {
+            continue;
+        }
         let samples = recording.read(channel, record.clone())?;
         let cut_off = samples.iter().enumerate();
         let cut_off = cut_off.filter(|(_, x)| **x >= high || **x <= low);
@@ -697,23 +715,23 @@ fn is_answered(
     if responses.is_empty() || stretch < 8 || event.trigger < 2 * stretch {
         return Ok(true);
     }
-    let before = event.trigger - gap - stretch..event.trigger - gap;
-    let after = event.trigger..event.trigger + stretch;
-    for &response in responses {
-        let quiet = recording.read(response, before.clone())?;
-        let loud = recording.read(response, after.clone())?;
-        if rms_about_mean(&loud) > RISE * rms_about_mean(&quiet)
-            || rms_of_change(&loud) > RISE * rms_of_change(&quiet)
+    let continued = (CONTINUED * recording.sample_rate()) as u64;
+    // Two taps lie no nearer, so that the stretch before the trigger is part of what is read.
+    let first = (event.trigger - gap).saturating_sub(continued.max(stretch));
+    let samples = recording.read_channels(responses, first..event.trigger + stretch)?;
+    let turn = (event.trigger - gap - first) as usize;
+    let trigger = (event.trigger - first) as usize;
+    let lag = ((LAG * recording.sample_rate()) as usize).max(1);
+    for ringing in &samples {
+        let quiet = &ringing[turn - stretch as usize..turn];
+        let loud = &ringing[trigger.min(ringing.len())..];
+        if rms_about_mean(loud) > RISE * rms_about_mean(quiet)
+            || rms_of_change(loud) > RISE * rms_of_change(quiet)
         {
             return Ok(true);
         }
         // A hit on a structure that still rings loudly may leave it no louder.
-        let continued = (CONTINUED * recording.sample_rate()) as u64;
-        let first = before.end.saturating_sub(continued);
-        let ringing = recording.read(response, first..after.end)?;
-        let turn = (before.end - first) as usize;
-        let lag = ((LAG * recording.sample_rate()) as usize).max(1);
-        if let Some((quiet, loud)) = unpredicted(&ringing, turn, lag)
+        if let Some((quiet, loud)) = unpredicted(ringing, turn, lag)
             && loud > RISE * quiet
         {
             return Ok(true);

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::{Event, Found, TapRemark, TapSettings};
-use crate::recording::{Recording, RecordingError};
+use crate::recording::{Extremes, Outline, Recording, RecordingError};
 use tapjoint_numerics::stats::{median, root_mean_square};
 
 // ---- Pulses of force.
@@ -18,22 +18,44 @@ const FEWEST_PIECES: usize = 20;
 /// An excursion longer than this is no hammer pulse but a moving cable or hand (s).
 const LONGEST_PULSE: f64 = 0.05;
 
+/// Most pieces that are surveyed, evenly spread: more would say no more of noise and drift.
+const MOST_SURVEYED: u64 = 1024;
+
 /// The channel's drift, piece by piece, interpolated between their middles.
 struct Baseline {
     medians: Vec<f64>,
+    /// Length of a piece (samples).
     frames: f64,
+    /// Distance of the pieces (pieces).
+    stride: f64,
 }
 
 impl Baseline {
+    /// Place of a sample among the medians.
+    fn position(&self, frame: u64) -> f64 {
+        (frame as f64 / self.frames - 0.5) / self.stride
+    }
+
+    fn median(&self, piece: usize) -> f64 {
+        let median = self.medians.get(piece).or(self.medians.last());
+        median.copied().unwrap_or(0.0)
+    }
+
     fn at(&self, frame: u64) -> f64 {
-        let position = frame as f64 / self.frames - 0.5;
+        let position = self.position(frame);
         let index = position.floor().max(0.0);
         let share = (position - index).clamp(0.0, 1.0);
-        let [before, after] = [index as usize, index as usize + 1].map(|piece| {
-            let median = self.medians.get(piece).or(self.medians.last());
-            median.copied().unwrap_or(0.0)
-        });
-        before * (1.0 - share) + after * share
+        let index = index as usize;
+        self.median(index) * (1.0 - share) + self.median(index + 1) * share
+    }
+
+    /// Lowest and highest value over some samples.
+    fn extremes(&self, frames: Range<u64>) -> Extremes {
+        let nodes = [frames.start, frames.end].map(|frame| self.position(frame).max(0.0) as usize);
+        let inner = (nodes[0] + 1..=nodes[1]).map(|node| self.median(node));
+        let ends = [self.at(frames.start), self.at(frames.end)];
+        let all: Vec<f64> = ends.into_iter().chain(inner).collect();
+        Extremes::of(&all)
     }
 }
 
@@ -46,31 +68,54 @@ pub(super) struct Survey {
     polarity: f64,
     /// Largest excursion from the baseline, in the pulses' direction.
     largest: f64,
+    outline: Outline,
+}
+
+impl Survey {
+    /// Most force that some samples of an outline's piece may have.
+    fn most_force(&self, piece: usize) -> f64 {
+        let extremes = self.outline.pieces[piece];
+        let baseline = self.baseline.extremes(self.outline.samples_of(piece));
+        match self.polarity > 0.0 {
+            true => extremes.high - baseline.low,
+            false => baseline.high - extremes.low,
+        }
+    }
+
+    /// The last of these samples about which the force may reach `height`; the first of them where it reaches it nowhere.
+    pub(super) fn last_reaching(&self, height: f64, frames: Range<u64>) -> u64 {
+        let mut pieces = self.outline.pieces_of(frames.clone()).rev();
+        let last = pieces.find(|piece| {
+            let swing = self.outline.pieces[*piece];
+            self.most_force(*piece) >= height || swing.high - swing.low >= height
+        });
+        let end = last.map(|piece| self.outline.samples_of(piece).end);
+        end.unwrap_or(frames.start).min(frames.end)
+    }
 }
 
 /// Surveys drift, noise and direction of the force channel.
 fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingError> {
-    let frames = ((PIECE * recording.sample_rate()) as usize).max(32);
+    let frames = ((PIECE * recording.sample_rate()) as u64).max(32);
+    let pieces = recording.frames().div_ceil(frames);
+    let stride = pieces.div_ceil(MOST_SURVEYED).max(1);
     let (mut medians, mut deviations) = (Vec::new(), Vec::new());
     let (mut roots, mut reached) = (Vec::new(), Vec::new());
-    // Largest excursions from the medians to either side.
-    let (mut up, mut down) = (0.0_f64, 0.0_f64);
-    for block in recording.blocks(&[channel], frames) {
-        for mut samples in block?.samples {
-            let low = samples.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let centre = median(&mut samples);
-            samples.iter_mut().for_each(|x| *x = (*x - centre).abs());
-            roots.push(root_mean_square(&samples));
-            deviations.push(median(&mut samples));
-            medians.push(centre);
-            reached.push((high - centre).max(centre - low));
-            (up, down) = (up.max(high - centre), down.max(centre - low));
-        }
+    for piece in (0..pieces).step_by(stride as usize) {
+        let start = piece * frames;
+        let mut samples = recording.read(channel, start..start + frames)?;
+        let Extremes { low, high } = Extremes::of(&samples);
+        let centre = median(&mut samples);
+        samples.iter_mut().for_each(|x| *x = (*x - centre).abs());
+        roots.push(root_mean_square(&samples));
+        deviations.push(median(&mut samples));
+        medians.push(centre);
+        reached.push((high - centre).max(centre - low));
     }
     let baseline = Baseline {
         medians,
         frames: frames as f64,
+        stride: stride as f64,
     };
     if reached.len() < FEWEST_PIECES {
         // From finer pieces, so that the only pulse is not taken for what goes on all the time. They are measured from
@@ -84,6 +129,17 @@ fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingErro
         reached = pieces
             .map(|piece| piece.iter().fold(0.0, |most, x| x.abs().max(most)))
             .collect();
+    }
+    // Largest excursions from the baseline to either side.
+    let outline = recording.outline(channel).unwrap_or_default();
+    let (mut up, mut down) = (0.0_f64, 0.0_f64);
+    for (piece, extremes) in outline.pieces.iter().enumerate() {
+        let frames = outline.samples_of(piece);
+        let centre = baseline.at(frames.start + outline.length as u64 / 2);
+        (up, down) = (
+            up.max(extremes.high - centre),
+            down.max(centre - extremes.low),
+        );
     }
     // 1.4826 turns a median deviation into a standard deviation of normal noise. Coarsely quantised
     // noise has a median deviation of zero: the rms of a usual piece and a third of a quantum (what
@@ -99,6 +155,7 @@ fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingErro
         usual: median(&mut reached),
         polarity,
         largest: if polarity > 0.0 { up } else { down },
+        outline,
     })
 }
 
@@ -125,27 +182,34 @@ pub(super) fn find_pulses(
     if survey.polarity < 0.0 {
         remarks.push(TapRemark::InvertedForce);
     }
-    // Excursions above the threshold, each until the force falls below half of it.
+    // Excursions above the threshold, each until the force falls below half of it. Only pieces that reach the threshold
+    // are read, and those in which an excursion goes on.
     let mut excursions: Vec<Excursion> = Vec::new();
     let mut open = false;
-    if survey.largest > floor {
-        for block in recording.blocks(&[channel], 1 << 16) {
-            let block = block?;
-            for (frame, x) in (block.start..).zip(block.samples.iter().flatten()) {
-                let force = survey.polarity * (x - survey.baseline.at(frame));
-                if !open && force > threshold {
-                    open = true;
-                    excursions.push(Excursion {
-                        start: frame,
-                        end: frame,
-                        peak: force,
-                    });
-                }
-                if let Some(last) = excursions.last_mut().filter(|_| open) {
-                    last.peak = last.peak.max(force);
-                    last.end = frame;
-                    open = force >= 0.5 * threshold;
-                }
+    let pieces = match survey.largest > floor {
+        true => 0..survey.outline.pieces.len(),
+        false => 0..0,
+    };
+    for piece in pieces {
+        if !open && survey.most_force(piece) <= threshold {
+            continue;
+        }
+        let frames = survey.outline.samples_of(piece);
+        let samples = recording.read(channel, frames.clone())?;
+        for (frame, x) in (frames.start..).zip(samples) {
+            let force = survey.polarity * (x - survey.baseline.at(frame));
+            if !open && force > threshold {
+                open = true;
+                excursions.push(Excursion {
+                    start: frame,
+                    end: frame,
+                    peak: force,
+                });
+            }
+            if let Some(last) = excursions.last_mut().filter(|_| open) {
+                last.peak = last.peak.max(force);
+                last.end = frame;
+                open = force >= 0.5 * threshold;
             }
         }
     }
@@ -209,13 +273,182 @@ const RISE: f64 = 3.0;
 /// last `MEMORY` pieces is a new tap.
 const MEMORY: usize = 200;
 
-/// Largest distance of a channel from its mean, piece by piece.
-struct Envelope {
-    channel: usize,
-    mean: f64,
-    pieces: Vec<f64>,
-    /// Noise level: the 10 % point of the pieces, or a millionth of the peak in digital silence.
-    floor: f64,
+/// Pieces read in one go.
+const PIECES_AT_ONCE: u64 = 64;
+/// Most times that so many pieces are read for the noise level, evenly spread.
+const MOST_FLOORS: u64 = 512;
+
+/// A longer stretch is looked at in parts (pieces): a bound on memory.
+const LONGEST_STRETCH: u64 = 4096;
+
+/// How far the channels swing from their means, over their noise.
+struct Envelope<'a> {
+    recording: &'a Recording,
+    channels: &'a [usize],
+    /// Samples of a piece.
+    frames: u64,
+    means: Vec<f64>,
+    /// Noise level of each channel: the 10 % point of the pieces, or a millionth of the peak in digital silence.
+    floors: Vec<f64>,
+    outlines: Vec<Outline>,
+}
+
+impl<'a> Envelope<'a> {
+    fn new(recording: &'a Recording, channels: &'a [usize]) -> Result<Self, RecordingError> {
+        let frames = ((ENVELOPE_PIECE * recording.sample_rate()).round() as u64).max(4);
+        let mut envelope = Envelope {
+            recording,
+            channels,
+            frames,
+            means: channels
+                .iter()
+                .map(|&channel| recording.mean(channel))
+                .collect(),
+            floors: vec![1.0; channels.len()],
+            outlines: Vec::new(),
+        };
+        let mut pieces = vec![Vec::new(); channels.len()];
+        let blocks = recording.frames().div_ceil(PIECES_AT_ONCE * frames);
+        let stride = blocks.div_ceil(MOST_FLOORS).max(1);
+        for block in (0..blocks).step_by(stride as usize) {
+            let first = block * PIECES_AT_ONCE;
+            let levels = envelope.levels(first..first + PIECES_AT_ONCE)?;
+            pieces
+                .iter_mut()
+                .zip(levels)
+                .for_each(|(all, more)| all.extend(more));
+        }
+        for ((mut sorted, &channel), (floor, mean)) in pieces
+            .into_iter()
+            .zip(channels)
+            .zip(envelope.floors.iter_mut().zip(&envelope.means))
+        {
+            sorted.sort_by(f64::total_cmp);
+            let outline = recording.outline(channel).unwrap_or_default();
+            let most = outline
+                .pieces
+                .iter()
+                .map(|piece| distance(*piece, *mean))
+                .fold(0.0, f64::max);
+            let tenth = sorted.get(sorted.len() / 10).copied().unwrap_or(0.0);
+            *floor = tenth.max(1e-6 * most).max(f64::MIN_POSITIVE);
+            envelope.outlines.push(outline);
+        }
+        Ok(envelope)
+    }
+
+    /// Largest distance of every channel from its mean, in each of these pieces (its unit).
+    fn levels(&self, pieces: Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let frames = pieces.start * self.frames..pieces.end * self.frames;
+        let samples = self.recording.read_channels(self.channels, frames)?;
+        let levels = samples.iter().zip(&self.means).map(|(samples, mean)| {
+            let pieces = samples.chunks(self.frames as usize);
+            pieces
+                .map(|piece| distance(Extremes::of(piece), *mean))
+                .collect()
+        });
+        Ok(levels.collect())
+    }
+
+    /// The largest ratio to the noise level over the channels, in each of these pieces.
+    fn combined(&self, pieces: Range<u64>) -> Result<Vec<f64>, RecordingError> {
+        let levels = self.levels(pieces)?;
+        let mut combined = vec![0.0; levels.first().map_or(0, Vec::len)];
+        for (levels, floor) in levels.iter().zip(&self.floors) {
+            for (most, level) in combined.iter_mut().zip(levels) {
+                *most = f64::max(*most, level / floor);
+            }
+        }
+        Ok(combined)
+    }
+
+    /// The same of a piece of the outlines.
+    fn outlined(&self, piece: usize) -> f64 {
+        let channels = self.outlines.iter().zip(&self.means).zip(&self.floors);
+        let ratios = channels.map(|((outline, mean), floor)| {
+            outline
+                .pieces
+                .get(piece)
+                .map_or(0.0, |piece| distance(*piece, *mean) / floor)
+        });
+        ratios.fold(0.0, f64::max)
+    }
+
+    /// Stretches (pieces of the envelope) outside which there is no rise above `threshold`.
+    ///
+    /// A rise exceeds 1.2 times the level of the memory before it. The memory holds whole pieces of the outline, whose
+    /// level is known.
+    fn candidates(&self, threshold: f64) -> Vec<Range<u64>> {
+        let Some(outline) = self.outlines.first() else {
+            return Vec::new();
+        };
+        let levels: Vec<f64> = (0..outline.pieces.len())
+            .map(|piece| self.outlined(piece))
+            .collect();
+        let (build_up, memory) = (BUILD_UP as u64 * self.frames, MEMORY as u64 * self.frames);
+        let mut stretches: Vec<Range<u64>> = Vec::new();
+        for piece in 0..levels.len() {
+            let own = outline.samples_of(piece);
+            // The last level of a rise lies up to so far behind its first.
+            let ahead = outline.pieces_of(own.start..own.end + build_up + 2 * self.frames);
+            let first = (own.end + self.frames)
+                .saturating_sub(memory)
+                .div_ceil(outline.length as u64);
+            let end = own.start.saturating_sub(build_up + self.frames) / outline.length as u64;
+            let before = largest(&levels, first as usize, end as usize);
+            let most = largest(&levels, ahead.start, ahead.end);
+            if most <= threshold || most <= 1.2 * before {
+                continue;
+            }
+            // Neighbours share a piece of the envelope where its pieces do not fit the outline's.
+            let last = stretches.last().map_or(0, |last| last.end);
+            let start = last.max(own.start / self.frames);
+            let end = own.end.div_ceil(self.frames);
+            match stretches.last_mut() {
+                Some(last) if last.end == start && end - last.start <= LONGEST_STRETCH => {
+                    last.end = end;
+                }
+                _ if start < end => stretches.push(start..end),
+                _ => {}
+            }
+        }
+        stretches
+    }
+
+    /// Moves a trigger to the first sample that stands out, and reads its peak on the channel that
+    /// stands out most.
+    fn refined(&self, trigger: u64) -> Result<Event, RecordingError> {
+        let mut event = Event {
+            trigger,
+            peak: 0.0,
+            answered: true,
+        };
+        let piece = trigger / self.frames;
+        let levels = self.levels(piece..piece + 4 * BUILD_UP as u64)?;
+        let peaks = levels.iter().map(|levels| largest(levels, 0, levels.len()));
+        let peaks = peaks.zip(&self.floors).enumerate();
+        let highest = peaks.max_by(|(_, a), (_, b)| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+        if let Some((best, (peak, floor))) = highest {
+            event.peak = peak;
+            let first = trigger.saturating_sub(BUILD_UP as u64 * self.frames);
+            let samples = self
+                .recording
+                .read(self.channels[best], first..trigger + self.frames)?;
+            let limit = (3.0 * floor).max(0.05 * peak);
+            if let Some(offset) = samples
+                .iter()
+                .position(|x| (x - self.means[best]).abs() > limit)
+            {
+                event.trigger = first + offset as u64;
+            }
+        }
+        Ok(event)
+    }
+}
+
+/// Largest distance of some values from a mean.
+fn distance(values: Extremes, mean: f64) -> f64 {
+    (values.high - mean).max(mean - values.low)
 }
 
 /// Finds sudden rises of the envelope over all `channels`.
@@ -224,128 +457,67 @@ pub(super) fn find_rises(
     channels: &[usize],
     settings: &TapSettings,
 ) -> Result<Found, RecordingError> {
-    let frames = ((ENVELOPE_PIECE * recording.sample_rate()).round() as usize).max(4);
-    let envelopes = envelopes(recording, channels, frames)?;
-    // The largest ratio to its own floor over the channels, piece by piece.
-    let pieces = envelopes.iter().map(|envelope| envelope.pieces.len()).min();
-    let mut combined = vec![0.0; pieces.unwrap_or(0)];
-    for envelope in &envelopes {
-        for (most, piece) in combined.iter_mut().zip(&envelope.pieces) {
-            *most = f64::max(*most, piece / envelope.floor);
-        }
-    }
-    let highest = largest(&combined, 0, combined.len());
+    let envelope = Envelope::new(recording, channels)?;
+    let outlined = envelope
+        .outlines
+        .first()
+        .map_or(0, |outline| outline.pieces.len());
+    let highest = (0..outlined)
+        .map(|piece| envelope.outlined(piece))
+        .fold(0.0, f64::max);
     // The floor is the 10 % point of the pieces' peaks; noise peaks reach some two times that.
     let threshold = (0.6 * settings.over_noise).max(settings.of_largest * highest);
     let distance = (settings.least_distance * recording.sample_rate()) as u64;
     let (mut triggers, mut remarks) = (Vec::new(), Vec::new());
-    if combined
+    let first = envelope.combined(0..1)?;
+    if first
         .first()
         .is_some_and(|&first| first > threshold && first > 0.3 * highest)
     {
         remarks.push(TapRemark::StartsWithinTap);
         triggers.push(0);
     }
-    for (index, &level) in combined.iter().enumerate() {
-        let is_rise = match index.checked_sub(BUILD_UP) {
-            // Too near the start to look back: the first thing there decides.
-            None => level > RISE * largest(&combined, 0, index.min(1)),
-            Some(before_end) => {
-                let end = before_end.max(1);
-                let recent = largest(&combined, index.saturating_sub(LOOK_BACK), end);
-                let memory = largest(&combined, index.saturating_sub(MEMORY), end);
-                let ahead = largest(&combined, index, index + BUILD_UP);
-                level > RISE * recent && ahead > 1.2 * memory
+    for stretch in envelope.candidates(threshold) {
+        let start = stretch.start.saturating_sub(MEMORY as u64);
+        let combined = envelope.combined(start..stretch.end + BUILD_UP as u64)?;
+        let own = (stretch.start - start) as usize..(stretch.end - start) as usize;
+        for (index, &level) in combined.iter().enumerate().take(own.end).skip(own.start) {
+            let is_rise = match index.checked_sub(BUILD_UP) {
+                // Too near the start to look back: the first thing there decides.
+                None => level > RISE * largest(&combined, 0, index.min(1)),
+                Some(before_end) => {
+                    let end = before_end.max(1);
+                    let recent = largest(&combined, index.saturating_sub(LOOK_BACK), end);
+                    let memory = largest(&combined, index.saturating_sub(MEMORY), end);
+                    let ahead = largest(&combined, index, index + BUILD_UP);
+                    level > RISE * recent && ahead > 1.2 * memory
+                }
+            };
+            let trigger = (start + index as u64) * envelope.frames;
+            let last = triggers.last();
+            if level > threshold && is_rise && last.is_none_or(|last| trigger - last >= distance) {
+                triggers.push(trigger);
             }
-        };
-        let trigger = (index * frames) as u64;
-        let last = triggers.last();
-        if level > threshold && is_rise && last.is_none_or(|last| trigger - last >= distance) {
-            triggers.push(trigger);
         }
     }
     let mut events = Vec::with_capacity(triggers.len());
     for trigger in triggers {
-        events.push(refined(recording, &envelopes, frames, trigger)?);
+        events.push(envelope.refined(trigger)?);
     }
     // At a few samples per piece two rises may begin with the same sample.
     events.dedup_by(|later, earlier| later.trigger <= earlier.trigger);
     Ok(Found {
         events,
-        noise: envelopes.first().map_or(0.0, |first| first.floor) / 2.0,
+        noise: envelope.floors.first().map_or(0.0, |first| first / 2.0),
         survey: None,
         remarks,
     })
-}
-
-/// Reads the envelopes of all `channels` in pieces of `frames` samples.
-fn envelopes(
-    recording: &Recording,
-    channels: &[usize],
-    frames: usize,
-) -> Result<Vec<Envelope>, RecordingError> {
-    let mut envelopes = Vec::with_capacity(channels.len());
-    for &channel in channels {
-        envelopes.push(Envelope {
-            channel,
-            mean: recording.mean(channel),
-            pieces: Vec::new(),
-            floor: 0.0,
-        });
-    }
-    for block in recording.blocks(channels, frames * 64) {
-        for (envelope, samples) in envelopes.iter_mut().zip(block?.samples) {
-            for piece in samples.chunks(frames) {
-                let distances = piece.iter().map(|x| (x - envelope.mean).abs());
-                envelope.pieces.push(distances.fold(0.0, f64::max));
-            }
-        }
-    }
-    for envelope in &mut envelopes {
-        let mut sorted = envelope.pieces.clone();
-        sorted.sort_by(f64::total_cmp);
-        let most = sorted.last().copied().unwrap_or(0.0);
-        let tenth = sorted.get(sorted.len() / 10).copied().unwrap_or(0.0);
-        envelope.floor = tenth.max(1e-6 * most).max(f64::MIN_POSITIVE);
-    }
-    Ok(envelopes)
 }
 
 /// Largest of some pieces; 0 of none.
 fn largest(pieces: &[f64], from: usize, to: usize) -> f64 {
     let some = pieces.get(from..to.min(pieces.len())).unwrap_or_default();
     some.iter().copied().fold(0.0, f64::max)
-}
-
-/// Moves a trigger to the first sample that stands out, and reads its peak on the channel that
-/// stands out most.
-fn refined(
-    recording: &Recording,
-    envelopes: &[Envelope],
-    frames: usize,
-    trigger: u64,
-) -> Result<Event, RecordingError> {
-    let mut event = Event {
-        trigger,
-        peak: 0.0,
-        answered: true,
-    };
-    let piece = trigger as usize / frames;
-    let peaks = envelopes.iter().map(|envelope| {
-        let peak = largest(&envelope.pieces, piece, piece + 4 * BUILD_UP);
-        (envelope, peak)
-    });
-    let highest = peaks.max_by(|a, b| (a.1 / a.0.floor).total_cmp(&(b.1 / b.0.floor)));
-    if let Some((best, peak)) = highest {
-        event.peak = peak;
-        let first = trigger.saturating_sub((BUILD_UP * frames) as u64);
-        let samples = recording.read(best.channel, first..trigger + frames as u64)?;
-        let limit = (3.0 * best.floor).max(0.05 * peak);
-        if let Some(offset) = samples.iter().position(|x| (x - best.mean).abs() > limit) {
-            event.trigger = first + offset as u64;
-        }
-    }
-    Ok(event)
 }
 
 // ---- The force about one tap.

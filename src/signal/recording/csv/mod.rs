@@ -3,10 +3,10 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_rate};
+use super::kept::KeptSamples;
 use super::resample::resample;
 use super::text::{Cell, CellProblem, TimeCheck, is_comment, parse_number, shown, split_cells};
 use super::{
@@ -35,10 +35,13 @@ pub(super) fn open_csv(
     settings: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
     let mut meters: Vec<HealthMeter> = Vec::new();
+    let mut kept: Option<KeptSamples> = None;
     let source = CsvSource::open(path, &file, Some(settings), |block| {
         meters.resize(block.len(), HealthMeter::new(None));
-        for (samples, meter) in block.iter().zip(&mut meters) {
+        let kept = kept.get_or_insert_with(|| KeptSamples::new(block.len()));
+        for ((channel, samples), meter) in block.iter().enumerate().zip(&mut meters) {
             meter.add(samples);
+            kept.add(channel, samples);
         }
     })?;
     if source.frames == 0 {
@@ -76,6 +79,7 @@ pub(super) fn open_csv(
             &mut warnings,
         ));
     }
+    let kept = kept.unwrap_or_else(|| KeptSamples::new(0));
     Ok(Recording {
         name: file,
         format,
@@ -83,7 +87,7 @@ pub(super) fn open_csv(
         frames: source.frames,
         channels,
         warnings,
-        source: Arc::new(source),
+        source: kept.or_file(source),
         parts: Vec::new(),
     })
 }

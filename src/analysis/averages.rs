@@ -3,15 +3,12 @@
 use super::decays::{MOST_KEPT, MOST_SINGLE};
 use super::pulse_window::{PulseWindow, remove_offset};
 use num_complex::Complex64;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
-use tapjoint_signal::spectral::{
-    AveragedSpectra, Lines, SpectralAverager, Transformer, Window, Workspace,
-};
+use tapjoint_signal::spectral::{AveragedSpectra, Lines, SpectralAverager, Transformer, Window};
 use tapjoint_signal::taps::Tap;
 
 /// Longer records are transformed on several cores (samples).
-pub(super) const LONG: u64 = 1 << 15;
+const LONG: u64 = 1 << 15;
 /// Most values kept of the transforms of many taps without a hammer.
 const MOST_OF_MANY: usize = 1 << 20;
 /// Most taps from which the change by the force window is taken, the first ones.
@@ -48,14 +45,10 @@ pub(super) struct TapSums {
     window_change: Option<WindowChange>,
     kept: Vec<Vec<Complex64>>,
     most_kept: usize,
-    channels: Vec<Channel>,
-}
-
-/// Room for the transform of one channel.
-#[derive(Default)]
-struct Channel {
-    workspace: Workspace,
-    values: Vec<Complex64>,
+    /// Transforms of the channels.
+    values: Vec<Vec<Complex64>>,
+    /// Room for two transforms at a time.
+    scratch: [Vec<Complex64>; 2],
 }
 
 impl TapSums {
@@ -85,7 +78,8 @@ impl TapSums {
             } else {
                 MOST_KEPT
             },
-            channels: Vec::new(),
+            values: Vec::new(),
+            scratch: Default::default(),
         }
     }
 
@@ -101,41 +95,45 @@ impl TapSums {
             // The force without its window comes last.
             record.extend(copy);
         }
-        self.channels
-            .resize_with(record.len().max(self.channels.len()), Channel::default);
+        let count = record.len();
+        self.values
+            .resize_with(count.max(self.values.len()), Vec::new);
         let (transformer, window, rate) = (&self.transformer, self.window, self.sample_rate);
-        let transform = |(channel, samples): (&mut Channel, &mut Vec<f64>)| {
-            window.apply(samples, rate);
-            transformer.transform_into(samples, &mut channel.workspace, &mut channel.values);
-        };
-        match record
+        let transform =
+            |samples: &mut [Vec<f64>], values: &mut [Vec<Complex64>], scratch: &mut _| {
+                for (samples, values) in samples.iter_mut().zip(values) {
+                    window.apply(samples, rate);
+                    transformer.transform_in_place(samples, scratch, values);
+                }
+            };
+        // Of long records one half of the channels each.
+        let half = match record
             .first()
             .is_some_and(|samples| samples.len() as u64 > LONG)
         {
-            true => self
-                .channels
-                .par_iter_mut()
-                .zip(record.par_iter_mut())
-                .for_each(transform),
-            false => self
-                .channels
-                .iter_mut()
-                .zip(record.iter_mut())
-                .for_each(transform),
+            true => count.div_ceil(2),
+            false => count,
+        };
+        let (left, right) = record.split_at_mut(half);
+        let (left_values, right_values) = self.values[..count].split_at_mut(half);
+        let [one, two] = &mut self.scratch;
+        match right.is_empty() {
+            true => transform(left, left_values, one),
+            false => {
+                rayon::join(
+                    || transform(left, left_values, one),
+                    || transform(right, right_values, two),
+                );
+            }
         }
         let first = usize::from(self.has_force);
-        let values: Vec<&[Complex64]> = self
-            .channels
-            .iter()
-            .map(|one| one.values.as_slice())
-            .collect();
-        let of_responses = &values[first..first + responses];
-        let force = self.has_force.then(|| values[0]);
+        let of_responses = &self.values[first..first + responses];
+        let force = self.has_force.then(|| self.values[0].as_slice());
         self.averager.add(force, of_responses);
         if let Some(whole) = &mut self.ungated
             && record.len() > first + responses
         {
-            whole.add(Some(values[first + responses]), of_responses);
+            whole.add(Some(&self.values[first + responses]), of_responses);
             record.truncate(first + responses);
             if self.averager.taps() == MOST_UNGATED {
                 self.compare_with_ungated();
@@ -150,8 +148,8 @@ impl TapSums {
     /// few lines could not follow that tilt as a background.
     fn keep(&mut self, tap: &Tap) {
         let delay = tap.time - tap.usable_from() as f64 / self.sample_rate;
-        for channel in &self.channels {
-            let mut transform = channel.values.clone();
+        for values in &self.values {
+            let mut transform = values.clone();
             for (line, value) in transform.iter_mut().enumerate() {
                 let turn = TAU * self.lines.frequency(line) * delay;
                 *value *= Complex64::from_polar(1.0, turn);
@@ -184,10 +182,9 @@ impl TapSums {
         self.window_change = Some(change);
     }
 
-    /// The averages over the taps so far.
-    pub fn so_far(&self) -> AveragedSpectra {
-        let averages = self.averager.clone().finish();
-        averages.unwrap_or_else(|| AveragedSpectra::empty(self.lines))
+    /// The averages of the responses over the taps so far.
+    pub fn responses_so_far(&self) -> AveragedSpectra {
+        self.averager.responses_so_far()
     }
 
     /// The averages over all taps.

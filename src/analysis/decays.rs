@@ -3,7 +3,7 @@
 //! Up to a hundred taps are kept one by one. Of more taps groups are kept, as many as memory allows. A group is the mean
 //! of its taps weighted by their peaks. The sum of free decays is a free decay: its poles are those of the taps.
 
-use super::pulse_window::{PulseWindow, remove_offset};
+use super::pulse_window::{PulseWindow, offset_stretch, remove_offset};
 use tapjoint_signal::modal::amplitude::Decay;
 use tapjoint_signal::modal::fit::TapForce;
 use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Thinning, largest_smooth_block};
@@ -127,7 +127,9 @@ impl DecayCollector {
         };
         let before = begin.saturating_sub(start) as usize;
         let force = force.first().filter(|_| tap.is_whole()).map(|force| {
-            let mut force = force.clone();
+            // The offset is looked for beyond the pulse.
+            let wanted = before.max(offset_stretch(rate)).min(force.len());
+            let mut force = force[..wanted].to_vec();
             remove_offset(&mut force, rate);
             if let Some(window) = PulseWindow::of(tap, rate) {
                 window.apply(&mut force);

@@ -1,6 +1,6 @@
 //! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
 
-use super::averages::{Averages, LONG, TapSums, WindowChange};
+use super::averages::{Averages, TapSums, WindowChange};
 use super::decays::{CollectedDecays, DecayCollector};
 use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation};
@@ -397,37 +397,20 @@ impl<'a> Stage<'a> {
         let mut decays =
             DecayCollector::new(&taps, rate, self.gate, self.has_force, self.responses());
         let mut record = vec![Vec::new(); self.channels.len()];
-        let mut next = record.clone();
-        if let Some(first) = taps.first() {
-            self.read_record(first, &mut next)?;
-        }
-        for (number, tap) in taps.iter().enumerate() {
-            std::mem::swap(&mut record, &mut next);
-            let mut add = || {
-                if let Some(decays) = &mut decays {
-                    decays.add(tap, &record);
+        for tap in taps {
+            self.read_record(tap, &mut record)?;
+            if let Some(decays) = &mut decays {
+                decays.add(tap, &record);
+            }
+            if !self.has_force || tap.is_whole() {
+                let skipped = (tap.usable_from() - tap.record.start) as usize;
+                for samples in &mut record {
+                    samples.drain(..skipped.min(samples.len()));
                 }
-                if !self.has_force || tap.is_whole() {
-                    let skipped = (tap.usable_from() - tap.record.start) as usize;
-                    for samples in &mut record {
-                        samples.drain(..skipped.min(samples.len()));
-                    }
-                    sums.add(tap, &mut record);
-                }
-            };
-            // Of long records the next one is read meanwhile.
-            match taps.get(number + 1) {
-                Some(following) if self.gate > LONG => {
-                    rayon::join(add, || self.read_record(following, &mut next)).1?;
-                }
-                Some(following) => {
-                    add();
-                    self.read_record(following, &mut next)?;
-                }
-                None => add(),
+                sums.add(tap, &mut record);
             }
             if let Some(decays) = decays.as_mut().filter(|decays| decays.needs_highest_peak()) {
-                let averages = sums.so_far();
+                let averages = sums.responses_so_far();
                 let level = self.level(&averages, quiet, window);
                 let peaks = find_peaks(&level, &self.settings.peaks);
                 let places = peaks.iter().map(|peak| self.lines.frequency(peak.index));

@@ -54,12 +54,16 @@ impl PulseWindow {
 /// median is the level at rest, and short beside the drift of its amplifier.
 const OFFSET_STRETCH: f64 = 0.2;
 
+/// Samples from the start of a record in which the offset is looked for.
+pub(super) fn offset_stretch(sample_rate: f64) -> usize {
+    ((OFFSET_STRETCH * sample_rate) as usize).max(1)
+}
+
 /// Takes out the level at which the force rests about its pulse. The mean of the recording is not
 /// that level: the pulses are in it, and over the force window the difference amounts to a percent
 /// of a pulse's momentum.
 pub(super) fn remove_offset(force: &mut [f64], sample_rate: f64) {
-    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
-    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
-    let rest = median(&mut about);
+    let about = force.iter().copied().take(offset_stretch(sample_rate));
+    let rest = median(&mut about.collect::<Vec<f64>>());
     force.iter_mut().for_each(|x| *x -= rest);
 }

@@ -202,7 +202,7 @@ pub struct ChannelHealth {
     pub constant: bool,
     /// Extremes piece by piece, in the units of the file; none of joined files.
     #[serde(skip)]
-    pub(super) outline: Arc<Outline>,
+    pub outline: Arc<Outline>,
 }
 
 impl ChannelHealth {

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 /// Length of a piece at first (samples).
 const FIRST_LENGTH: usize = 64;
-/// Most pieces (2 MB). An hour at 51.2 kHz has pieces of 40 ms.
-const MOST_PIECES: usize = 1 << 17;
+/// Most pieces (512 kB). An hour at 51.2 kHz has pieces of 160 ms.
+const MOST_PIECES: usize = 1 << 15;
 
 /// Lowest and highest of some values.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -28,7 +28,7 @@ const BLOCK_BYTES: u64 = 1 << 19;
 const ALIGNMENT_FRAMES: u64 = 1 << 20;
 
 /// Samples handled at a time when a WAV file is checked, over all channels.
-const PASS_SAMPLES: usize = 1 << 16;
+const PASS_SAMPLES: usize = 1 << 17;
 
 /// Opens a WAV file as a recording.
 pub(super) fn open_wav(
@@ -50,15 +50,32 @@ pub(super) fn open_wav(
     let mut kept = KeptSamples::new(source.channels);
     let mut cursor = source.reader(0)?;
     let mut block = vec![Vec::new(); all.len()];
-    while cursor.at < frames {
-        let start = cursor.at;
-        block.iter_mut().for_each(Vec::clear);
-        cursor.read(&all, per_block, &mut block)?;
-        for ((channel, samples), meter) in block.iter().enumerate().zip(&mut meters) {
-            check_finite(&file, sample_rate, channel, start, samples)?;
-            meter.add(samples);
-            kept.add(channel, samples);
+    let mut next = block.clone();
+    let mut start = 0;
+    cursor.read(&all, per_block, &mut block)?;
+    while start < frames {
+        let mut judge = || {
+            for ((channel, samples), meter) in block.iter().enumerate().zip(&mut meters) {
+                check_finite(&file, sample_rate, channel, start, samples)?;
+                meter.add(samples);
+                kept.add(channel, samples);
+            }
+            Ok(())
+        };
+        let end = cursor.at;
+        if end < frames {
+            // The next block is read meanwhile.
+            let read = || {
+                next.iter_mut().for_each(Vec::clear);
+                cursor.read(&all, per_block, &mut next)
+            };
+            let (judged, read) = rayon::join(judge, read);
+            judged.and(read)?;
+        } else {
+            judge()?;
         }
+        std::mem::swap(&mut block, &mut next);
+        start = end;
     }
     drop(cursor);
     let channels = meters.into_iter();

@@ -95,6 +95,21 @@ impl SpectralAverager {
         }
     }
 
+    /// The averages of the responses so far, as if there were no hammer.
+    pub fn responses_so_far(&self) -> AveragedSpectra {
+        let share = 1.0 / self.taps.max(1) as f64;
+        let powers = self.response_power.iter();
+        let response_power: Vec<Vec<f64>> = powers
+            .map(|powers| powers.iter().map(|power| share * power).collect())
+            .collect();
+        AveragedSpectra {
+            taps: self.taps,
+            responses: response_power.iter().map(|g| roots(g)).collect(),
+            response_power,
+            ..AveragedSpectra::empty(self.lines)
+        }
+    }
+
     /// The averages; `None` before the first tap.
     pub fn finish(mut self) -> Option<AveragedSpectra> {
         if self.taps == 0 {

@@ -44,7 +44,6 @@ enum Plan {
 #[derive(Debug, Default)]
 pub struct Workspace {
     samples: Vec<f64>,
-    spectrum: Vec<Complex64>,
     scratch: Vec<Complex64>,
 }
 
@@ -80,28 +79,39 @@ impl Transformer {
         workspace: &mut Workspace,
         values: &mut Vec<Complex64>,
     ) {
-        values.clear();
+        let Workspace {
+            samples: copy,
+            scratch,
+        } = workspace;
+        copy.clear();
+        copy.extend_from_slice(samples);
+        self.transform_in_place(copy, scratch, values);
+    }
+
+    /// [`transform`](Self::transform) of samples that are not needed any more; what they hold afterwards means nothing.
+    pub fn transform_in_place(
+        &self,
+        samples: &mut Vec<f64>,
+        scratch: &mut Vec<Complex64>,
+        values: &mut Vec<Complex64>,
+    ) {
         let scale = 1.0 / self.sample_rate;
         match &self.plan {
             Plan::Full(fft) => {
+                samples.truncate(fft.len());
+                samples.iter_mut().for_each(|x| *x *= scale);
                 // Zeros are appended.
-                let Workspace {
-                    samples: block,
-                    spectrum,
-                    scratch,
-                } = workspace;
-                block.clear();
-                block.extend(samples.iter().take(fft.len()).map(|x| x * scale));
-                block.resize(fft.len(), 0.0);
-                spectrum.resize(fft.complex_len(), Complex64::ZERO);
+                samples.resize(fft.len(), 0.0);
+                values.resize(fft.complex_len(), Complex64::ZERO);
                 scratch.resize(fft.get_scratch_len(), Complex64::ZERO);
                 // It refuses buffers of a wrong length alone, and these have just been given theirs.
-                let done = fft.process_with_scratch(block, spectrum, scratch);
+                let done = fft.process_with_scratch(samples, values, scratch);
                 debug_assert!(done.is_ok(), "{done:?}");
-                values.extend_from_slice(&spectrum[..self.lines.points()]);
+                values.truncate(self.lines.points());
             }
             Plan::Lines(chirp) => {
                 let transformed = chirp.transform(samples.iter().map(|&x| x.into()));
+                values.clear();
                 values.extend(transformed.iter().map(|x| x * scale));
             }
             Plan::Zoom {
@@ -110,6 +120,7 @@ impl Transformer {
                 turns,
             } => {
                 let transformed = chirp.transform(decimator.run(samples).into_iter());
+                values.clear();
                 values.extend(transformed.iter().zip(turns).map(|(x, t)| x * t * scale));
             }
         }

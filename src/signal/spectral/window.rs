@@ -68,14 +68,14 @@ impl Window {
 /// whole record out of a force that lasts a millisecond; a second hit must have been looked for
 /// before.
 pub fn apply_force_window(samples: &mut [f64], unity: usize, taper: usize) {
-    for (n, x) in samples.iter_mut().enumerate().skip(unity) {
-        let share = (n - unity + 1) as f64 / (taper + 1) as f64;
-        *x *= if share < 1.0 {
-            0.5 * (1.0 + (std::f64::consts::PI * share).cos())
-        } else {
-            0.0
-        };
+    let unity = unity.min(samples.len());
+    let (_, rest) = samples.split_at_mut(unity);
+    let (tapered, zero) = rest.split_at_mut(taper.min(rest.len()));
+    for (n, x) in tapered.iter_mut().enumerate() {
+        let share = (n + 1) as f64 / (taper + 1) as f64;
+        *x *= 0.5 * (1.0 + (std::f64::consts::PI * share).cos());
     }
+    zero.fill(0.0);
 }
 
 /// Level at a record's end that counts as rung down: 1 % (field practice after ISO 7626-5).

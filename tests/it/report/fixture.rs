@@ -457,7 +457,7 @@ fn averages(lines: Lines) -> AveragedSpectra {
                 let mut noise = || 0.04 * (random.random::<f64>() - 0.5);
                 (accelerance + Complex64::new(noise(), noise())) * force + 2e-5
             });
-            response.collect()
+            response.collect::<Vec<Complex64>>()
         });
         sum.add(Some(&force), &responses);
     }

@@ -495,14 +495,23 @@ fn prop_blocks_join_to_the_whole() {
 fn limit_a_file_that_shrank_is_an_error_and_no_panic() {
     // Longer than what is kept in memory.
     let file = file("shrunk.wav", b"");
-    write_wav(&file.path, 51_200, &[vec![0.5; 1_100_000]], WavFormat::Pcm24).unwrap();
+    write_wav(
+        &file.path,
+        51_200,
+        &[vec![0.5; 1_100_000]],
+        WavFormat::Pcm24,
+    )
+    .unwrap();
     let recording = Recording::open(&file.path, &ReadSettings::default()).unwrap();
     let shortened = std::fs::OpenOptions::new()
         .write(true)
         .open(&file.path)
         .unwrap();
     shortened.set_len(90_000).unwrap();
-    let error = recording.read(0, 0..150_000).map(drop).expect_err("samples are gone");
+    let error = recording
+        .read(0, 0..150_000)
+        .map(drop)
+        .expect_err("samples are gone");
     assert!(error.to_string().contains("ended before sample"), "{error}");
     let mut blocks = recording.blocks(&[0], 1000);
     assert_eq!(blocks.by_ref().filter(Result::is_err).count(), 1);

@@ -37,36 +37,21 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     let changes = found.all.iter().map(|one| one.after - one.before);
     let changes = DVector::from_iterator(found.all.len(), changes);
     let squares = covariance.product(&changes, &changes);
-    let no_change_goodness = fisher_tail(squares / count, count, found.freedom);
-    let (mut loss_factor, mut joint_goodness) = (None, None);
-    if let Some(slopes) = joint_slopes(models).filter(|_| found.all.len() > 1) {
-        let slopes = found.all.iter().map(|one| {
-            let model = &models[one.pair];
-            let position = model.modes.iter().position(|mode| *mode == one.mode);
-            position.map_or(0.0, |position| slopes[one.pair][position])
-        });
-        let slopes = DVector::from_iterator(found.all.len(), slopes);
-        let information = covariance.product(&slopes, &slopes);
-        let value = covariance.product(&slopes, &changes) / information;
-        let left = (squares - value * value * information).max(0.0) / (count - 1.0);
-        joint_goodness = Some(fisher_tail(left, count - 1.0, found.freedom));
-        // What the fit leaves tells of the scatter, too.
-        let freedom = found.freedom + count - 1.0;
-        let share = (found.freedom + (count - 1.0) * left) / freedom;
-        let std = (share / information).sqrt();
-        let reach = student::quantile(0.05, freedom) * std;
-        loss_factor = Some(Interval {
-            value,
-            std,
-            low: value - reach,
-            high: value + reach,
-        });
+    let mut no_change_goodness = fisher_tail(squares / count, count, found.freedom);
+    let joint = JointFit::new(&found, &covariance, &changes, models);
+    if let Some(joint) = &joint {
+        // Of two tests the better one counts twice (Bonferroni). A test of one pattern sees what few degrees of freedom hide from a
+        // test of all.
+        no_change_goodness = (2.0 * no_change_goodness.min(joint.no_change_goodness)).min(1.0);
     }
-    let is_clear = loss_factor.is_some_and(|one| one.low * one.high > 0.0);
-    let verdict = match joint_goodness {
+    let explains = joint.as_ref().is_some_and(|joint| {
+        let Interval { low, high, .. } = joint.loss_factor;
+        joint.goodness >= NO_FIT && low * high > 0.0
+    });
+    let verdict = match explains {
         _ if no_change_goodness >= NO_FIT => DampingVerdict::NoChange,
-        Some(goodness) if goodness >= NO_FIT && is_clear => DampingVerdict::JointDamping,
-        _ => DampingVerdict::Other,
+        true => DampingVerdict::JointDamping,
+        false => DampingVerdict::Other,
     };
     let modes = found.all.iter().zip(stds).map(|(one, std)| ModeDamping {
         pair: one.pair,
@@ -78,11 +63,59 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     Some(DampingResult {
         modes: modes.collect(),
         verdict,
-        loss_factor,
+        loss_factor: joint.as_ref().map(|joint| joint.loss_factor),
         no_change_goodness,
-        joint_goodness,
+        joint_goodness: joint.map(|joint| joint.goodness),
         scatter_percent: 100.0 * found.scatter,
     })
+}
+
+/// Change of the joint's loss factor that fits the changes of the dampings best.
+struct JointFit {
+    /// The change (1), with the stiffness as it was before.
+    loss_factor: Interval,
+    /// Goodness of this fit (1).
+    goodness: f64,
+    /// Probability that chance alone gives a loss factor as large as this (1).
+    no_change_goodness: f64,
+}
+
+impl JointFit {
+    /// Fits the loss factor; `None` where there is no elastic joint, and for one mode.
+    fn new(
+        found: &ValueChanges,
+        covariance: &Factored,
+        changes: &DVector<f64>,
+        models: &[PairModel],
+    ) -> Option<Self> {
+        let slopes = joint_slopes(models).filter(|_| found.all.len() > 1)?;
+        let slopes = found.all.iter().map(|one| {
+            let model = &models[one.pair];
+            let position = model.modes.iter().position(|mode| *mode == one.mode);
+            position.map_or(0.0, |position| slopes[one.pair][position])
+        });
+        let slopes = DVector::from_iterator(found.all.len(), slopes);
+        let information = covariance.product(&slopes, &slopes);
+        let value = covariance.product(&slopes, changes) / information;
+        let explained = value * value * information;
+        let others = found.all.len() as f64 - 1.0;
+        let left = (covariance.product(changes, changes) - explained).max(0.0) / others;
+        // What the fit leaves tells of the scatter, too.
+        let freedom = found.freedom + others;
+        let share = (found.freedom + others * left) / freedom;
+        let std = (share / information).sqrt();
+        let reach = student::quantile(0.05, freedom) * std;
+        Some(Self {
+            loss_factor: Interval {
+                value,
+                std,
+                low: value - reach,
+                high: value + reach,
+            },
+            goodness: fisher_tail(left, others, found.freedom),
+            no_change_goodness: fisher_tail(explained, 1.0, found.freedom),
+        })
+    }
 }
 
 /// Returns d ln f/d ln K of each mode of each pair, all elastic stiffnesses of the joint together; `None` where there are none.

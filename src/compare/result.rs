@@ -207,7 +207,8 @@ pub struct DampingResult {
     /// Change of the joint's loss factor (1) if only this changed, and no stiffness; `null` where there is no elastic joint, and
     /// for one mode.
     pub loss_factor: Option<Interval>,
-    /// Goodness of fit of no change (1).
+    /// Goodness of fit of no change (1): the smaller one of two tests, times two. One is of all dampings, the other of the loss
+    /// factor alone.
     pub no_change_goodness: f64,
     /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is none.
     pub joint_goodness: Option<f64>,

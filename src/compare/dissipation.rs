@@ -1,9 +1,8 @@
 //! Changes of the dampings, which no frequency shows.
 //!
-//! A joint that dissipates damps each mode in proportion to its share of the strain energy. Half of this share is the slope of
-//! the frequency with respect to the stiffness (Rayleigh's quotient):
+//! A joint that dissipates damps each mode in proportion to its share of the strain energy:
 //!
-//! zeta_n = eta/2 (strain energy of the joint/strain energy)_n = eta d ln f_n/d ln K
+//! zeta_n = eta/2 (strain energy of the joint/strain energy)_n
 //!
 //! Translation and rotation have one loss factor eta. Its change is fitted with the stiffness as it was before.
 
@@ -88,15 +87,19 @@ impl JointFit {
         changes: &DVector<f64>,
         models: &[PairModel],
     ) -> Option<Self> {
-        let slopes = joint_slopes(models).filter(|_| found.all.len() > 1)?;
-        let slopes = found.all.iter().map(|one| {
-            let model = &models[one.pair];
-            let position = model.modes.iter().position(|mode| *mode == one.mode);
-            position.map_or(0.0, |position| slopes[one.pair][position])
+        let levers = models.iter().map(PairModel::joint_levers);
+        let levers: Vec<Vec<f64>> = levers.collect::<Option<_>>()?;
+        let levers = found.all.iter().map(|one| {
+            let modes = &models[one.pair].modes;
+            let position = modes.iter().position(|mode| *mode == one.mode);
+            position.map_or(0.0, |position| levers[one.pair][position])
         });
-        let slopes = DVector::from_iterator(found.all.len(), slopes);
-        let information = covariance.product(&slopes, &slopes);
-        let value = covariance.product(&slopes, changes) / information;
+        let levers = DVector::from_iterator(found.all.len(), levers);
+        let information = covariance.product(&levers, &levers);
+        if found.all.len() < 2 {
+            return None;
+        }
+        let value = covariance.product(&levers, changes) / information;
         let explained = value * value * information;
         let others = found.all.len() as f64 - 1.0;
         let left = (covariance.product(changes, changes) - explained).max(0.0) / others;
@@ -116,25 +119,6 @@ impl JointFit {
             no_change_goodness: fisher_tail(explained, 1.0, found.freedom),
         })
     }
-}
-
-/// Returns d ln f/d ln K of each mode of each pair, all elastic stiffnesses of the joint together; `None` where there are none.
-fn joint_slopes(models: &[PairModel]) -> Option<Vec<Vec<f64>>> {
-    let mut all = Vec::with_capacity(models.len());
-    for model in models {
-        let joints = model.joints()?;
-        let mut directions = model.joint_directions();
-        directions.retain(|&one| {
-            let mut joints = joints.iter();
-            one < 2 && joints.all(|joint| [joint.kt, joint.kr][one].is_finite())
-        });
-        if directions.is_empty() {
-            return None;
-        }
-        let slopes = model.joint_slopes(&directions, &vec![0.0; directions.len()])?;
-        all.push(slopes.column_sum().iter().copied().collect());
-    }
-    Some(all)
 }
 
 #[cfg(test)]

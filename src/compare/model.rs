@@ -529,6 +529,21 @@ impl PairModel {
         Some(slopes)
     }
 
+    /// Returns half of the joint's share of the strain energy of each mode (1): its damping ratio over the joint's loss factor.
+    /// `None` where there is no elastic joint, or a spring is rigid in one description alone.
+    pub(crate) fn joint_levers(&self) -> Option<Vec<f64>> {
+        let rigid = self
+            .joints()?
+            .map(|joint| [joint.kt, joint.kr].map(f64::is_infinite));
+        if rigid[0] != rigid[1] || rigid[0] == [true; 2] {
+            return None;
+        }
+        let BeamModes { modes, numbers, .. } = &self.centre.modes_after;
+        let levers = self.modes.iter();
+        let levers = levers.map(|mode| 0.5 * modes.joint_energy_share(numbers[mode - 1]));
+        Some(levers.collect())
+    }
+
     fn joint_shifted(
         &self,
         structures: &Structures,

@@ -20,6 +20,10 @@ const USUAL: UsualScatter = UsualScatter {
     least_size: f64::MIN_POSITIVE,
 };
 
+/// Largest loss factor that is told (1). Rubber has about 1, bolted joints have a few hundredths. A larger one only says that
+/// the modes hardly feel the joint. Damping is in proportion to the loss factor while it is small.
+const MOST_LOSS: f64 = 1.0;
+
 /// Returns the change of the dampings; `None` where the tests have none in common.
 pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingResult> {
     let modes: Vec<Vec<usize>> = models.iter().map(|model| model.modes.clone()).collect();
@@ -62,7 +66,10 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     Some(DampingResult {
         modes: modes.collect(),
         verdict,
-        loss_factor: joint.as_ref().map(|joint| joint.loss_factor),
+        loss_factor: joint
+            .as_ref()
+            .map(|joint| joint.loss_factor)
+            .filter(|one| one.low >= -MOST_LOSS && one.high <= MOST_LOSS),
         no_change_goodness,
         joint_goodness: joint.map(|joint| joint.goodness),
         scatter_percent: 100.0 * found.scatter,
@@ -96,7 +103,8 @@ impl JointFit {
         });
         let levers = DVector::from_iterator(found.all.len(), levers);
         let information = covariance.product(&levers, &levers);
-        if found.all.len() < 2 {
+        let is_felt = information.is_finite() && information > 0.0;
+        if !is_felt || found.all.len() < 2 {
             return None;
         }
         let value = covariance.product(&levers, changes) / information;

@@ -204,13 +204,14 @@ pub struct DampingResult {
     pub modes: Vec<ModeDamping>,
     /// What they say.
     pub verdict: DampingVerdict,
-    /// Change of the joint's loss factor (1) if only this changed, and no stiffness; `null` where there is no elastic joint, and
-    /// for one mode.
+    /// Change of the joint's loss factor (1) if only this changed, and no stiffness: the most probable value. `null` where there is
+    /// no elastic joint, for one mode, and where the interval reaches beyond 1: then the modes hardly feel the joint.
     pub loss_factor: Option<Interval>,
     /// Goodness of fit of no change (1): the smaller one of two tests, times two. One is of all dampings, the other of the loss
     /// factor alone.
     pub no_change_goodness: f64,
-    /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is none.
+    /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is no elastic joint that the modes feel, and
+    /// for one mode.
     pub joint_goodness: Option<f64>,
     /// Standard deviation of the difference of a damping between two tests of one state (%).
     pub scatter_percent: f64,

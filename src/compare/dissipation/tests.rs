@@ -99,6 +99,17 @@ fn val_levers_are_those_of_a_complex_stiffness() {
 }
 
 #[test]
+fn limit_modes_that_hardly_feel_the_joint_tell_no_loss_factor() {
+    let [stiff, clamped] = [1e6, 1e300].map(|factor| test(joint(800.0 * factor, 6.0 * factor)));
+    for own in [stiff, clamped] {
+        let [before, after] = [0.002, 0.02].map(|ratio| vec![damped(&own, &[ratio; 5])]);
+        let found = dampings(&[Pair { before, after }], &[model(&own)]).unwrap();
+        assert!(found.loss_factor.is_none(), "{found:?}");
+        assert_ne!(found.verdict, DampingVerdict::NoChange, "{found:?}");
+    }
+}
+
+#[test]
 fn limit_equal_dampings_are_no_change_and_a_mode_without_one_is_left_out() {
     let own = test(joint(800.0, 6.0));
     let damped = damped(&own, &[0.003, 0.004, 0.002, 0.003]);

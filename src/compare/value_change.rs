@@ -57,6 +57,8 @@ impl ValueChanges {
         let (mut all, mut squares, mut freedom) = (Vec::new(), 0.0, 0.0);
         for (index, (pair, modes)) in pairs.iter().zip(modes).enumerate() {
             let first = &pair.before[0];
+            let known = all.len();
+            let (mut own_squares, mut own_freedom) = (0.0, 0.0);
             for &mode in modes {
                 let of_side = |tests: &[Test]| -> Option<Vec<Reading>> {
                     let values = tests.iter().map(|test| {
@@ -77,9 +79,9 @@ impl ValueChanges {
                     for one in side {
                         reading += (one.std / count).powi(2);
                         // The difference of two tests has twice the variance of one.
-                        squares += 2.0 * ((one.value - mean) / size).powi(2);
+                        own_squares += 2.0 * ((one.value - mean) / size).powi(2);
                     }
-                    freedom += count - 1.0;
+                    own_freedom += count - 1.0;
                     share += 0.5 / count;
                 }
                 all.push(ValueChange {
@@ -91,12 +93,12 @@ impl ValueChanges {
                     unit: size * share.sqrt(),
                 });
             }
+            // Correlated modes tell less of their scatter: m of them as much as m/(1 + (m - 1) c^2).
+            let others = (all.len() - known).saturating_sub(1) as f64;
+            let repeated = 1.0 + others * SCATTER_CORRELATION * SCATTER_CORRELATION;
+            squares += own_squares / repeated;
+            freedom += own_freedom / repeated;
         }
-        // Correlated modes tell less of their scatter.
-        let others = modes.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64 - 1.0;
-        let repeated = 1.0 + others * SCATTER_CORRELATION * SCATTER_CORRELATION;
-        squares /= repeated;
-        freedom /= repeated;
         let both = USUAL_FREEDOM + freedom;
         let scatter = (USUAL_FREEDOM * usual.share * usual.share + squares) / both;
         Self {

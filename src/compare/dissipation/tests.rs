@@ -129,6 +129,26 @@ fn limit_equal_dampings_are_no_change_and_a_mode_without_one_is_left_out() {
 }
 
 #[test]
+fn prop_modes_without_a_damping_tell_nothing_of_the_scatter() {
+    let own = test(joint(800.0, 6.0));
+    let side = |factors: [f64; 3]| {
+        factors
+            .map(|factor| damped(&own, &[0.003 * factor; 3]))
+            .to_vec()
+    };
+    let pair = Pair {
+        before: side([0.9, 1.0, 1.1]),
+        after: side([1.0, 1.1, 1.2]),
+    };
+    let [all, three] = [&MODES[..], &MODES[..3]].map(|modes| {
+        let model = PairModel::new(&pair, modes).unwrap();
+        dampings(std::slice::from_ref(&pair), &[model]).unwrap()
+    });
+    assert_eq!(all.modes, three.modes);
+    assert_eq!(all.scatter_percent, three.scatter_percent);
+}
+
+#[test]
 fn prop_a_damping_that_rises_in_one_mode_alone_is_not_the_joints() {
     let own = test(joint(800.0, 6.0));
     let side = |fourth: f64| {

@@ -7,7 +7,7 @@
 use crate::blind_check::TruthError;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use tapjoint_beam::effects::{Effect, EffectId};
 use tapjoint_compare::CauseKind;
 use tapjoint_description::TestDescription;
@@ -177,9 +177,10 @@ pub fn parse_pair_truths(text: &str) -> Result<PairTruthFile, TruthError> {
     let truths: Vec<PairTruth> =
         serde_json::from_str(text).map_err(|source| TruthError::PairEntry { source })?;
     let mut doubts = Vec::new();
+    let mut names = HashSet::new();
     for (index, truth) in truths.iter().enumerate() {
         let name = &truth.name;
-        if truths[..index].iter().any(|other| other.name == *name) {
+        if !names.insert(name) {
             return Err(TruthError::Twice { name: name.clone() });
         }
         let [least, most] = REPEATABILITY;

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Interval {
-    /// Median.
+    /// Median; of a loss factor the best fit.
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
@@ -204,8 +204,8 @@ pub struct DampingResult {
     pub modes: Vec<ModeDamping>,
     /// What they say.
     pub verdict: DampingVerdict,
-    /// Change of the joint's loss factor (1) if only this changed, and no stiffness: the most probable value. `null` where there is
-    /// no elastic joint, for one mode, and where the interval reaches beyond 1: then the modes hardly feel the joint.
+    /// Change of the joint's loss factor (1) if only this changed, and no stiffness. `null` where there is no elastic joint, for
+    /// one mode, and where the interval reaches beyond 1: then the modes hardly feel the joint.
     pub loss_factor: Option<Interval>,
     /// Goodness of fit of no change (1): the smaller one of two tests, times two. One is of all dampings, the other of the loss
     /// factor alone.

@@ -18,6 +18,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::ops::Range;
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings as SearchSettings, minimise};
 use tapjoint_numerics::stats::median;
 
@@ -75,6 +76,17 @@ pub struct Departure {
     pub percent: f64,
 }
 
+impl Departure {
+    /// Returns the indices of the tests that are compared: the last ones before the step, and the last ones from there to the test
+    /// that shows it.
+    pub fn compared(&self) -> [Range<usize>; 2] {
+        [0..self.since, self.since..self.test + 1].map(|tests| {
+            let first = tests.end.saturating_sub(MOST_REPEATS);
+            tests.start.max(first)..tests.end
+        })
+    }
+}
+
 /// Control chart of one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ControlChart {
@@ -126,8 +138,7 @@ impl Series {
 pub struct WatchedSeries {
     /// The charts.
     pub series: Series,
-    /// What changed. The tests before the step are compared with those from the step to the test that shows it. `None` where
-    /// all tests agree.
+    /// What changed between the tests of [`Departure::compared`]. `None` where all tests agree.
     pub change: Option<Comparison>,
 }
 
@@ -208,20 +219,17 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     let mut change = None;
     if let Some((_, departure)) = series.departure() {
         // What comes later may be another change.
-        let (before, after) = as_read[..=departure.test].split_at(departure.since);
-        let pair = Pair {
-            before: before[before.len().saturating_sub(MOST_REPEATS)..].to_vec(),
-            after: after.to_vec(),
-        };
+        let [before, after] = departure.compared().map(|tests| as_read[tests].to_vec());
+        let pair = Pair { before, after };
         change = Some(crate::compare(&[pair], settings)?);
     }
     Ok(WatchedSeries { series, change })
 }
 
-/// SeriesChanges of all quantities.
+/// Changes of all quantities.
 struct SeriesChanges {
     quantities: Vec<ChartedQuantity>,
-    /// SeriesChanges of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
+    /// Changes of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
     sensitivities: DMatrix<f64>,
     /// Logarithms of all quantities over those of the first test: a row for each test.
     rows: Vec<Vec<f64>>,
@@ -358,7 +366,7 @@ fn chart(
 struct JointSensitivity {
     quantities: Vec<ChartedQuantity>,
     directions: Vec<usize>,
-    /// SeriesChanges of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
+    /// Changes of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
     sensitivity: DMatrix<f64>,
 }
 

@@ -5,6 +5,7 @@ use super::blind_check::{BlindCheckArguments, RELIABILITY};
 use super::blind_tests::{AGAIN, Listed, rename_recordings, renamed, write_test};
 use super::input::{TestFile, read_test};
 use super::publication::OutputFolder;
+use super::simulate::SIDES;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
 use rayon::prelude::*;
@@ -20,9 +21,6 @@ use tapjoint::study::change_check::{
     DrawnPair, PairAnswer, PairCampaign, PairCase, PairConduct, PairTruth, PairTruthFile,
     pair_rows, pair_truths_json, parse_pair_truths, score_pairs,
 };
-
-/// Folders of the two tests of a pair.
-const SIDES: [&str; 2] = ["before", "after"];
 
 pub(super) fn run(
     arguments: &BlindCheckArguments,

@@ -47,14 +47,11 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
         // test of all.
         no_change_goodness = (2.0 * no_change_goodness.min(joint.no_change_goodness)).min(1.0);
     }
-    let explains = joint.as_ref().is_some_and(|joint| {
-        let Interval { low, high, .. } = joint.loss_factor;
-        joint.goodness >= NO_FIT && low * high > 0.0
-    });
-    let verdict = match explains {
+    let verdict = match &joint {
         _ if no_change_goodness >= NO_FIT => DampingVerdict::NoChange,
-        true => DampingVerdict::JointDamping,
-        false => DampingVerdict::Other,
+        Some(joint) if joint.goodness < NO_FIT => DampingVerdict::Other,
+        Some(joint) if joint.is_clear() => DampingVerdict::JointDamping,
+        _ => DampingVerdict::Undecided,
     };
     let modes = found.all.iter().zip(stds).map(|(one, std)| ModeDamping {
         pair: one.pair,
@@ -126,6 +123,11 @@ impl JointFit {
             goodness: fisher_tail(left, others, found.freedom),
             no_change_goodness: fisher_tail(explained, 1.0, found.freedom),
         })
+    }
+
+    /// Returns true where the interval of the loss factor lies on one side of 0.
+    fn is_clear(&self) -> bool {
+        self.loss_factor.low * self.loss_factor.high > 0.0
     }
 }
 

@@ -180,6 +180,8 @@ pub enum DampingVerdict {
     JointDamping,
     /// In another way.
     Other,
+    /// They changed. These data do not tell whether the joint changed them.
+    Undecided,
 }
 
 /// Change of a damping ratio.

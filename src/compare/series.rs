@@ -13,7 +13,9 @@ use crate::level::take_one_level;
 use crate::matching::match_modes;
 use crate::model::PairModel;
 use crate::result::{Comparison, MatchedMode};
-use crate::test::{CompareError, MOST_REPEATS, Pair, Settings, Test, common_modes};
+use crate::test::{
+    CompareError, MOST_REPEATS, Pair, REPEATABILITY_LIMITS, Settings, Test, common_modes,
+};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -26,8 +28,6 @@ use tapjoint_numerics::stats::median;
 pub const LEAST_SERIES: usize = 3;
 /// Most tests of a series.
 pub const MOST_SERIES: usize = 1000;
-/// Least repeatability where none is stated (1): no frequency is read better.
-const LEAST_REPEATABILITY: f64 = 1e-6;
 /// Largest change of a stiffness (logarithm).
 const MOST_CHANGE: f64 = 3.0;
 /// Unit of the residuals of the search for stiffnesses (1): the precision of a good reading.
@@ -183,7 +183,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     } = SeriesChanges::new(&model, &measured);
     // A stated repeatability holds the readings' own noise, unless these are worse. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
-    let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
+    let repeatability = settings.repeatability.unwrap_or(REPEATABILITY_LIMITS[0]);
     let stds = (0..count).map(|k| {
         let mut readings: Vec<f64> = measured.iter().map(|one| one[1][k]).collect();
         (0.5 * repeatability.powi(2).max(median(&mut readings))).sqrt()

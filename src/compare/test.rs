@@ -182,8 +182,8 @@ const LEAST_MODES: usize = 3;
 pub const MOST_PAIRS: usize = 16;
 /// Most repeats on one side of a change.
 pub const MOST_REPEATS: usize = 100;
-/// Limits of a stated repeatability (1).
-const REPEATABILITY: [f64; 2] = [1e-6, 0.1];
+/// Limits of a stated repeatability (1): no frequency is read better than the first.
+pub const REPEATABILITY_LIMITS: [f64; 2] = [1e-6, 0.1];
 
 /// Refuses what cannot be compared, and returns the modes that all tests of each pair have, ascending.
 ///
@@ -196,7 +196,7 @@ pub fn common_modes(pairs: &[Pair], settings: &Settings) -> Result<Vec<Vec<usize
             most: MOST_PAIRS,
         });
     }
-    let [least, most] = REPEATABILITY;
+    let [least, most] = REPEATABILITY_LIMITS;
     if let Some(value) = settings.repeatability
         && !(least..=most).contains(&value)
     {

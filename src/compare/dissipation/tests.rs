@@ -162,6 +162,14 @@ fn prop_a_damping_that_rises_in_one_mode_alone_is_not_the_joints() {
     };
     let found = dampings(&[pair], &[model(&own)]).unwrap();
     assert_eq!(found.verdict, DampingVerdict::Other, "{found:?}");
+    // A joint that is rigid damps nothing, so that it is neither the cause nor refuted.
+    let rigid = damped(&test(Joint::RIGID), &[0.003; 5]);
+    let pair = Pair {
+        before: vec![rigid.clone()],
+        after: vec![damped(&rigid, &[0.03; 5])],
+    };
+    let found = dampings(&[pair], &[model(&rigid)]).unwrap();
+    assert_eq!(found.verdict, DampingVerdict::Undecided, "{found:?}");
 }
 
 /// How dampings scatter between tests.

@@ -4,7 +4,7 @@ use super::Analysis;
 use super::ModeResult;
 use super::observations::nominal_with;
 use tapjoint_beam::specimen::PointMass;
-use tapjoint_compare::{Item, ItemKind, Level, MeasuredMode, Reading, Test};
+use tapjoint_compare::{Item, ItemKind, Level, MeasuredMode, MovedStd, Reading, Test};
 use tapjoint_description::{SensorKind, TestDescription};
 use tapjoint_signal::modal::amplitude::AmplitudeVerdict;
 
@@ -64,6 +64,7 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
             std: mode.std.unwrap_or(half_line / 3.0_f64.sqrt()),
             damping: damping_of(mode),
             level: level_of(mode, test, analysis),
+            moved: MovedStd::default(),
         })
     });
     let modes: Vec<MeasuredMode> = modes

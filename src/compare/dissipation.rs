@@ -9,7 +9,7 @@
 use crate::likelihood::{Factored, NO_FIT};
 use crate::model::PairModel;
 use crate::result::{DampingResult, DampingVerdict, Interval, ModeDamping};
-use crate::test::Pair;
+use crate::test::{MeasuredMode, Pair, Test};
 use crate::value_change::{UsualScatter, ValueChanges};
 use nalgebra::DVector;
 use tapjoint_numerics::stats::{fisher_tail, student};
@@ -27,9 +27,8 @@ const MOST_LOSS: f64 = 1.0;
 /// Returns the change of the dampings; `None` where the tests have none in common.
 pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingResult> {
     let modes: Vec<Vec<usize>> = models.iter().map(|model| model.modes.clone()).collect();
-    let found = ValueChanges::new(pairs, &modes, &USUAL, |_, mode| {
-        mode.damping.filter(|one| one.value > 0.0)
-    });
+    let damping = |_: &Test, mode: &MeasuredMode| mode.damping.filter(|one| one.value > 0.0);
+    let found = ValueChanges::new(pairs, &modes, &USUAL, damping, |mode| mode.moved.damping);
     if found.all.is_empty() {
         return None;
     }

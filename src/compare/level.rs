@@ -6,7 +6,7 @@
 
 use crate::likelihood::{Factored, NO_FIT};
 use crate::result::{LevelResult, ModeLevel};
-use crate::test::{MeasuredMode, Pair};
+use crate::test::{MeasuredMode, Pair, Test};
 use crate::value_change::{UsualScatter, ValueChanges};
 use nalgebra::DVector;
 use tapjoint_numerics::stats::fisher_tail;
@@ -69,12 +69,10 @@ fn take_level_of(first: &MeasuredMode, mode: &mut MeasuredMode) -> Option<f64> {
     }
     let change = -own.frequency_slope.value * tens;
     mode.frequency *= change.exp();
-    mode.std = mode
-        .std
-        .hypot(own.frequency_slope.std * tens * mode.frequency);
+    mode.moved.frequency = (own.frequency_slope.std * tens).abs() * mode.frequency;
     if let Some(damping) = &mut mode.damping {
         damping.value -= own.damping_slope.value * tens;
-        damping.std = damping.std.hypot(own.damping_slope.std * tens);
+        mode.moved.damping = (own.damping_slope.std * tens).abs();
     }
     Some(change)
 }
@@ -82,13 +80,14 @@ fn take_level_of(first: &MeasuredMode, mode: &mut MeasuredMode) -> Option<f64> {
 /// Returns the change of the frequencies' dependence on the level, for modes that all tests read at about one amplitude; `None`
 /// where there are none.
 pub(crate) fn levels(pairs: &[Pair], modes: &[Vec<usize>]) -> Option<LevelResult> {
-    let found = ValueChanges::new(pairs, modes, &USUAL, |first, mode| {
+    let slope = |first: &Test, mode: &MeasuredMode| {
         let own = mode.level.as_ref()?;
         let first = first.mode(mode.mode)?.level.as_ref()?;
         let ratio = own.amplitude / first.amplitude;
         let is_alike = first.of == own.of && ratio < ALIKE && ratio > 1.0 / ALIKE;
         is_alike.then_some(own.frequency_slope)
-    });
+    };
+    let found = ValueChanges::new(pairs, modes, &USUAL, slope, |_| 0.0);
     if found.all.is_empty() {
         return None;
     }

@@ -53,7 +53,7 @@ pub use series::{
     Series, WatchedSeries, watch,
 };
 pub use test::{
-    CompareError, Item, ItemKind, Level, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair,
+    CompareError, Item, ItemKind, Level, MOST_PAIRS, MOST_REPEATS, MeasuredMode, MovedStd, Pair,
     REPEATABILITY_LIMITS, Reading, Settings, Test,
 };
 

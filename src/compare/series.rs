@@ -11,7 +11,7 @@ use crate::change_point::{
 use crate::joint::JointChange;
 use crate::level::take_one_level;
 use crate::matching::match_modes;
-use crate::model::PairModel;
+use crate::model::{Differences, PairModel};
 use crate::result::{Comparison, MatchedMode};
 use crate::test::{
     CompareError, MOST_REPEATS, Pair, REPEATABILITY_LIMITS, Settings, Test, common_modes,
@@ -174,7 +174,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
         &modes,
     )?;
     let measured = others.par_iter().map(|test| model.beyond(first, test));
-    let measured: Vec<[Vec<f64>; 2]> = measured.collect::<Result<_, _>>()?;
+    let measured: Vec<Differences> = measured.collect::<Result<_, _>>()?;
     let count = modes.len();
     let SeriesChanges {
         quantities,
@@ -185,8 +185,11 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     let is_stated = settings.repeatability.is_some();
     let repeatability = settings.repeatability.unwrap_or(REPEATABILITY_LIMITS[0]);
     let stds = (0..count).map(|k| {
-        let mut readings: Vec<f64> = measured.iter().map(|one| one[1][k]).collect();
-        (0.5 * repeatability.powi(2).max(median(&mut readings))).sqrt()
+        let mut readings: Vec<f64> = measured.iter().map(|one| one.reading[k]).collect();
+        let at_own_level = 0.5 * repeatability.powi(2).max(median(&mut readings));
+        // The first test keeps its level.
+        let moved: f64 = measured.iter().map(|one| one.moved[k]).sum();
+        (at_own_level + moved / measured.len() as f64).sqrt()
     });
     let stds: Vec<f64> = stds.collect();
     let limits = Limits::new(
@@ -237,12 +240,13 @@ struct SeriesChanges {
 
 impl SeriesChanges {
     /// Returns the changes from the measured ones of the modes (logarithms), from the second test on.
-    fn new(model: &PairModel, measured: &[[Vec<f64>; 2]]) -> Self {
+    fn new(model: &PairModel, measured: &[Differences]) -> Self {
         let count = model.modes.len();
         let modes = model.modes.iter().map(|mode| ChartedQuantity::Mode(*mode));
         let sensitivities = DMatrix::identity(count, count);
         let mut rows = vec![vec![0.0; count + 1]];
-        for [changes, _] in measured {
+        for differences in measured {
+            let changes = &differences.measured;
             let mut row = changes.clone();
             row.push(changes.iter().sum::<f64>() / count as f64);
             rows.push(row);
@@ -254,7 +258,7 @@ impl SeriesChanges {
         };
         if let Some(joint) = JointSensitivity::new(model) {
             let fits = measured.par_iter();
-            let fits = fits.map(|[changes, _]| joint.changes(model, changes));
+            let fits = fits.map(|one| joint.changes(model, &one.measured));
             // Without a fit of every test the stiffnesses have no charts.
             if let Some(fits) = fits.collect::<Option<Vec<Vec<f64>>>>() {
                 all.add_joint(&joint, fits);

@@ -54,6 +54,17 @@ pub struct MeasuredMode {
     pub damping: Option<Reading>,
     /// How the frequency depends on the level; `None` without decays that tell it.
     pub level: Option<Level>,
+    /// What taking the mode to another level adds to its uncertainty.
+    pub moved: MovedStd,
+}
+
+/// Standard uncertainties that taking a mode to another level adds; 0 where it stays as it was read.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MovedStd {
+    /// Of the frequency (Hz).
+    pub frequency: f64,
+    /// Of the damping ratio (1).
+    pub damping: f64,
 }
 
 impl MeasuredMode {
@@ -65,6 +76,7 @@ impl MeasuredMode {
             std,
             damping: None,
             level: None,
+            moved: MovedStd::default(),
         }
     }
 }

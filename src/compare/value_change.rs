@@ -22,6 +22,8 @@ pub(crate) struct ValueChange {
     pub(crate) after: f64,
     /// Variance of the change by readings.
     reading: f64,
+    /// Variance of the change by taking modes to another level.
+    moved: f64,
     /// Standard deviation of the change by a scatter of 1.
     unit: f64,
 }
@@ -47,12 +49,14 @@ pub(crate) struct UsualScatter {
 }
 
 impl ValueChanges {
-    /// Takes a value of each of the modes of each pair. `value` gets the first test and the mode of another.
+    /// Takes a value of each of the modes of each pair. `value` gets the first test and the mode of another. `moved_std` returns the
+    /// standard uncertainty that taking the mode to another level adds to the value.
     pub(crate) fn new(
         pairs: &[Pair],
         modes: &[Vec<usize>],
         usual: &UsualScatter,
         value: impl Fn(&Test, &MeasuredMode) -> Option<Reading>,
+        moved_std: impl Fn(&MeasuredMode) -> f64,
     ) -> Self {
         let (mut all, mut squares, mut freedom) = (Vec::new(), 0.0, 0.0);
         for (index, (pair, modes)) in pairs.iter().zip(modes).enumerate() {
@@ -60,9 +64,12 @@ impl ValueChanges {
             let known = all.len();
             let (mut own_squares, mut own_freedom) = (0.0, 0.0);
             for &mode in modes {
-                let of_side = |tests: &[Test]| -> Option<Vec<Reading>> {
+                let mut moved = 0.0;
+                let mut of_side = |tests: &[Test]| -> Option<Vec<Reading>> {
                     let values = tests.iter().map(|test| {
-                        let found = value(first, test.mode(mode)?)?;
+                        let own = test.mode(mode)?;
+                        let found = value(first, own)?;
+                        moved += (moved_std(own) / tests.len() as f64).powi(2);
                         (found.value.is_finite() && found.std.is_finite()).then_some(found)
                     });
                     values.collect()
@@ -90,6 +97,7 @@ impl ValueChanges {
                     before: means[0],
                     after: means[1],
                     reading,
+                    moved,
                     unit: size * share.sqrt(),
                 });
             }
@@ -122,10 +130,11 @@ impl ValueChanges {
                 };
                 return correlation * scatter;
             }
-            match self.has_repeats {
+            let at_own_level = match self.has_repeats {
                 true => scatter.max(one.reading),
                 false => scatter + one.reading,
-            }
+            };
+            at_own_level + one.moved
         })
     }
 }

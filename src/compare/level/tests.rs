@@ -92,6 +92,38 @@ fn prop_a_joint_that_begins_to_slip_is_told_by_the_slopes() {
 }
 
 #[test]
+fn prop_uncertain_slopes_add_to_the_scatter() {
+    // Taking a frequency from 5 to 1 is as uncertain as the repeatability.
+    let uncertain = |amplitude| {
+        let mut test = test(SLOPES, amplitude);
+        for mode in &mut test.modes {
+            let level = mode.level.as_mut().unwrap();
+            level.frequency_slope.std = 5e-4 / 5.0_f64.log10();
+            level.damping_slope.std = 0.01;
+        }
+        test
+    };
+    let sure = compared(test(SLOPES, 1.0), test(SLOPES, 5.0));
+    let unsure = compared(uncertain(1.0), uncertain(5.0));
+    for (sure, unsure) in sure.modes.iter().zip(&unsure.modes) {
+        let added = (unsure.std_percent.powi(2) - sure.std_percent.powi(2)).sqrt();
+        assert!((added - 0.05).abs() < 1e-4, "{sure:?} {unsure:?}");
+    }
+    let [sure, unsure] = [sure, unsure].map(|found| found.damping.unwrap());
+    for (sure, unsure) in sure.modes.iter().zip(&unsure.modes) {
+        assert!(unsure.std > sure.std.hypot(0.006), "{sure:?} {unsure:?}");
+    }
+    let tests = [1.0, 5.0, 5.0, 5.0, 5.0, 5.0].map(uncertain);
+    let settings = Settings {
+        repeatability: Some(5e-4),
+    };
+    let watched = watch(&tests, &settings).unwrap();
+    // The variance of one test is half of that of a difference, and that of the other level.
+    let scatter = watched.series.charts[0].scatter_percent.unwrap();
+    assert!((scatter / 0.05 - 1.5_f64.sqrt()).abs() < 0.01, "{scatter}");
+}
+
+#[test]
 fn prop_harder_taps_in_a_series_are_no_change() {
     let tests = [1.0, 2.0, 1.0, 3.0, 2.0, 5.0].map(|amplitude| test(SLOPES, amplitude));
     let settings = Settings {

@@ -20,32 +20,7 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
     let estimate = found.and_then(|found| found.consistent.as_ref());
     // Properties of the beam stay as described: an estimate of them would take in what changed.
     let nominal = nominal_with(test, estimate.map(|estimate| estimate.joint));
-    let recording = test.reference_recording();
-    let mut items = Vec::new();
-    for sensor in &test.sensors {
-        let position = recording.map_or(sensor.position, |one| one.place_of(sensor));
-        let mass = sensor.mass.filter(|_| test.analysis.sensor_mass);
-        if let (Some(position), Some(mass)) = (position, mass)
-            && sensor.kind != SensorKind::Sound
-            && mass > 0.0
-        {
-            items.push(Item {
-                name: sensor.name.clone(),
-                point: PointMass::new(position, mass),
-                kind: ItemKind::Sensor,
-            });
-        }
-    }
-    if let Some(recording) = recording {
-        for (index, point) in recording.masses.iter().enumerate() {
-            let name = recording.mass_names.get(index).cloned().flatten();
-            items.push(Item {
-                name: name.unwrap_or_else(|| format!("fastened mass {}", index + 1)),
-                point: *point,
-                kind: ItemKind::Mass,
-            });
-        }
-    }
+    let items = compared_items(test);
     let mut structure = nominal.specimen;
     structure.masses.extend(items.iter().map(|item| item.point));
     let tolerances = nominal.uncertainty.beam;
@@ -83,6 +58,38 @@ pub fn compared_test(test: &TestDescription, analysis: &Analysis) -> Option<Test
         common_std: common.hypot(2.0 * length).max(LEAST_COMMON),
         modes,
     })
+}
+
+/// Returns what weighs on the structure in the reference configuration: sensors of known mass and place, and fastened masses. A
+/// comparison may name each of them.
+pub fn compared_items(test: &TestDescription) -> Vec<Item> {
+    let recording = test.reference_recording();
+    let mut items = Vec::new();
+    for sensor in &test.sensors {
+        let position = recording.map_or(sensor.position, |one| one.place_of(sensor));
+        let mass = sensor.mass.filter(|_| test.analysis.sensor_mass);
+        if let (Some(position), Some(mass)) = (position, mass)
+            && sensor.kind != SensorKind::Sound
+            && mass > 0.0
+        {
+            items.push(Item {
+                name: sensor.name.clone(),
+                point: PointMass::new(position, mass),
+                kind: ItemKind::Sensor,
+            });
+        }
+    }
+    if let Some(recording) = recording {
+        for (index, point) in recording.masses.iter().enumerate() {
+            let name = recording.mass_names.get(index).cloned().flatten();
+            items.push(Item {
+                name: name.unwrap_or_else(|| format!("fastened mass {}", index + 1)),
+                point: *point,
+                kind: ItemKind::Mass,
+            });
+        }
+    }
+    items
 }
 
 /// Returns the damping ratio of a mode (1).

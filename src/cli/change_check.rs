@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::compare::{Pair, Settings, Test, compare};
 use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{IdentifySettings, compared_test};
+use tapjoint::pipeline::{IdentifySettings, compared_items, compared_test};
 use tapjoint::report::change_check::{pair_score_json, render_change_check};
 use tapjoint::study::blind_check::{RecordedTest, commitment, render_rows};
 use tapjoint::study::change_check::{
@@ -236,13 +236,14 @@ fn elsewhere(
             .iter()
             .filter_map(|change| change.item.as_ref())
         {
-            if files[0]
-                .as_ref()
-                .is_ok_and(|file| !has_item(&file.test, item))
-            {
+            let Ok(before) = &files[0] else {
+                continue;
+            };
+            let items = compared_items(&before.test);
+            if items.iter().all(|own| own.name != *item) {
                 terminal.warn(&format!(
-                    "{name}: \"{}\": before/test.toml describes no sensor or mass \"{item}\", so that no answer has the \
-                     right item",
+                    "{name}: \"{}\": before/test.toml describes no \"{item}\" that weighs in the reference recording, so that \
+                     no answer has the right item",
                     truth.name
                 ));
             }
@@ -278,14 +279,6 @@ fn elsewhere(
         ..PairConduct::default()
     };
     Ok((cases, conduct))
-}
-
-fn has_item(test: &TestDescription, item: &str) -> bool {
-    let masses = test.recordings.iter().flat_map(|one| &one.mass_names);
-    let mut names = masses
-        .flatten()
-        .chain(test.sensors.iter().map(|one| &one.name));
-    names.any(|name| name == item)
 }
 
 /// Compares the first existing pairs again, with their recordings under other names. Pairs whose names cannot be exchanged are

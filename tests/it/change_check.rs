@@ -608,6 +608,40 @@ fn regress_pairs_that_cannot_be_compared_have_no_answer() {
 }
 
 #[test]
+fn regress_an_item_that_weighs_nothing_is_no_right_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let weighed = STRIP.replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    // A mass that is not on the beam in the first recording.
+    let later = "[[recording]]\nfile = \"later.wav\"\ntap = 0.3\n";
+    let text = format!("{weighed}{later}{MASS}");
+    for side in ["before", "after"] {
+        let own = place.join("pairs/a").join(side);
+        fs::create_dir_all(&own).unwrap();
+        fs::write(own.join("test.toml"), &text).unwrap();
+    }
+    let lost = |item: &str| format!(r#"{{"cause": "lost-mass", "item": "{item}"}}"#);
+    let changes = ["W", "A", "L1"].map(lost).join(", ");
+    let truth = format!(r#"[{{"name": "a", "changes": [{changes}], "visible": true}}]"#);
+    fs::write(place.join("truth.json"), truth).unwrap();
+    let mut command = Command::cargo_bin("tapjoint").unwrap();
+    let check = [
+        "blind-check",
+        "--compare",
+        "--folder",
+        "pairs",
+        "--truth",
+        "truth.json",
+    ];
+    let output = command.current_dir(place).args(check).output().unwrap();
+    let warnings = String::from_utf8(output.stderr).unwrap();
+    for (item, is_warned) in [("W", false), ("A", true), ("L1", true)] {
+        let words = format!("describes no \"{item}\" that weighs");
+        assert_eq!(warnings.contains(&words), is_warned, "{item}: {warnings}");
+    }
+}
+
+#[test]
 fn regress_a_moved_sensor_is_scored_and_the_summary_says_what_changed() {
     let folder = tempfile::tempdir().unwrap();
     let weighed = STRIP.replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);

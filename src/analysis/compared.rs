@@ -4,13 +4,15 @@ use super::Analysis;
 use super::ModeResult;
 use super::observations::nominal_with;
 use tapjoint_beam::specimen::PointMass;
-use tapjoint_compare::{Item, ItemKind, Level, MeasuredMode, MovedStd, Reading, Test};
+use tapjoint_compare::{Item, ItemKind, Level, LevelPoint, MeasuredMode, MovedStd, Reading, Test};
 use tapjoint_description::{SensorKind, TestDescription};
 use tapjoint_signal::modal::amplitude::AmplitudeVerdict;
 
 /// Least standard uncertainty that a described beam leaves to all frequencies in common (1): its own error cancels between two
 /// tests, and only the joint's stiffness follows it.
 const LEAST_COMMON: f64 = 0.01;
+/// Points over the amplitudes of a mode's decays.
+const LEVEL_POINTS: usize = 40;
 
 /// Returns what a comparison needs of a test: the described structure in the reference configuration, what sits on it,
 /// and its modes. `None` for a bare recording, which has no structure.
@@ -116,20 +118,35 @@ fn level_of(mode: &ModeResult, test: &TestDescription, analysis: &Analysis) -> O
     let frequency = curve.frequency.as_ref().filter(|_| tells)?;
     let damping = curve.damping.as_ref()?;
     let at = reading.at_amplitude.as_ref()?;
-    let amplitudes = curve.points.iter().map(|point| point.amplitude);
-    let low = amplitudes.clone().fold(f64::INFINITY, f64::min);
-    let high = amplitudes.fold(0.0, f64::max);
+    let [low, high] = frequency.reach();
+    let points = (0..LEVEL_POINTS).filter_map(|point| {
+        // In the middle of each step, since the curve cannot be read beyond its ends.
+        let share = (point as f64 + 0.5) / LEVEL_POINTS as f64;
+        let amplitude = low * (high / low).powf(share);
+        let (change, std) = frequency.between(at.value, amplitude)?;
+        let (damping, damping_std) = damping.between(at.value, amplitude)?;
+        Some(LevelPoint {
+            amplitude,
+            frequency: Reading {
+                value: (change / mode.frequency).ln_1p(),
+                std: std / mode.frequency,
+            },
+            damping: Reading {
+                value: damping,
+                std: damping_std,
+            },
+        })
+    });
     // Slopes are per factor of e in amplitude.
-    let per_ten = |value: f64, std: f64, factor: f64| Reading {
-        value: std::f64::consts::LN_10 * factor * value,
-        std: std::f64::consts::LN_10 * factor * std,
-    };
+    let per_ten = std::f64::consts::LN_10 / mode.frequency;
     Some(Level {
         amplitude: at.value,
-        range: [low, high],
+        curve: points.collect(),
         of: amplitude_of(mode, at.sensor, test, analysis)?,
-        frequency_slope: per_ten(frequency.slope, frequency.slope_std, mode.frequency.recip()),
-        damping_slope: per_ten(damping.slope, damping.slope_std, 1.0),
+        frequency_slope: Reading {
+            value: per_ten * frequency.slope,
+            std: per_ten * frequency.slope_std,
+        },
     })
 }
 

@@ -267,16 +267,17 @@ fn print_scores(rows: &[Row]) {
     });
     println!(
         "first cause of visible single changes {}, named wrongly {}",
-        shown(scores.first_right_visible),
+        shown(scores.rate("first_right_visible").unwrap_or_default()),
         shown(wrong)
     );
     let intervals = [
-        ("Kt", scores.kt_interval),
-        ("Kr", scores.kr_interval),
-        ("visible mass", scores.mass_interval),
-        ("visible position", scores.place_interval),
+        ("Kt", "kt_interval"),
+        ("Kr", "kr_interval"),
+        ("visible mass", "mass_interval"),
+        ("visible position", "place_interval"),
     ];
-    for (name, rate) in intervals {
+    for (name, key) in intervals {
+        let rate = scores.rate(key).unwrap_or_default();
         println!("95 % interval of {name} holds {}", shown(rate));
     }
     print_calibration(rows);

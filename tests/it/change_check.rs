@@ -472,7 +472,21 @@ fn val_the_score_counts_what_it_says() {
     ];
     let scores = score_pairs(&cases);
     assert_eq!((scores.failed, scores.counts), (1, [0, 2, 0, 0]));
-    assert_eq!((scores.first_right.hits, scores.first_right.of), (1, 1));
+    let first_right = scores.rate("first_right").unwrap();
+    assert_eq!((first_right.hits, first_right.of), (1, 1));
+    // Every key that is asked for elsewhere.
+    for key in [
+        "first_right_visible",
+        "several_first_right",
+        "named_wrongly",
+        "list_holds",
+        "kt_interval",
+        "kr_interval",
+        "mass_interval",
+        "place_interval",
+    ] {
+        assert!(scores.rate(key).is_some(), "{key}");
+    }
     // Dealt out, each answer goes to a pair that it is wrong for; one pair has no other.
     let right = |cause: &str, kind| {
         let found = answer(VerdictKind::NoChange, &[], &[(kind, "kt", [-0.2, 0.0])]);

@@ -1,9 +1,8 @@
 //! What changes between two virtual tests of one structure, and how far the set-up scatters from test to test.
 
 use super::laboratory::SimulateError;
-use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, StudentT};
 use tapjoint_beam::Assembly;
 use tapjoint_beam::effects::{Effect, EffectId, scale_joint};
 use tapjoint_beam::specimen::{PointMass, Specimen};
@@ -156,25 +155,47 @@ pub(super) fn change_joint(
     Ok(())
 }
 
-/// Share of the scatter's variance that all modes of a test have in common: temperature and the like.
-const COMMON_SHARE: f64 = 0.25;
-/// Modes whose scatter is drawn, more than any test has.
-const MOST_MODES: usize = 100;
+/// Distribution of a mode's own scatter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScatterTails {
+    /// Normal.
+    Normal,
+    /// Student's with four degrees of freedom.
+    Long,
+}
 
-/// Returns the factor on the natural frequency of each mode in this test: normally distributed logarithms whose difference
-/// between two tests has the standard deviation `repeatability` (1).
-pub(super) fn set_up_factors(repeatability: f64, seed: u64) -> Vec<f64> {
-    if repeatability == 0.0 {
-        return Vec::new();
+/// Scatter of natural frequencies between set-ups of one state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetUpScatter {
+    /// Standard deviation of the difference of two tests of one state (1, relative).
+    pub repeatability: f64,
+    /// Share of the variance that all modes of a test have in common (1): temperature and the like.
+    pub share: f64,
+    /// Distribution of the rest.
+    pub tails: ScatterTails,
+}
+
+impl SetUpScatter {
+    /// Draws the factor on the natural frequency of each mode in one test: exp(r/sqrt(2) (sqrt(c) n + sqrt(1 - c) own)) with the
+    /// repeatability r and the share c.
+    pub fn factors(&self, modes: usize, draw: &mut ChaCha8Rng) -> Vec<f64> {
+        // The difference of two tests has the variance of both.
+        let std = self.repeatability / 2.0_f64.sqrt();
+        let normal = |draw: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(draw) };
+        let common = self.share.sqrt() * normal(draw);
+        let rest = (1.0 - self.share).sqrt();
+        let mut factors = Vec::with_capacity(modes);
+        for _ in 0..modes {
+            let own = match self.tails {
+                ScatterTails::Normal => rest * normal(draw),
+                ScatterTails::Long => {
+                    let tail: f64 = StudentT::new(4.0).map_or(0.0, |t| t.sample(draw));
+                    // Its variance is 2.
+                    rest * tail / 2.0_f64.sqrt()
+                }
+            };
+            factors.push((std * (common + own)).exp());
+        }
+        factors
     }
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    // A stream of its own, behind those of the visits.
-    random.set_stream(1 << 41);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let std = repeatability / 2.0_f64.sqrt();
-    let common = COMMON_SHARE.sqrt() * normal();
-    let own = (1.0 - COMMON_SHARE).sqrt();
-    (0..MOST_MODES)
-        .map(|_| (std * (common + own * normal())).exp())
-        .collect()
 }

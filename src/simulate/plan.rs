@@ -3,7 +3,8 @@
 
 use super::chain::Signal;
 use super::change::{
-    Change, change_joint, check_changes, set_up_factors, without_lost_masses, without_lost_sensors,
+    Change, ScatterTails, SetUpScatter, change_joint, check_changes, without_lost_masses,
+    without_lost_sensors,
 };
 use super::hammer::{TapPlan, Tip};
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
@@ -314,6 +315,11 @@ fn check_moves(
     Ok(())
 }
 
+/// Share of the set-up scatter's variance that all modes of a test have in common.
+const COMMON_SHARE: f64 = 0.25;
+/// Modes whose scatter is drawn, more than any test has.
+const SCATTERED: usize = 100;
+
 fn prepare(
     plan: &TestPlan<'_>,
     wanted: &WantedFile<'_>,
@@ -378,7 +384,17 @@ fn prepare(
         seen.joint_loss_factor,
         recording.highest_mode(laboratory),
     )?;
-    structure.scale_frequencies(&set_up_factors(plan.repeatability, plan.seed));
+    if plan.repeatability > 0.0 {
+        let scatter = SetUpScatter {
+            repeatability: plan.repeatability,
+            share: COMMON_SHARE,
+            tails: ScatterTails::Normal,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+        // A stream of its own, behind those of the visits.
+        random.set_stream(1 << 41);
+        structure.scale_frequencies(&scatter.factors(SCATTERED, &mut random));
+    }
     let block = match described.block.filter(|_| described.band.is_none()) {
         Some(block) => block as f64 / f64::from(sample_rate),
         None => wanted.block_seconds,

@@ -27,10 +27,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tapjoint::compare::{CauseKind, Comparison, MeasuredMode, Pair, Settings, Test, compare};
+use tapjoint::simulate::{ScatterTails, SetUpScatter};
 use tapjoint::study::blind_check::Rate;
 use tapjoint::study::change_check::{
-    AnsweredPair, ChangeClass, ChangedStructure, PairAnswer, PairCase, PairTruth, SetUpScatter,
-    VISIBLE, chi_square, score_pairs,
+    AnsweredPair, ChangeClass, ChangedStructure, PairAnswer, PairCase, PairTruth, VISIBLE,
+    chi_square, draw_repeatability, score_pairs,
 };
 
 const USAGE: &str = "usage: compare_study [--pairs N | --series N | --smallest N] [--seed S] [--cell NAME] [--ideal] [--list]";
@@ -68,12 +69,13 @@ impl Drawn {
         let draw = &mut draw;
         let structure = ChangedStructure::draw(cell, draw)?;
         let frequencies = structure.frequencies(draw.random_range(4..=8))?;
-        let repeatability = SetUpScatter::draw_repeatability(draw);
+        let repeatability = draw_repeatability(draw);
         let knows = draw.random_range(0..4);
         let repeats = if knows == 2 { 3 } else { 1 };
         let scatter = SetUpScatter {
             repeatability,
             share: 0.5 * draw.random::<f64>(),
+            tails: ScatterTails::Long,
         };
         let described = match is_ideal {
             true => &structure.before,
@@ -267,16 +269,17 @@ fn print_scores(rows: &[Row]) {
     });
     println!(
         "first cause of visible single changes {}, named wrongly {}",
-        shown(scores.first_right_visible),
+        shown(scores.rate("first_right_visible").unwrap_or_default()),
         shown(wrong)
     );
     let intervals = [
-        ("Kt", scores.kt_interval),
-        ("Kr", scores.kr_interval),
-        ("visible mass", scores.mass_interval),
-        ("visible position", scores.place_interval),
+        ("Kt", "kt_interval"),
+        ("Kr", "kr_interval"),
+        ("visible mass", "mass_interval"),
+        ("visible position", "place_interval"),
     ];
-    for (name, rate) in intervals {
+    for (name, key) in intervals {
+        let rate = scores.rate(key).unwrap_or_default();
         println!("95 % interval of {name} holds {}", shown(rate));
     }
     print_calibration(rows);

@@ -38,7 +38,7 @@ mod wiring;
 
 pub use amplitude::AmplitudeChange;
 use checks::judge;
-pub use compared::compared_test;
+pub use compared::{compared_items, compared_test};
 pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
 pub use free_test::{FreeTest, FreeTestError, measure_free_test};

@@ -5,6 +5,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use tapjoint::compare::REPEATABILITY_LIMITS;
 use tapjoint::description::{
     ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
     SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
@@ -572,10 +573,18 @@ pub(super) fn perturbed_by(methods: &[EstimateMethod]) -> IdentifySettings {
 /// Parses a repeatability: a ratio, or a percentage with its sign.
 pub(super) fn repeatability(text: &str) -> Result<f64, String> {
     let value = parse_quantity(text, Dimension::Ratio).map_err(|error| error.to_string())?;
-    match (1e-6..=0.1).contains(&value) {
+    let [least, most] = REPEATABILITY_LIMITS;
+    match (least..=most).contains(&value) {
         true => Ok(value),
         false => Err(format!(
-            "{text} is no repeatability; give \"0.0001 %\" to \"10 %\", such as \"0.1 %\""
+            "{text} is no repeatability; give \"{} %\" to \"{} %\", such as \"0.1 %\"",
+            percent(least),
+            percent(most)
         )),
     }
+}
+
+/// Returns a relative value in percent, without digits that the computer adds.
+pub(super) fn percent(value: f64) -> f64 {
+    (1e8 * value).round() / 1e6
 }

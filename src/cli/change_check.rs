@@ -5,6 +5,7 @@ use super::blind_check::{BlindCheckArguments, RELIABILITY};
 use super::blind_tests::{AGAIN, Listed, rename_recordings, renamed, write_test};
 use super::input::{TestFile, read_test};
 use super::publication::OutputFolder;
+use super::simulate::SIDES;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
 use rayon::prelude::*;
@@ -13,16 +14,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::compare::{Pair, Settings, Test, compare};
 use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{IdentifySettings, compared_test};
+use tapjoint::pipeline::{IdentifySettings, compared_items, compared_test};
 use tapjoint::report::change_check::{pair_score_json, render_change_check};
 use tapjoint::study::blind_check::{RecordedTest, commitment, render_rows};
 use tapjoint::study::change_check::{
     DrawnPair, PairAnswer, PairCampaign, PairCase, PairConduct, PairTruth, PairTruthFile,
     pair_rows, pair_truths_json, parse_pair_truths, score_pairs,
 };
-
-/// Folders of the two tests of a pair.
-const SIDES: [&str; 2] = ["before", "after"];
 
 pub(super) fn run(
     arguments: &BlindCheckArguments,
@@ -238,13 +236,14 @@ fn elsewhere(
             .iter()
             .filter_map(|change| change.item.as_ref())
         {
-            if files[0]
-                .as_ref()
-                .is_ok_and(|file| !has_item(&file.test, item))
-            {
+            let Ok(before) = &files[0] else {
+                continue;
+            };
+            let items = compared_items(&before.test);
+            if items.iter().all(|own| own.name != *item) {
                 terminal.warn(&format!(
-                    "{name}: \"{}\": before/test.toml describes no sensor or mass \"{item}\", so that no answer has the \
-                     right item",
+                    "{name}: \"{}\": before/test.toml describes no \"{item}\" that weighs in the reference recording, so that \
+                     no answer has the right item",
                     truth.name
                 ));
             }
@@ -280,14 +279,6 @@ fn elsewhere(
         ..PairConduct::default()
     };
     Ok((cases, conduct))
-}
-
-fn has_item(test: &TestDescription, item: &str) -> bool {
-    let masses = test.recordings.iter().flat_map(|one| &one.mass_names);
-    let mut names = masses
-        .flatten()
-        .chain(test.sensors.iter().map(|one| &one.name));
-    names.any(|name| name == item)
 }
 
 /// Compares the first existing pairs again, with their recordings under other names. Pairs whose names cannot be exchanged are

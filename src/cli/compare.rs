@@ -181,13 +181,13 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
             && outputs.report.is_some()
         {
             // Reading two tests again takes less than keeping the spectra of all.
-            let first = departure.since.saturating_sub(MOST_REPEATS);
+            let [before, after] = departure.compared();
             let again = |test: usize| {
                 let file = &arguments.series[test];
                 read_side(file, template.as_ref(), &terminal, &mut Vec::new())
             };
-            recordings.before = again(first)?.recordings;
-            recordings.after = again(departure.since)?.recordings;
+            recordings.before = again(before.start)?.recordings;
+            recordings.after = again(after.start)?.recordings;
         }
         let files = names(&arguments.series);
         let document = series_of(&name, &structure, files, found, warnings);

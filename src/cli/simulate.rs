@@ -1,7 +1,7 @@
 //! `tapjoint simulate`: the recordings of a virtual test, or of two between which something changed.
 
 use super::Outcome;
-use super::arguments::{StiffnessArguments, repeatability};
+use super::arguments::{StiffnessArguments, percent, repeatability};
 use super::input::{effect_at, read_model};
 use super::laboratory::{LaboratoryArguments, laboratory_lines};
 use super::overwrite::{CHECKSUMS, Expanded, listed_files};
@@ -239,7 +239,7 @@ const DESCRIPTION: &str = "test.toml";
 /// Name of the file with what was planted.
 const TRUTH: &str = "truth.json";
 /// Folders of the tests before and after a change.
-const SIDES: [&str; 2] = ["before", "after"];
+pub(super) const SIDES: [&str; 2] = ["before", "after"];
 
 impl SimulateArguments {
     /// Returns the files of the virtual test.
@@ -391,11 +391,6 @@ fn run_pair(
     terminal.say(&text)?;
     terminal.write_json(&serde_json::json!({ "truth": truth }))?;
     left.map_or(Ok(Outcome::Answered), Err)
-}
-
-/// Returns a relative value in percent, without digits that the computer adds.
-fn percent(value: f64) -> f64 {
-    (1e8 * value).round() / 1e6
 }
 
 /// Returns the files of earlier virtual tests in the folder, of one test or of a pair.

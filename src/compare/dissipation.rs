@@ -1,16 +1,15 @@
 //! Changes of the dampings, which no frequency shows.
 //!
-//! A joint that dissipates damps each mode in proportion to its share of the strain energy. Half of this share is the slope of
-//! the frequency with respect to the stiffness (Rayleigh's quotient):
+//! A joint that dissipates damps each mode in proportion to its share of the strain energy:
 //!
-//! zeta_n = eta/2 (strain energy of the joint/strain energy)_n = eta d ln f_n/d ln K
+//! zeta_n = eta/2 (strain energy of the joint/strain energy)_n
 //!
 //! Translation and rotation have one loss factor eta. Its change is fitted with the stiffness as it was before.
 
 use crate::likelihood::{Factored, NO_FIT};
 use crate::model::PairModel;
 use crate::result::{DampingResult, DampingVerdict, Interval, ModeDamping};
-use crate::test::Pair;
+use crate::test::{MeasuredMode, Pair, Test};
 use crate::value_change::{UsualScatter, ValueChanges};
 use nalgebra::DVector;
 use tapjoint_numerics::stats::{fisher_tail, student};
@@ -21,12 +20,15 @@ const USUAL: UsualScatter = UsualScatter {
     least_size: f64::MIN_POSITIVE,
 };
 
+/// Largest loss factor that is told (1). Rubber has about 1, bolted joints have a few hundredths. A larger one only says that
+/// the modes hardly feel the joint. Damping is in proportion to the loss factor while it is small.
+const MOST_LOSS: f64 = 1.0;
+
 /// Returns the change of the dampings; `None` where the tests have none in common.
 pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingResult> {
     let modes: Vec<Vec<usize>> = models.iter().map(|model| model.modes.clone()).collect();
-    let found = ValueChanges::new(pairs, &modes, &USUAL, |_, mode| {
-        mode.damping.filter(|one| one.value > 0.0)
-    });
+    let damping = |_: &Test, mode: &MeasuredMode| mode.damping.filter(|one| one.value > 0.0);
+    let found = ValueChanges::new(pairs, &modes, &USUAL, damping, |mode| mode.moved.damping);
     if found.all.is_empty() {
         return None;
     }
@@ -37,36 +39,18 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     let changes = found.all.iter().map(|one| one.after - one.before);
     let changes = DVector::from_iterator(found.all.len(), changes);
     let squares = covariance.product(&changes, &changes);
-    let no_change_goodness = fisher_tail(squares / count, count, found.freedom);
-    let (mut loss_factor, mut joint_goodness) = (None, None);
-    if let Some(slopes) = joint_slopes(models).filter(|_| found.all.len() > 1) {
-        let slopes = found.all.iter().map(|one| {
-            let model = &models[one.pair];
-            let position = model.modes.iter().position(|mode| *mode == one.mode);
-            position.map_or(0.0, |position| slopes[one.pair][position])
-        });
-        let slopes = DVector::from_iterator(found.all.len(), slopes);
-        let information = covariance.product(&slopes, &slopes);
-        let value = covariance.product(&slopes, &changes) / information;
-        let left = (squares - value * value * information).max(0.0) / (count - 1.0);
-        joint_goodness = Some(fisher_tail(left, count - 1.0, found.freedom));
-        // What the fit leaves tells of the scatter, too.
-        let freedom = found.freedom + count - 1.0;
-        let share = (found.freedom + (count - 1.0) * left) / freedom;
-        let std = (share / information).sqrt();
-        let reach = student::quantile(0.05, freedom) * std;
-        loss_factor = Some(Interval {
-            value,
-            std,
-            low: value - reach,
-            high: value + reach,
-        });
+    let mut no_change_goodness = fisher_tail(squares / count, count, found.freedom);
+    let joint = JointFit::new(&found, &covariance, &changes, models);
+    if let Some(joint) = &joint {
+        // Of two tests the better one counts twice (Bonferroni). A test of one pattern sees what few degrees of freedom hide from a
+        // test of all.
+        no_change_goodness = (2.0 * no_change_goodness.min(joint.no_change_goodness)).min(1.0);
     }
-    let is_clear = loss_factor.is_some_and(|one| one.low * one.high > 0.0);
-    let verdict = match joint_goodness {
+    let verdict = match &joint {
         _ if no_change_goodness >= NO_FIT => DampingVerdict::NoChange,
-        Some(goodness) if goodness >= NO_FIT && is_clear => DampingVerdict::JointDamping,
-        _ => DampingVerdict::Other,
+        Some(joint) if joint.goodness < NO_FIT => DampingVerdict::Other,
+        Some(joint) if joint.is_clear() => DampingVerdict::JointDamping,
+        _ => DampingVerdict::Undecided,
     };
     let modes = found.all.iter().zip(stds).map(|(one, std)| ModeDamping {
         pair: one.pair,
@@ -78,30 +62,72 @@ pub(crate) fn dampings(pairs: &[Pair], models: &[PairModel]) -> Option<DampingRe
     Some(DampingResult {
         modes: modes.collect(),
         verdict,
-        loss_factor,
+        loss_factor: joint
+            .as_ref()
+            .map(|joint| joint.loss_factor)
+            .filter(|one| one.low >= -MOST_LOSS && one.high <= MOST_LOSS),
         no_change_goodness,
-        joint_goodness,
+        joint_goodness: joint.map(|joint| joint.goodness),
         scatter_percent: 100.0 * found.scatter,
     })
 }
 
-/// Returns d ln f/d ln K of each mode of each pair, all elastic stiffnesses of the joint together; `None` where there are none.
-fn joint_slopes(models: &[PairModel]) -> Option<Vec<Vec<f64>>> {
-    let mut all = Vec::with_capacity(models.len());
-    for model in models {
-        let joints = model.joints()?;
-        let mut directions = model.joint_directions();
-        directions.retain(|&one| {
-            let mut joints = joints.iter();
-            one < 2 && joints.all(|joint| [joint.kt, joint.kr][one].is_finite())
+/// Change of the joint's loss factor that fits the changes of the dampings best.
+struct JointFit {
+    /// The change (1), with the stiffness as it was before.
+    loss_factor: Interval,
+    /// Goodness of this fit (1).
+    goodness: f64,
+    /// Probability that chance alone gives a loss factor as large as this (1).
+    no_change_goodness: f64,
+}
+
+impl JointFit {
+    /// Fits the loss factor; `None` where there is no elastic joint, and for one mode.
+    fn new(
+        found: &ValueChanges,
+        covariance: &Factored,
+        changes: &DVector<f64>,
+        models: &[PairModel],
+    ) -> Option<Self> {
+        let levers = models.iter().map(PairModel::joint_levers);
+        let levers: Vec<Vec<f64>> = levers.collect::<Option<_>>()?;
+        let levers = found.all.iter().map(|one| {
+            let modes = &models[one.pair].modes;
+            let position = modes.iter().position(|mode| *mode == one.mode);
+            position.map_or(0.0, |position| levers[one.pair][position])
         });
-        if directions.is_empty() {
+        let levers = DVector::from_iterator(found.all.len(), levers);
+        let information = covariance.product(&levers, &levers);
+        let is_felt = information.is_finite() && information > 0.0;
+        if !is_felt || found.all.len() < 2 {
             return None;
         }
-        let slopes = model.joint_slopes(&directions, &vec![0.0; directions.len()])?;
-        all.push(slopes.column_sum().iter().copied().collect());
+        let value = covariance.product(&levers, changes) / information;
+        let explained = value * value * information;
+        let others = found.all.len() as f64 - 1.0;
+        let left = (covariance.product(changes, changes) - explained).max(0.0) / others;
+        // What the fit leaves tells of the scatter, too.
+        let freedom = found.freedom + others;
+        let share = (found.freedom + others * left) / freedom;
+        let std = (share / information).sqrt();
+        let reach = student::quantile(0.05, freedom) * std;
+        Some(Self {
+            loss_factor: Interval {
+                value,
+                std,
+                low: value - reach,
+                high: value + reach,
+            },
+            goodness: fisher_tail(left, others, found.freedom),
+            no_change_goodness: fisher_tail(explained, 1.0, found.freedom),
+        })
     }
-    Some(all)
+
+    /// Returns true where the interval of the loss factor lies on one side of 0.
+    fn is_clear(&self) -> bool {
+        self.loss_factor.low * self.loss_factor.high > 0.0
+    }
 }
 
 #[cfg(test)]

@@ -1,18 +1,16 @@
 //! One level of the taps for all tests, and changes of how frequencies depend on it.
 //!
 //! A joint that slips is softer at higher levels. Two tests at different levels then differ although nothing changed. Decays tell
-//! the slope of a frequency over the logarithm of the amplitude. With it each frequency is taken at the amplitude of the first
-//! test. A change of the slopes is often the first sign of a bolt that works loose.
+//! the frequency over the amplitude. By this curve each frequency is taken at the amplitude of the first test. A change of the mean
+//! slope of the curve is often the first sign of a bolt that works loose.
 
 use crate::likelihood::{Factored, NO_FIT};
 use crate::result::{LevelResult, ModeLevel};
-use crate::test::{MeasuredMode, Pair};
+use crate::test::{MeasuredMode, Pair, Test};
 use crate::value_change::{UsualScatter, ValueChanges};
 use nalgebra::DVector;
 use tapjoint_numerics::stats::fisher_tail;
 
-/// How far beyond the amplitudes of its decays a mode is moved (1, factor).
-const BEYOND: f64 = 1.5;
 /// Amplitudes that differ by less than this factor are alike: slopes of a joint that slips grow with the level.
 const ALIKE: f64 = 1.5;
 /// Scatter of a slope, at least 0.01 % per factor of ten: other modes in the decay pull it.
@@ -61,34 +59,30 @@ pub(crate) fn take_one_level(pair: &mut Pair) -> Vec<Moved> {
 /// the decays do not show it at this amplitude.
 fn take_level_of(first: &MeasuredMode, mode: &mut MeasuredMode) -> Option<f64> {
     let (target, own) = first.level.as_ref().zip(mode.level.as_ref())?;
-    let [low, high] = own.range;
-    let is_shown = (low / BEYOND..=high * BEYOND).contains(&target.amplitude);
-    let tens = (own.amplitude / target.amplitude).log10();
-    if target.of != own.of || !is_shown || !tens.is_finite() {
+    if target.of != own.of {
         return None;
     }
-    let change = -own.frequency_slope.value * tens;
-    mode.frequency *= change.exp();
-    mode.std = mode
-        .std
-        .hypot(own.frequency_slope.std * tens * mode.frequency);
+    let there = own.at(target.amplitude)?;
+    mode.frequency *= there.frequency.value.exp();
+    mode.moved.frequency = there.frequency.std * mode.frequency;
     if let Some(damping) = &mut mode.damping {
-        damping.value -= own.damping_slope.value * tens;
-        damping.std = damping.std.hypot(own.damping_slope.std * tens);
+        damping.value += there.damping.value;
+        mode.moved.damping = there.damping.std;
     }
-    Some(change)
+    Some(there.frequency.value)
 }
 
 /// Returns the change of the frequencies' dependence on the level, for modes that all tests read at about one amplitude; `None`
 /// where there are none.
 pub(crate) fn levels(pairs: &[Pair], modes: &[Vec<usize>]) -> Option<LevelResult> {
-    let found = ValueChanges::new(pairs, modes, &USUAL, |first, mode| {
+    let slope = |first: &Test, mode: &MeasuredMode| {
         let own = mode.level.as_ref()?;
         let first = first.mode(mode.mode)?.level.as_ref()?;
         let ratio = own.amplitude / first.amplitude;
         let is_alike = first.of == own.of && ratio < ALIKE && ratio > 1.0 / ALIKE;
         is_alike.then_some(own.frequency_slope)
-    });
+    };
+    let found = ValueChanges::new(pairs, modes, &USUAL, slope, |_| 0.0);
     if found.all.is_empty() {
         return None;
     }

@@ -53,8 +53,8 @@ pub use series::{
     Series, WatchedSeries, watch,
 };
 pub use test::{
-    CompareError, Item, ItemKind, Level, MOST_PAIRS, MOST_REPEATS, MeasuredMode, Pair, Reading,
-    Settings, Test,
+    CompareError, Item, ItemKind, Level, LevelPoint, MOST_PAIRS, MOST_REPEATS, MeasuredMode,
+    MovedStd, Pair, REPEATABILITY_LIMITS, Reading, Settings, Test,
 };
 
 use cause::Cause;

@@ -3,7 +3,8 @@
 //! The measured change of each mode is the predicted one, plus scatter between set-ups. Its covariance is
 //! r^2 ((1 - c) I + c 1 1') + sum of g g' + (e d)^2 + (e/2)^2 d d':
 //!
-//! - r: the repeatability; readings that are worse, or not held in it, have a variance of their own
+//! - r: the repeatability; readings that are worse, or not held in it, have a variance of their own. So has taking a mode to another
+//!   level
 //! - c: correlation of the scatter of two modes
 //! - g: change of the prediction with the joint one standard deviation aside, for each of its axes; of a sensor that was moved
 //!   also with its place aside
@@ -92,18 +93,19 @@ pub(crate) fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
     most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
 }
 
-/// Returns the covariance of the measured changes by scatter and readings alone.
+/// Returns the covariance of the measured changes by scatter, readings and other levels alone.
 pub(crate) fn errors(pair: &PairModel, std: f64, is_stated: bool) -> DMatrix<f64> {
     let scatter = std * std * pair.scatter_share;
     let count = pair.modes.len();
     let mut errors = DMatrix::from_element(count, count, SCATTER_CORRELATION * scatter);
     // A stated repeatability and the scatter of repeats hold the readings' own noise. An assumed one does not.
     let holds_readings = is_stated || pair.repeat_freedom > 0.0;
-    for (k, reading) in pair.reading.iter().enumerate() {
-        errors[(k, k)] = match holds_readings {
+    for (k, (reading, moved)) in pair.reading.iter().zip(&pair.moved).enumerate() {
+        let at_own_level = match holds_readings {
             true => scatter.max(*reading),
             false => scatter + reading,
         };
+        errors[(k, k)] = at_own_level + moved;
     }
     errors
 }

@@ -58,6 +58,8 @@ pub(crate) struct PairModel {
     pub(crate) measured: Vec<f64>,
     /// Its variance by the readings.
     pub(crate) reading: Vec<f64>,
+    /// Its variance by taking modes to another level.
+    pub(crate) moved: Vec<f64>,
     /// Variance of the change over that of a difference of two tests: less where there are repeats.
     pub(crate) scatter_share: f64,
     /// Sum of squares of the scatter between repeats, each against the mean of its side (logarithm).
@@ -330,6 +332,7 @@ impl PairModel {
             described: centre.described(),
             measured: differences.measured,
             reading: differences.reading,
+            moved: differences.moved,
             scatter_share: differences.scatter_share,
             repeat_squares: differences.repeat_squares,
             repeat_freedom: differences.repeat_freedom,
@@ -466,22 +469,16 @@ impl PairModel {
         })
     }
 
-    /// Returns the measured change (logarithm) beyond the described one and its variance by the readings, from the first test
-    /// before to another test.
+    /// Returns the measured differences from the first test before to another test.
     ///
     /// # Errors
     /// The described structure of the other test has no modes.
-    pub(crate) fn beyond(
-        &self,
-        first: &Test,
-        other: &Test,
-    ) -> Result<[Vec<f64>; 2], StructureError> {
+    pub(crate) fn beyond(&self, first: &Test, other: &Test) -> Result<Differences, StructureError> {
         let pair = Pair {
             before: vec![first.clone()],
             after: vec![other.clone()],
         };
-        let found = Differences::new(&pair, &self.modes, &self.centre)?;
-        Ok([found.measured, found.reading])
+        Differences::new(&pair, &self.modes, &self.centre)
     }
 
     /// Returns the directions in which the joint may change.
@@ -527,6 +524,21 @@ impl PairModel {
             }
         }
         Some(slopes)
+    }
+
+    /// Returns half of the joint's share of the strain energy of each mode (1): its damping ratio over the joint's loss factor.
+    /// `None` where there is no elastic joint, or a spring is rigid in one description alone.
+    pub(crate) fn joint_levers(&self) -> Option<Vec<f64>> {
+        let rigid = self
+            .joints()?
+            .map(|joint| [joint.kt, joint.kr].map(f64::is_infinite));
+        if rigid[0] != rigid[1] || rigid[0] == [true; 2] {
+            return None;
+        }
+        let BeamModes { modes, numbers, .. } = &self.centre.modes_after;
+        let levers = self.modes.iter();
+        let levers = levers.map(|mode| 0.5 * modes.joint_energy_share(numbers[mode - 1]));
+        Some(levers.collect())
     }
 
     fn joint_shifted(
@@ -589,9 +601,13 @@ impl PairModel {
 }
 
 /// Measured differences of a pair.
-struct Differences {
-    measured: Vec<f64>,
-    reading: Vec<f64>,
+pub(crate) struct Differences {
+    /// Measured change of each frequency (logarithm) beyond the described one.
+    pub(crate) measured: Vec<f64>,
+    /// Its variance by the readings.
+    pub(crate) reading: Vec<f64>,
+    /// Its variance by taking modes to another level.
+    pub(crate) moved: Vec<f64>,
     scatter_share: f64,
     repeat_squares: f64,
     repeat_freedom: f64,
@@ -607,7 +623,7 @@ impl Differences {
     fn new(pair: &Pair, modes: &[usize], centre: &Structures) -> Result<Self, StructureError> {
         let count = modes.len();
         let mut measured = vec![0.0; count];
-        let mut reading = vec![0.0; count];
+        let (mut reading, mut moved) = (vec![0.0; count], vec![0.0; count]);
         let mut frequencies = vec![[0.0; 2]; count];
         let (mut squares, mut freedom, mut share) = (0.0, 0.0, 0.0);
         let sides = [&pair.before, &pair.after];
@@ -627,8 +643,11 @@ impl Differences {
                 }
                 for (k, &mode) in modes.iter().enumerate() {
                     beyond[(row, k)] = log_frequency(test, mode) - predicted[k];
-                    let relative = test.mode(mode).map_or(0.0, |one| one.std / one.frequency);
-                    reading[k] += (relative / tests.len() as f64).powi(2);
+                    if let Some(own) = test.mode(mode) {
+                        let all = own.frequency * tests.len() as f64;
+                        reading[k] += (own.std / all).powi(2);
+                        moved[k] += (own.moved.frequency / all).powi(2);
+                    }
                 }
             }
             let means: DVector<f64> = beyond.row_mean().transpose();
@@ -654,6 +673,7 @@ impl Differences {
         Ok(Self {
             measured,
             reading,
+            moved,
             scatter_share: share,
             repeat_squares: squares,
             repeat_freedom: freedom,

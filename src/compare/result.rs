@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Interval {
-    /// Median.
+    /// Median; of a loss factor the best fit.
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
@@ -180,6 +180,8 @@ pub enum DampingVerdict {
     JointDamping,
     /// In another way.
     Other,
+    /// They changed. These data do not tell whether the joint changed them.
+    Undecided,
 }
 
 /// Change of a damping ratio.
@@ -204,12 +206,14 @@ pub struct DampingResult {
     pub modes: Vec<ModeDamping>,
     /// What they say.
     pub verdict: DampingVerdict,
-    /// Change of the joint's loss factor (1) if only this changed, and no stiffness; `null` where there is no elastic joint, and
-    /// for one mode.
+    /// Change of the joint's loss factor (1) if only this changed, and no stiffness. `null` where there is no elastic joint, for
+    /// one mode, and where the interval reaches beyond 1: then the modes hardly feel the joint.
     pub loss_factor: Option<Interval>,
-    /// Goodness of fit of no change (1).
+    /// Goodness of fit of no change (1): the smaller one of two tests, times two. One is of all dampings, the other of the loss
+    /// factor alone.
     pub no_change_goodness: f64,
-    /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is none.
+    /// Goodness of fit of a change of the joint's loss factor (1); `null` where there is no elastic joint that the modes feel, and
+    /// for one mode.
     pub joint_goodness: Option<f64>,
     /// Standard deviation of the difference of a damping between two tests of one state (%).
     pub scatter_percent: f64,

@@ -11,13 +11,16 @@ use crate::change_point::{
 use crate::joint::JointChange;
 use crate::level::take_one_level;
 use crate::matching::match_modes;
-use crate::model::PairModel;
+use crate::model::{Differences, PairModel};
 use crate::result::{Comparison, MatchedMode};
-use crate::test::{CompareError, MOST_REPEATS, Pair, Settings, Test, common_modes};
+use crate::test::{
+    CompareError, MOST_REPEATS, Pair, REPEATABILITY_LIMITS, Settings, Test, common_modes,
+};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::ops::Range;
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings as SearchSettings, minimise};
 use tapjoint_numerics::stats::median;
 
@@ -25,8 +28,6 @@ use tapjoint_numerics::stats::median;
 pub const LEAST_SERIES: usize = 3;
 /// Most tests of a series.
 pub const MOST_SERIES: usize = 1000;
-/// Least repeatability where none is stated (1): no frequency is read better.
-const LEAST_REPEATABILITY: f64 = 1e-6;
 /// Largest change of a stiffness (logarithm).
 const MOST_CHANGE: f64 = 3.0;
 /// Unit of the residuals of the search for stiffnesses (1): the precision of a good reading.
@@ -73,6 +74,17 @@ pub struct Departure {
     pub since: usize,
     /// Mean change of the tests from there to `test`, against the mean before (%).
     pub percent: f64,
+}
+
+impl Departure {
+    /// Returns the indices of the tests that are compared: the last ones before the step, and the last ones from there to the test
+    /// that shows it.
+    pub fn compared(&self) -> [Range<usize>; 2] {
+        [0..self.since, self.since..self.test + 1].map(|tests| {
+            let first = tests.end.saturating_sub(MOST_REPEATS);
+            tests.start.max(first)..tests.end
+        })
+    }
 }
 
 /// Control chart of one quantity.
@@ -126,8 +138,7 @@ impl Series {
 pub struct WatchedSeries {
     /// The charts.
     pub series: Series,
-    /// What changed. The tests before the step are compared with those from the step to the test that shows it. `None` where
-    /// all tests agree.
+    /// What changed between the tests of [`Departure::compared`]. `None` where all tests agree.
     pub change: Option<Comparison>,
 }
 
@@ -163,7 +174,7 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
         &modes,
     )?;
     let measured = others.par_iter().map(|test| model.beyond(first, test));
-    let measured: Vec<[Vec<f64>; 2]> = measured.collect::<Result<_, _>>()?;
+    let measured: Vec<Differences> = measured.collect::<Result<_, _>>()?;
     let count = modes.len();
     let SeriesChanges {
         quantities,
@@ -172,10 +183,13 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     } = SeriesChanges::new(&model, &measured);
     // A stated repeatability holds the readings' own noise, unless these are worse. Half of the variance of a difference is that of one test.
     let is_stated = settings.repeatability.is_some();
-    let repeatability = settings.repeatability.unwrap_or(LEAST_REPEATABILITY);
+    let repeatability = settings.repeatability.unwrap_or(REPEATABILITY_LIMITS[0]);
     let stds = (0..count).map(|k| {
-        let mut readings: Vec<f64> = measured.iter().map(|one| one[1][k]).collect();
-        (0.5 * repeatability.powi(2).max(median(&mut readings))).sqrt()
+        let mut readings: Vec<f64> = measured.iter().map(|one| one.reading[k]).collect();
+        let at_own_level = 0.5 * repeatability.powi(2).max(median(&mut readings));
+        // The first test keeps its level.
+        let moved: f64 = measured.iter().map(|one| one.moved[k]).sum();
+        (at_own_level + moved / measured.len() as f64).sqrt()
     });
     let stds: Vec<f64> = stds.collect();
     let limits = Limits::new(
@@ -208,20 +222,17 @@ pub fn watch(tests: &[Test], settings: &Settings) -> Result<WatchedSeries, Compa
     let mut change = None;
     if let Some((_, departure)) = series.departure() {
         // What comes later may be another change.
-        let (before, after) = as_read[..=departure.test].split_at(departure.since);
-        let pair = Pair {
-            before: before[before.len().saturating_sub(MOST_REPEATS)..].to_vec(),
-            after: after.to_vec(),
-        };
+        let [before, after] = departure.compared().map(|tests| as_read[tests].to_vec());
+        let pair = Pair { before, after };
         change = Some(crate::compare(&[pair], settings)?);
     }
     Ok(WatchedSeries { series, change })
 }
 
-/// SeriesChanges of all quantities.
+/// Changes of all quantities.
 struct SeriesChanges {
     quantities: Vec<ChartedQuantity>,
-    /// SeriesChanges of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
+    /// Changes of the quantities over those of the frequencies (all logarithms): a row for each quantity, the modes first.
     sensitivities: DMatrix<f64>,
     /// Logarithms of all quantities over those of the first test: a row for each test.
     rows: Vec<Vec<f64>>,
@@ -229,12 +240,13 @@ struct SeriesChanges {
 
 impl SeriesChanges {
     /// Returns the changes from the measured ones of the modes (logarithms), from the second test on.
-    fn new(model: &PairModel, measured: &[[Vec<f64>; 2]]) -> Self {
+    fn new(model: &PairModel, measured: &[Differences]) -> Self {
         let count = model.modes.len();
         let modes = model.modes.iter().map(|mode| ChartedQuantity::Mode(*mode));
         let sensitivities = DMatrix::identity(count, count);
         let mut rows = vec![vec![0.0; count + 1]];
-        for [changes, _] in measured {
+        for differences in measured {
+            let changes = &differences.measured;
             let mut row = changes.clone();
             row.push(changes.iter().sum::<f64>() / count as f64);
             rows.push(row);
@@ -246,7 +258,7 @@ impl SeriesChanges {
         };
         if let Some(joint) = JointSensitivity::new(model) {
             let fits = measured.par_iter();
-            let fits = fits.map(|[changes, _]| joint.changes(model, changes));
+            let fits = fits.map(|one| joint.changes(model, &one.measured));
             // Without a fit of every test the stiffnesses have no charts.
             if let Some(fits) = fits.collect::<Option<Vec<Vec<f64>>>>() {
                 all.add_joint(&joint, fits);
@@ -358,7 +370,7 @@ fn chart(
 struct JointSensitivity {
     quantities: Vec<ChartedQuantity>,
     directions: Vec<usize>,
-    /// SeriesChanges of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
+    /// Changes of the stiffnesses (logarithms) over those of the frequencies: a row for each stiffness.
     sensitivity: DMatrix<f64>,
 }
 

@@ -54,6 +54,17 @@ pub struct MeasuredMode {
     pub damping: Option<Reading>,
     /// How the frequency depends on the level; `None` without decays that tell it.
     pub level: Option<Level>,
+    /// What taking the mode to another level adds to its uncertainty.
+    pub moved: MovedStd,
+}
+
+/// Standard uncertainties that taking a mode to another level adds; 0 where it stays as it was read.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MovedStd {
+    /// Of the frequency (Hz).
+    pub frequency: f64,
+    /// Of the damping ratio (1).
+    pub damping: f64,
 }
 
 impl MeasuredMode {
@@ -65,6 +76,7 @@ impl MeasuredMode {
             std,
             damping: None,
             level: None,
+            moved: MovedStd::default(),
         }
     }
 }
@@ -74,15 +86,48 @@ impl MeasuredMode {
 pub struct Level {
     /// Amplitude at which frequency and damping hold, in the unit of the sensor.
     pub amplitude: f64,
-    /// Smallest and largest amplitude that the decays show.
-    pub range: [f64; 2],
+    /// The mode at the amplitudes that the decays show, ascending.
+    pub curve: Vec<LevelPoint>,
     /// What has this amplitude: sensor, place and unit. Amplitudes of others are not compared.
     pub of: String,
-    /// Relative change of the frequency per factor of ten in amplitude (1); negative where the structure is softer at higher
-    /// levels.
+    /// Relative change of the frequency per factor of ten in amplitude (1), the mean over the decays; negative where the structure
+    /// is softer at higher levels.
     pub frequency_slope: Reading,
-    /// Change of the damping ratio per factor of ten in amplitude (1).
-    pub damping_slope: Reading,
+}
+
+/// A mode at one amplitude of its decays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelPoint {
+    /// Amplitude, in the unit of the sensor.
+    pub amplitude: f64,
+    /// Change of the frequency (logarithm) against that of the mode.
+    pub frequency: Reading,
+    /// Change of the damping ratio (1) against that of the mode.
+    pub damping: Reading,
+}
+
+impl Level {
+    /// Returns the mode at an amplitude, between the points in proportion to its logarithm; `None` where the decays do not show
+    /// it.
+    pub(crate) fn at(&self, amplitude: f64) -> Option<LevelPoint> {
+        let pair = self.curve.windows(2).find(|pair| {
+            let [low, high] = [pair[0].amplitude, pair[1].amplitude];
+            low < high && (low..=high).contains(&amplitude)
+        })?;
+        let [below, above] = pair else {
+            return None;
+        };
+        let share = (amplitude / below.amplitude).ln() / (above.amplitude / below.amplitude).ln();
+        let between = |below: Reading, above: Reading| Reading {
+            value: below.value + share * (above.value - below.value),
+            std: below.std + share * (above.std - below.std),
+        };
+        Some(LevelPoint {
+            amplitude,
+            frequency: between(below.frequency, above.frequency),
+            damping: between(below.damping, above.damping),
+        })
+    }
 }
 
 /// A measured value.
@@ -182,8 +227,8 @@ const LEAST_MODES: usize = 3;
 pub const MOST_PAIRS: usize = 16;
 /// Most repeats on one side of a change.
 pub const MOST_REPEATS: usize = 100;
-/// Limits of a stated repeatability (1).
-const REPEATABILITY: [f64; 2] = [1e-6, 0.1];
+/// Limits of a stated repeatability (1): no frequency is read better than the first.
+pub const REPEATABILITY_LIMITS: [f64; 2] = [1e-6, 0.1];
 
 /// Refuses what cannot be compared, and returns the modes that all tests of each pair have, ascending.
 ///
@@ -196,7 +241,7 @@ pub fn common_modes(pairs: &[Pair], settings: &Settings) -> Result<Vec<Vec<usize
             most: MOST_PAIRS,
         });
     }
-    let [least, most] = REPEATABILITY;
+    let [least, most] = REPEATABILITY_LIMITS;
     if let Some(value) = settings.repeatability
         && !(least..=most).contains(&value)
     {

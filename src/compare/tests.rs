@@ -2,7 +2,7 @@
 
 use crate::fixture::{self, BEAM, cantilever, pair, springs, test};
 use crate::{
-    CauseKind, ChartedQuantity, CompareError, Comparison, Item, ItemKind, Pair,
+    CauseKind, ChartedQuantity, CompareError, Comparison, Departure, Item, ItemKind, Pair,
     RepeatabilityOrigin, Settings, Test, VerdictKind, compare, watch,
 };
 use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
@@ -86,6 +86,17 @@ fn val_a_mass_at_the_end_is_found_with_its_size_and_place() {
         "{mass:?} {truth}"
     );
     assert!(first.parameters["position"].high > 0.99 * BEAM.length);
+}
+
+#[test]
+fn limit_no_more_tests_of_a_series_are_compared_than_repeats_of_a_pair() {
+    let departure = |since, test| Departure {
+        test,
+        since,
+        percent: 1.0,
+    };
+    assert_eq!(departure(3, 4).compared(), [0..3, 3..5]);
+    assert_eq!(departure(150, 149 + 150).compared(), [50..150, 200..300]);
 }
 
 #[test]

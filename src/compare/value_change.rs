@@ -22,6 +22,8 @@ pub(crate) struct ValueChange {
     pub(crate) after: f64,
     /// Variance of the change by readings.
     reading: f64,
+    /// Variance of the change by taking modes to another level.
+    moved: f64,
     /// Standard deviation of the change by a scatter of 1.
     unit: f64,
 }
@@ -47,20 +49,27 @@ pub(crate) struct UsualScatter {
 }
 
 impl ValueChanges {
-    /// Takes a value of each of the modes of each pair. `value` gets the first test and the mode of another.
+    /// Takes a value of each of the modes of each pair. `value` gets the first test and the mode of another. `moved_std` returns the
+    /// standard uncertainty that taking the mode to another level adds to the value.
     pub(crate) fn new(
         pairs: &[Pair],
         modes: &[Vec<usize>],
         usual: &UsualScatter,
         value: impl Fn(&Test, &MeasuredMode) -> Option<Reading>,
+        moved_std: impl Fn(&MeasuredMode) -> f64,
     ) -> Self {
         let (mut all, mut squares, mut freedom) = (Vec::new(), 0.0, 0.0);
         for (index, (pair, modes)) in pairs.iter().zip(modes).enumerate() {
             let first = &pair.before[0];
+            let known = all.len();
+            let (mut own_squares, mut own_freedom) = (0.0, 0.0);
             for &mode in modes {
-                let of_side = |tests: &[Test]| -> Option<Vec<Reading>> {
+                let mut moved = 0.0;
+                let mut of_side = |tests: &[Test]| -> Option<Vec<Reading>> {
                     let values = tests.iter().map(|test| {
-                        let found = value(first, test.mode(mode)?)?;
+                        let own = test.mode(mode)?;
+                        let found = value(first, own)?;
+                        moved += (moved_std(own) / tests.len() as f64).powi(2);
                         (found.value.is_finite() && found.std.is_finite()).then_some(found)
                     });
                     values.collect()
@@ -77,9 +86,9 @@ impl ValueChanges {
                     for one in side {
                         reading += (one.std / count).powi(2);
                         // The difference of two tests has twice the variance of one.
-                        squares += 2.0 * ((one.value - mean) / size).powi(2);
+                        own_squares += 2.0 * ((one.value - mean) / size).powi(2);
                     }
-                    freedom += count - 1.0;
+                    own_freedom += count - 1.0;
                     share += 0.5 / count;
                 }
                 all.push(ValueChange {
@@ -88,15 +97,16 @@ impl ValueChanges {
                     before: means[0],
                     after: means[1],
                     reading,
+                    moved,
                     unit: size * share.sqrt(),
                 });
             }
+            // Correlated modes tell less of their scatter: m of them as much as m/(1 + (m - 1) c^2).
+            let others = (all.len() - known).saturating_sub(1) as f64;
+            let repeated = 1.0 + others * SCATTER_CORRELATION * SCATTER_CORRELATION;
+            squares += own_squares / repeated;
+            freedom += own_freedom / repeated;
         }
-        // Correlated modes tell less of their scatter.
-        let others = modes.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64 - 1.0;
-        let repeated = 1.0 + others * SCATTER_CORRELATION * SCATTER_CORRELATION;
-        squares /= repeated;
-        freedom /= repeated;
         let both = USUAL_FREEDOM + freedom;
         let scatter = (USUAL_FREEDOM * usual.share * usual.share + squares) / both;
         Self {
@@ -120,10 +130,11 @@ impl ValueChanges {
                 };
                 return correlation * scatter;
             }
-            match self.has_repeats {
+            let at_own_level = match self.has_repeats {
                 true => scatter.max(one.reading),
                 false => scatter + one.reading,
-            }
+            };
+            at_own_level + one.moved
         })
     }
 }

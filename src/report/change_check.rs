@@ -7,7 +7,6 @@ use crate::{ReportError, ReportFile};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use tapjoint_compare::CauseKind;
-use tapjoint_study::blind_check::Rate;
 use tapjoint_study::change_check::{
     ChangeClass, PairAnswer, PairCase, PairConduct, PairKind, PairScores, PairTruth, pair_rows,
     pair_truths_json, score_pairs,
@@ -85,16 +84,19 @@ fn classes_json(cases: &[PairCase]) -> Value {
         let scores = score_pairs(&own);
         let visible = own.iter().filter(|(truth, _)| truth.visible == Some(true));
         let first = match kind {
-            PairKind::Several => scores.several_first_right,
-            _ => scores.first_right_visible,
+            PairKind::Several => "several_first_right",
+            _ => "first_right_visible",
         };
-        let count = |rate: Rate| json!({"hits": rate.hits, "of": rate.of});
+        let count = |key: &str| {
+            let rate = scores.rate(key);
+            rate.map(|rate| json!({"hits": rate.hits, "of": rate.of}))
+        };
         let row = json!({
             "pairs": own.len(),
             "visible": visible.count(),
             "first_right_visible": count(first),
-            "named_wrongly": count(scores.named_wrongly),
-            "list_holds": count(scores.list_holds),
+            "named_wrongly": count("named_wrongly"),
+            "list_holds": count("list_holds"),
             "no_answer": scores.failed,
         });
         rows.insert(kind.name().to_owned(), row);

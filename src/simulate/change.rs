@@ -1,9 +1,8 @@
 //! What changes between two virtual tests of one structure, and how far the set-up scatters from test to test.
 
 use super::laboratory::SimulateError;
-use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, StudentT};
 use tapjoint_beam::Assembly;
 use tapjoint_beam::effects::{Effect, EffectId, scale_joint};
 use tapjoint_beam::specimen::{PointMass, Specimen};
@@ -42,40 +41,40 @@ impl Change {
     pub const JOINT: &'static str = "joint-change";
     /// Name of a loss.
     pub const LOST_MASS: &'static str = "lost-mass";
+
+    /// Returns its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Joint { .. } => Self::JOINT,
+            Self::LostMass { .. } => Self::LOST_MASS,
+            Self::Effect(effect) => effect.id.name(),
+        }
+    }
 }
 
-/// Refuses changes that would change no natural frequency. The truth would not be true.
+/// Refuses changes of what the test does not have.
 pub(super) fn check_changes(
     test: &TestDescription,
-    effects: &[Effect],
     changes: &[Change],
 ) -> Result<(), SimulateError> {
-    for (index, change) in changes.iter().enumerate() {
+    for change in changes {
         match change {
-            Change::Joint { kt: 0.0, kr: 0.0 } => {
-                return Err(SimulateError::NoSize {
-                    change: Change::JOINT,
-                    parameters: "kt or kr".to_owned(),
-                });
+            Change::LostMass { item } => check_item(test, item)?,
+            Change::Effect(effect)
+                if effect.id == EffectId::AxialLoad && test.joint.kind != Assembly::Cantilever =>
+            {
+                return Err(SimulateError::NoLoad);
             }
-            Change::Joint { .. } => {}
-            Change::LostMass { item } => {
-                if changes[..index].contains(change) {
-                    return Err(SimulateError::LostTwice { item: item.clone() });
-                }
-                check_item(test, item)?;
-            }
-            Change::Effect(effect) => {
-                check_effect(test, effect)?;
-                check_move(test, effects, changes, effect)?;
-            }
+            Change::Joint { .. } | Change::Effect(_) => {}
         }
     }
     Ok(())
 }
 
 fn check_item(test: &TestDescription, item: &str) -> Result<(), SimulateError> {
-    let mut known = weighed_sensors(test);
+    let sensors = test.sensors.iter();
+    let weighed = sensors.filter(|sensor| sensor.mass.is_some_and(|mass| mass > 0.0));
+    let mut known: Vec<&str> = weighed.map(|sensor| sensor.name.as_str()).collect();
     for recording in &test.recordings {
         known.extend(recording.mass_names.iter().flatten().map(String::as_str));
     }
@@ -86,50 +85,11 @@ fn check_item(test: &TestDescription, item: &str) -> Result<(), SimulateError> {
     }
     Err(SimulateError::NoItem {
         item: item.to_owned(),
-        known: listed(&known),
+        known: match &known[..] {
+            [] => "nothing with a name and a mass".to_owned(),
+            names => names.join(", "),
+        },
     })
-}
-
-fn check_effect(test: &TestDescription, effect: &Effect) -> Result<(), SimulateError> {
-    let id = effect.id;
-    let sizes = id.size_parameters();
-    if !sizes.is_empty() && sizes.iter().all(|name| effect.value(name) == Some(0.0)) {
-        return Err(SimulateError::NoSize {
-            change: id.name(),
-            parameters: sizes.join(" or "),
-        });
-    }
-    match id == EffectId::AxialLoad && test.joint.kind != Assembly::Cantilever {
-        true => Err(SimulateError::NoLoad),
-        false => Ok(()),
-    }
-}
-
-/// Refuses to move a sensor whose mass is lost or not known.
-fn check_move(
-    test: &TestDescription,
-    effects: &[Effect],
-    changes: &[Change],
-    change: &Effect,
-) -> Result<(), SimulateError> {
-    if change.id != EffectId::SensorPosition {
-        return Ok(());
-    }
-    let Some(sensor) = moved_sensor(test, change) else {
-        return Ok(());
-    };
-    if is_lost(Some(sensor), changes) {
-        let sensor = sensor.to_owned();
-        return Err(SimulateError::LostAndMoved { sensor });
-    }
-    let weighed = weighed_sensors(test);
-    if !weighed.contains(&sensor) && effects.iter().all(|one| one.id != EffectId::SensorMass) {
-        return Err(SimulateError::WeighsNothing {
-            sensor: sensor.to_owned(),
-            known: listed(&weighed),
-        });
-    }
-    Ok(())
 }
 
 /// Returns the name of the sensor that an effect moves; `None` where the test has none of that number.
@@ -138,19 +98,6 @@ pub fn moved_sensor<'a>(test: &'a TestDescription, effect: &Effect) -> Option<&'
     let mut numbered = (1..).zip(&test.sensors);
     let (_, sensor) = numbered.find(|(own, _)| f64::from(*own) == number)?;
     Some(&sensor.name)
-}
-
-fn weighed_sensors(test: &TestDescription) -> Vec<&str> {
-    let sensors = test.sensors.iter();
-    let weighed = sensors.filter(|sensor| sensor.mass.is_some_and(|mass| mass > 0.0));
-    weighed.map(|sensor| sensor.name.as_str()).collect()
-}
-
-fn listed(names: &[&str]) -> String {
-    match names {
-        [] => "nothing with a name and a mass".to_owned(),
-        names => names.join(", "),
-    }
 }
 
 /// Returns the recording without the fastened masses that are lost.
@@ -208,25 +155,47 @@ pub(super) fn change_joint(
     Ok(())
 }
 
-/// Share of the scatter's variance that all modes of a test have in common: temperature and the like.
-const COMMON_SHARE: f64 = 0.25;
-/// Modes whose scatter is drawn, more than any test has.
-const MOST_MODES: usize = 100;
+/// Distribution of a mode's own scatter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScatterTails {
+    /// Normal.
+    Normal,
+    /// Student's with four degrees of freedom.
+    Long,
+}
 
-/// Returns the factor on the natural frequency of each mode in this test: normally distributed logarithms whose difference
-/// between two tests has the standard deviation `repeatability` (1).
-pub(super) fn set_up_factors(repeatability: f64, seed: u64) -> Vec<f64> {
-    if repeatability == 0.0 {
-        return Vec::new();
+/// Scatter of natural frequencies between set-ups of one state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetUpScatter {
+    /// Standard deviation of the difference of two tests of one state (1, relative).
+    pub repeatability: f64,
+    /// Share of the variance that all modes of a test have in common (1): temperature and the like.
+    pub share: f64,
+    /// Distribution of the rest.
+    pub tails: ScatterTails,
+}
+
+impl SetUpScatter {
+    /// Draws the factor on the natural frequency of each mode in one test: exp(r/sqrt(2) (sqrt(c) n + sqrt(1 - c) own)) with the
+    /// repeatability r and the share c.
+    pub fn factors(&self, modes: usize, draw: &mut ChaCha8Rng) -> Vec<f64> {
+        // The difference of two tests has the variance of both.
+        let std = self.repeatability / 2.0_f64.sqrt();
+        let normal = |draw: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(draw) };
+        let common = self.share.sqrt() * normal(draw);
+        let rest = (1.0 - self.share).sqrt();
+        let mut factors = Vec::with_capacity(modes);
+        for _ in 0..modes {
+            let own = match self.tails {
+                ScatterTails::Normal => rest * normal(draw),
+                ScatterTails::Long => {
+                    let tail: f64 = StudentT::new(4.0).map_or(0.0, |t| t.sample(draw));
+                    // Its variance is 2.
+                    rest * tail / 2.0_f64.sqrt()
+                }
+            };
+            factors.push((std * (common + own)).exp());
+        }
+        factors
     }
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    // A stream of its own, behind those of the visits.
-    random.set_stream(1 << 41);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let std = repeatability / 2.0_f64.sqrt();
-    let common = COMMON_SHARE.sqrt() * normal();
-    let own = (1.0 - COMMON_SHARE).sqrt();
-    (0..MOST_MODES)
-        .map(|_| (std * (common + own * normal())).exp())
-        .collect()
 }

@@ -249,41 +249,16 @@ pub enum SimulateError {
         /// Sensors and fastened masses with a name and a mass.
         known: String,
     },
-    /// A change of size 0.
+    /// A change without which the natural frequencies are the same.
     #[error(
-        "`{change}`: its size is 0, so that nothing changes; give {parameters} a value other than 0, or leave the change out"
+        "`{change}` (change {number}) changes no natural frequency; give it a larger size, or an item that weighs and that no \
+         other change takes away, or leave it out"
     )]
-    NoSize {
-        /// The change.
+    NoMove {
+        /// Name of the change.
         change: &'static str,
-        /// The parameters that measure its size.
-        parameters: String,
-    },
-    /// An item that is lost twice.
-    #[error("`lost-mass`: \"{item}\" is lost twice; give it once")]
-    LostTwice {
-        /// Name of the item.
-        item: String,
-    },
-    /// A sensor that is lost and moved.
-    #[error(
-        "`sensor-position`: the mass of sensor \"{sensor}\" is lost by another change, so that its place changes nothing; \
-         leave one of the two changes out"
-    )]
-    LostAndMoved {
-        /// Name of the sensor.
-        sensor: String,
-    },
-    /// A moved sensor without a mass.
-    #[error(
-        "`sensor-position`: sensor \"{sensor}\" has no mass, so that its place changes no natural frequency; move a \
-         sensor that weighs (the description names: {known}), or add its `mass`"
-    )]
-    WeighsNothing {
-        /// Name of the sensor.
-        sensor: String,
-        /// Sensors with a mass.
-        known: String,
+        /// Its number among the changes, from 1.
+        number: usize,
     },
     /// An axial load that changes on a beam that nothing holds.
     #[error(

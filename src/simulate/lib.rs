@@ -21,7 +21,7 @@ mod recording_run;
 mod truth;
 
 pub use chain::Signal;
-pub use change::{Change, moved_sensor};
+pub use change::{Change, ScatterTails, SetUpScatter, moved_sensor};
 pub use hammer::{HammerSettings, Pulse, PulseShape, Tap, TapKind, TapPlan, Tip};
 pub use joint_moment::{JointMoment, Slider};
 pub use laboratory::{

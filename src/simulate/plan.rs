@@ -3,7 +3,8 @@
 
 use super::chain::Signal;
 use super::change::{
-    Change, change_joint, check_changes, set_up_factors, without_lost_masses, without_lost_sensors,
+    Change, ScatterTails, SetUpScatter, change_joint, check_changes, without_lost_masses,
+    without_lost_sensors,
 };
 use super::hammer::{TapPlan, Tip};
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
@@ -82,27 +83,12 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    check_changes(test, plan.effects, plan.changes)?;
-    let mut effects = plan.effects.to_vec();
-    for change in plan.changes {
-        if let Change::Effect(effect) = change {
-            effects.push(effect.clone());
-        }
-    }
-    let plan = &TestPlan {
-        effects: &effects,
-        ..plan.clone()
-    };
-    check_effects(plan)?;
-    let set_ups = described_set_ups(test)?;
-    check_set_up(plan.effects, &set_ups)?;
-    let set_ups = actual_set_ups(plan.effects, &set_ups);
-    let (mut recordings, mut trials) = (Vec::new(), Vec::new());
-    for (visit, file) in described.iter().enumerate() {
-        let one = prepare(plan, file, &set_ups[file.number], visit)?;
-        trials.push(try_out(&one.structure, &one.plan, plan.laboratory));
-        recordings.push(one);
-    }
+    check_changes(test, plan.changes)?;
+    let mut recordings = prepare_all(plan, &described)?;
+    check_moves(plan, &described, &recordings)?;
+    let trials = recordings.iter();
+    let trials = trials.map(|one| try_out(&one.structure, &one.plan, plan.laboratory));
+    let trials: Vec<Trial> = trials.collect();
     let scales = scales(test, &recordings, &trials);
     let joint_law = hardest(&recordings, &trials);
     for recording in &mut recordings {
@@ -271,6 +257,69 @@ fn described_set_ups(test: &TestDescription) -> Result<Vec<DescribedSetUp>, Simu
     set_ups.collect()
 }
 
+/// Prepares all recordings. Changes that are effects join the others.
+fn prepare_all(
+    plan: &TestPlan<'_>,
+    described: &[WantedFile<'_>],
+) -> Result<Vec<VirtualRecording>, SimulateError> {
+    let mut effects = plan.effects.to_vec();
+    for change in plan.changes {
+        if let Change::Effect(effect) = change {
+            effects.push(effect.clone());
+        }
+    }
+    let plan = &TestPlan {
+        effects: &effects,
+        ..plan.clone()
+    };
+    check_effects(plan)?;
+    let set_ups = described_set_ups(plan.description)?;
+    check_set_up(plan.effects, &set_ups)?;
+    let set_ups = actual_set_ups(plan.effects, &set_ups);
+    let mut recordings = Vec::new();
+    for (visit, file) in described.iter().enumerate() {
+        recordings.push(prepare(plan, file, &set_ups[file.number], visit)?);
+    }
+    Ok(recordings)
+}
+
+/// Least relative change of a natural frequency that a change makes (1). No test sees less.
+const LEAST_MOVE: f64 = 1e-6;
+
+/// Refuses a change without which all natural frequencies are the same: the truth would not be true.
+fn check_moves(
+    plan: &TestPlan<'_>,
+    described: &[WantedFile<'_>],
+    recordings: &[VirtualRecording],
+) -> Result<(), SimulateError> {
+    for (index, change) in plan.changes.iter().enumerate() {
+        let mut others = plan.changes.to_vec();
+        others.remove(index);
+        let without = TestPlan {
+            changes: &others,
+            ..plan.clone()
+        };
+        let without = prepare_all(&without, described)?;
+        let moves = recordings.iter().zip(&without).any(|(with, without)| {
+            let modes = with.structure.elastic_modes();
+            let mut both = modes.zip(without.structure.elastic_modes());
+            both.any(|((with, _), (without, _))| (with / without - 1.0).abs() > LEAST_MOVE)
+        });
+        if !moves {
+            return Err(SimulateError::NoMove {
+                change: change.name(),
+                number: index + 1,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Share of the set-up scatter's variance that all modes of a test have in common.
+const COMMON_SHARE: f64 = 0.25;
+/// Modes whose scatter is drawn, more than any test has.
+const SCATTERED: usize = 100;
+
 fn prepare(
     plan: &TestPlan<'_>,
     wanted: &WantedFile<'_>,
@@ -335,7 +384,17 @@ fn prepare(
         seen.joint_loss_factor,
         recording.highest_mode(laboratory),
     )?;
-    structure.scale_frequencies(&set_up_factors(plan.repeatability, plan.seed));
+    if plan.repeatability > 0.0 {
+        let scatter = SetUpScatter {
+            repeatability: plan.repeatability,
+            share: COMMON_SHARE,
+            tails: ScatterTails::Normal,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+        // A stream of its own, behind those of the visits.
+        random.set_stream(1 << 41);
+        structure.scale_frequencies(&scatter.factors(SCATTERED, &mut random));
+    }
     let block = match described.block.filter(|_| described.band.is_none()) {
         Some(block) => block as f64 / f64::from(sample_rate),
         None => wanted.block_seconds,

@@ -149,75 +149,42 @@ fn limit_changes_that_change_nothing_are_refused() {
     };
     let sized = |id, name, size| Change::Effect(effect(id, &[(name, size)]));
     let placed = |id, name| Change::Effect(effect(id, &[(name, 0.0), ("position", 0.1)]));
+    let nothing = Change::Joint { kt: 0.0, kr: 0.0 };
     let cases = [
+        (&weighed, vec![nothing], 1),
+        (&weighed, vec![sized(EffectId::Modulus, "relative", 0.0)], 1),
         (
             &weighed,
-            vec![Change::Joint { kt: 0.0, kr: 0.0 }],
-            "give kt or kr a value other than 0",
+            vec![sized(EffectId::Modulus, "relative", 1e-7)],
+            1,
         ),
-        (
-            &weighed,
-            vec![sized(EffectId::Modulus, "relative", 0.0)],
-            "give relative a value",
-        ),
-        (
-            &weighed,
-            vec![sized(EffectId::Length, "relative", 0.0)],
-            "give relative a value",
-        ),
-        (
-            &weighed,
-            vec![sized(EffectId::AxialLoad, "force", 0.0)],
-            "give force a value",
-        ),
-        (
-            &weighed,
-            vec![placed(EffectId::AddedMass, "mass")],
-            "give mass a value",
-        ),
+        (&weighed, vec![sized(EffectId::Length, "relative", 0.0)], 1),
+        (&weighed, vec![sized(EffectId::AxialLoad, "force", 0.0)], 1),
+        (&weighed, vec![placed(EffectId::AddedMass, "mass")], 1),
         (
             &weighed,
             vec![placed(EffectId::LocalCrack, "compliance")],
-            "give compliance a value",
+            1,
         ),
-        (&weighed, vec![moved(0.0, 2.0)], "give offset a value"),
-        (
-            &weighed,
-            vec![moved(0.05, 1.0)],
-            "sensor that weighs (the description names: W)",
-        ),
-        (
-            &light,
-            vec![moved(0.05, 1.0)],
-            "nothing with a name and a mass",
-        ),
-        (
-            &weighed,
-            vec![lost("L1"), lost("W"), lost("L1")],
-            "\"L1\" is lost twice",
-        ),
-        (
-            &weighed,
-            vec![lost("W"), moved(0.05, 2.0)],
-            "\"W\" is lost by another change",
-        ),
-        (
-            &weighed,
-            vec![moved(0.05, 2.0), lost("W")],
-            "\"W\" is lost by another change",
-        ),
-        (
-            &free,
-            vec![sized(EffectId::AxialLoad, "force", 9.0)],
-            "on a cantilever",
-        ),
+        (&weighed, vec![moved(0.0, 2.0)], 1),
+        // A sensor without a mass.
+        (&weighed, vec![lost("L1"), moved(0.05, 1.0)], 2),
+        (&light, vec![moved(0.05, 1.0)], 1),
+        // The mass is gone by another change.
+        (&weighed, vec![lost("W"), lost("L1"), lost("L1")], 2),
+        (&weighed, vec![lost("W"), moved(0.05, 2.0)], 2),
+        (&weighed, vec![moved(0.05, 2.0), lost("W")], 1),
     ];
-    for (text, changes, words) in cases {
-        let error = planned(text, &changes, &[], 0.0, 1)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains(words), "{changes:?}: {error}");
+    for (text, changes, expected) in cases {
+        let error = planned(text, &changes, &[], 0.0, 1).unwrap_err();
+        let SimulateError::NoMove { change, number } = error else {
+            panic!("{changes:?}: {error}");
+        };
+        assert_eq!((change, number), (changes[expected - 1].name(), expected));
     }
+    let load = sized(EffectId::AxialLoad, "force", 9.0);
+    let error = planned(&free, &[load], &[], 0.0, 1).unwrap_err();
+    assert!(error.to_string().contains("on a cantilever"), "{error}");
     planned(&weighed, &[moved(0.05, 2.0), lost("L1")], &[], 0.0, 1).unwrap();
     // A mass that the description leaves out moves, too.
     let mass = effect(EffectId::SensorMass, &[("mass", 0.01)]);
@@ -505,7 +472,21 @@ fn val_the_score_counts_what_it_says() {
     ];
     let scores = score_pairs(&cases);
     assert_eq!((scores.failed, scores.counts), (1, [0, 2, 0, 0]));
-    assert_eq!((scores.first_right.hits, scores.first_right.of), (1, 1));
+    let first_right = scores.rate("first_right").unwrap();
+    assert_eq!((first_right.hits, first_right.of), (1, 1));
+    // Every key that is asked for elsewhere.
+    for key in [
+        "first_right_visible",
+        "several_first_right",
+        "named_wrongly",
+        "list_holds",
+        "kt_interval",
+        "kr_interval",
+        "mass_interval",
+        "place_interval",
+    ] {
+        assert!(scores.rate(key).is_some(), "{key}");
+    }
     // Dealt out, each answer goes to a pair that it is wrong for; one pair has no other.
     let right = |cause: &str, kind| {
         let found = answer(VerdictKind::NoChange, &[], &[(kind, "kt", [-0.2, 0.0])]);
@@ -638,6 +619,40 @@ fn regress_pairs_that_cannot_be_compared_have_no_answer() {
     let error = command.assert().code(2).get_output().stderr.clone();
     let error = String::from_utf8(error).unwrap();
     assert!(error.contains("b/before/test.toml"), "{error}");
+}
+
+#[test]
+fn regress_an_item_that_weighs_nothing_is_no_right_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let weighed = STRIP.replacen("[[recording]]", &format!("{WEIGHED}[[recording]]"), 1);
+    // A mass that is not on the beam in the first recording.
+    let later = "[[recording]]\nfile = \"later.wav\"\ntap = 0.3\n";
+    let text = format!("{weighed}{later}{MASS}");
+    for side in ["before", "after"] {
+        let own = place.join("pairs/a").join(side);
+        fs::create_dir_all(&own).unwrap();
+        fs::write(own.join("test.toml"), &text).unwrap();
+    }
+    let lost = |item: &str| format!(r#"{{"cause": "lost-mass", "item": "{item}"}}"#);
+    let changes = ["W", "A", "L1"].map(lost).join(", ");
+    let truth = format!(r#"[{{"name": "a", "changes": [{changes}], "visible": true}}]"#);
+    fs::write(place.join("truth.json"), truth).unwrap();
+    let mut command = Command::cargo_bin("tapjoint").unwrap();
+    let check = [
+        "blind-check",
+        "--compare",
+        "--folder",
+        "pairs",
+        "--truth",
+        "truth.json",
+    ];
+    let output = command.current_dir(place).args(check).output().unwrap();
+    let warnings = String::from_utf8(output.stderr).unwrap();
+    for (item, is_warned) in [("W", false), ("A", true), ("L1", true)] {
+        let words = format!("describes no \"{item}\" that weighs");
+        assert_eq!(warnings.contains(&words), is_warned, "{item}: {warnings}");
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Tests of the level of the taps.
 
 use crate::fixture::{self, cantilever, frequencies, pair, springs};
-use crate::test::{Level, Reading, Settings, Test};
+use crate::test::{Level, LevelPoint, Reading, Settings, Test};
 use crate::{Comparison, VerdictKind, compare, watch};
 
 const MODES: usize = 5;
@@ -15,13 +15,17 @@ fn test(slopes: [f64; MODES], amplitude: f64) -> Test {
     }
     let mut test = fixture::test(&structure, &[], &frequencies);
     for (mode, slope) in test.modes.iter_mut().zip(slopes) {
+        let point = |factor: f64| LevelPoint {
+            amplitude: factor * amplitude,
+            frequency: read(slope * factor.log10()),
+            damping: read(0.001 * factor.log10()),
+        };
         mode.damping = Some(read(0.003 + 0.001 * amplitude.log10()));
         mode.level = Some(Level {
             amplitude,
-            range: [0.1 * amplitude, amplitude],
+            curve: vec![point(0.1), point(1.0)],
             of: "A".to_owned(),
             frequency_slope: read(slope),
-            damping_slope: read(0.001),
         });
     }
     test
@@ -89,6 +93,76 @@ fn prop_a_joint_that_begins_to_slip_is_told_by_the_slopes() {
     assert_eq!(level.modes.len(), MODES);
     let first = &level.modes[0];
     assert_eq!([first.before_percent, first.after_percent], [0.0, -1.0]);
+}
+
+#[test]
+fn limit_a_mode_is_taken_to_amplitudes_of_its_curve_alone() {
+    let point = |amplitude: f64, value: f64| LevelPoint {
+        amplitude,
+        frequency: read(value),
+        damping: read(-value),
+    };
+    let mut level = Level {
+        amplitude: 4.0,
+        curve: vec![point(1.0, 0.003), point(2.0, 0.002), point(4.0, 0.0)],
+        of: "A".to_owned(),
+        frequency_slope: read(0.0),
+    };
+    for (amplitude, expected) in [
+        (1.0, 0.003),
+        (2.0, 0.002),
+        (8.0_f64.sqrt(), 0.001),
+        (4.0, 0.0),
+    ] {
+        let found = level.at(amplitude).unwrap();
+        assert!(
+            (found.frequency.value - expected).abs() < 1e-15,
+            "{found:?}"
+        );
+        assert!((found.damping.value + expected).abs() < 1e-15, "{found:?}");
+    }
+    assert!(
+        [0.9, 4.1, f64::NAN]
+            .iter()
+            .all(|one| level.at(*one).is_none())
+    );
+    level.curve = vec![point(4.0, 0.0); 2];
+    assert!(level.at(4.0).is_none());
+}
+
+#[test]
+fn prop_uncertain_slopes_add_to_the_scatter() {
+    // Taking a frequency from 5 to 1 is as uncertain as the repeatability.
+    let uncertain = |amplitude| {
+        let mut test = test(SLOPES, amplitude);
+        for mode in &mut test.modes {
+            let level = mode.level.as_mut().unwrap();
+            for point in &mut level.curve {
+                let tens = (point.amplitude / amplitude).log10().abs();
+                point.frequency.std = 5e-4 / 5.0_f64.log10() * tens;
+                point.damping.std = 0.01 * tens;
+            }
+        }
+        test
+    };
+    let sure = compared(test(SLOPES, 1.0), test(SLOPES, 5.0));
+    let unsure = compared(uncertain(1.0), uncertain(5.0));
+    for (sure, unsure) in sure.modes.iter().zip(&unsure.modes) {
+        let added = (unsure.std_percent.powi(2) - sure.std_percent.powi(2)).sqrt();
+        assert!((added - 0.05).abs() < 1e-4, "{sure:?} {unsure:?}");
+    }
+    let [sure, unsure] = [sure, unsure].map(|found| found.damping.unwrap());
+    for (sure, unsure) in sure.modes.iter().zip(&unsure.modes) {
+        assert!(unsure.std > sure.std.hypot(0.006), "{sure:?} {unsure:?}");
+    }
+    let tests = [1.0, 5.0, 5.0, 5.0, 5.0, 5.0].map(uncertain);
+    let settings = Settings {
+        repeatability: Some(5e-4),
+    };
+    let watched = watch(&tests, &settings).unwrap();
+    // The variance of one test is half of that of a difference, and that of the other level.
+    let scatter = watched.series.charts[0].scatter_percent.unwrap();
+    assert!((scatter / 0.05 - 1.5_f64.sqrt()).abs() < 0.01, "{scatter}");
 }
 
 #[test]

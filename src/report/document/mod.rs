@@ -38,7 +38,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
-use tapjoint_compare::{Comparison, MOST_REPEATS, Series, WatchedSeries};
+use tapjoint_compare::{Comparison, Series, WatchedSeries};
 use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::QualityVerdict;
@@ -320,12 +320,10 @@ pub fn series_of(
     let warnings = warnings.iter();
     let departure = found.series.departure().map(|(_, departure)| departure);
     let compare = found.change.zip(departure).map(|(found, departure)| {
-        let until = tests.iter().take(departure.test + 1).cloned();
-        let first = departure.since.saturating_sub(MOST_REPEATS);
-        let pair = PairFiles {
-            before: until.clone().take(departure.since).skip(first).collect(),
-            after: until.skip(departure.since).collect(),
-        };
+        let [before, after] = departure
+            .compared()
+            .map(|side| tests.get(side).unwrap_or_default().to_vec());
+        let pair = PairFiles { before, after };
         ComparisonSection {
             tests: vec![pair],
             found,

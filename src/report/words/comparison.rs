@@ -125,10 +125,10 @@ fn damping(own: &DampingResult, found: &Comparison) -> String {
         (DampingVerdict::JointDamping, _) => {
             format!("The damping changed as the joint changes it.{most}")
         }
-        (DampingVerdict::Other, _) if own.joint_goodness.is_some_and(|p| p < 0.01) => {
+        (DampingVerdict::Other, _) => {
             format!("The damping changed, but not as the joint changes it.{most}")
         }
-        (DampingVerdict::Other, _) => format!("The damping changed.{most}"),
+        (DampingVerdict::Undecided, _) => format!("The damping changed.{most}"),
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::document::SeriesSection;
 use crate::format::{capital, signed_percent};
 use crate::words::comparison::matched;
-use tapjoint_compare::{ChartedQuantity, MOST_REPEATS};
+use tapjoint_compare::ChartedQuantity;
 use tapjoint_numerics::stats::times;
 
 /// Returns what a chart shows, in words.
@@ -19,17 +19,12 @@ pub fn quantity(charted: ChartedQuantity) -> String {
 /// Returns which tests are compared with which; `None` where all tests agree.
 pub fn compared(section: &SeriesSection) -> Option<String> {
     let (_, departure) = section.series.departure()?;
-    let since = departure.since;
     // The numbers count from 1.
-    let tests = |first: usize, last: usize| match first == last {
-        true => format!("test {first}"),
-        false => format!("tests {first} to {last}"),
-    };
-    Some(format!(
-        "Before: {}. After: {}.",
-        tests(since.saturating_sub(MOST_REPEATS) + 1, since),
-        tests(since + 1, departure.test + 1)
-    ))
+    let [before, after] = departure.compared().map(|tests| match tests.len() {
+        1 => format!("test {}", tests.end),
+        _ => format!("tests {} to {}", tests.start + 1, tests.end),
+    });
+    Some(format!("Before: {before}. After: {after}."))
 }
 
 /// Returns the answer in a few sentences, the shortest first.

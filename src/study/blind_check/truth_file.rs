@@ -50,12 +50,16 @@ pub enum TruthError {
         source: serde_json::Error,
     },
     /// A repeatability that no comparison accepts.
-    #[error("the repeatability of \"{name}\" is {value}, but must lie between 1e-6 and 0.1")]
+    #[error("the repeatability of \"{name}\" is {value}, but must lie between {least} and {most}")]
     Repeatability {
         /// The pair.
         name: String,
         /// The value given (1).
         value: f64,
+        /// Least value (1).
+        least: f64,
+        /// Largest value (1).
+        most: f64,
     },
     /// Two entries of one name.
     #[error("the test \"{name}\" occurs twice; give each test one entry")]

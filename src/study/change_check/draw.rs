@@ -7,7 +7,7 @@ use super::truth::{OUTSIDE, PlantedChange};
 use crate::blind_check::{log_uniform, normal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, LogNormal, StudentT};
+use rand_distr::{Distribution, LogNormal};
 use tapjoint_beam::effects::{Circumstances, Effect, EffectId, apply};
 use tapjoint_beam::specimen::{
     BeamSection, Body, Joint, LapLayout, LapOverlap, Mesh, PointMass, PointSpring, Specimen,
@@ -167,33 +167,9 @@ pub fn chi_square([before, after]: &[Vec<f64>; 2], repeatability: f64) -> f64 {
         .sum()
 }
 
-/// Scatter of frequencies between set-ups, with long tails (Student's with four degrees of freedom).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SetUpScatter {
-    /// Standard deviation of the difference of two tests of one state (1, relative).
-    pub repeatability: f64,
-    /// Share of the variance that all modes of a test have in common (1).
-    pub share: f64,
-}
-
-impl SetUpScatter {
-    /// Draws a repeatability (1).
-    pub fn draw_repeatability(draw: &mut ChaCha8Rng) -> f64 {
-        log_uniform(REPEATABILITY[0], REPEATABILITY[1], draw)
-    }
-
-    /// Draws the factor on each frequency in one test.
-    pub fn factors(&self, modes: usize, draw: &mut ChaCha8Rng) -> Vec<f64> {
-        let common = self.share.sqrt() * normal(draw);
-        let mut factors = Vec::with_capacity(modes);
-        for _ in 0..modes {
-            let tail: f64 = StudentT::new(4.0).map_or(0.0, |t| t.sample(draw));
-            // Student's with four degrees of freedom has the variance 2.
-            let own = (1.0 - self.share).sqrt() * tail / 2.0_f64.sqrt();
-            factors.push((self.repeatability / 2.0_f64.sqrt() * (common + own)).exp());
-        }
-        factors
-    }
+/// Draws a repeatability: standard deviation of the difference of two tests of one state (1, relative).
+pub fn draw_repeatability(draw: &mut ChaCha8Rng) -> f64 {
+    log_uniform(REPEATABILITY[0], REPEATABILITY[1], draw)
 }
 
 /// Draws a described structure and its items.

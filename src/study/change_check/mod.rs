@@ -14,7 +14,7 @@ mod record;
 mod score;
 mod truth;
 
-pub use draw::{ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square, structure};
+pub use draw::{ChangeClass, ChangedStructure, VISIBLE, chi_square, draw_repeatability, structure};
 pub use record::{DrawnPair, PairCampaign};
 pub use score::{
     AnsweredPair, PairAnswer, PairCase, PairConduct, PairScores, pair_rows, score_pairs,

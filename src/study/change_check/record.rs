@@ -1,6 +1,6 @@
 //! Pairs of virtual tests with a withheld change: drawn, described, and recorded.
 
-use super::draw::{ChangeClass, ChangedStructure, SetUpScatter, VISIBLE, chi_square};
+use super::draw::{ChangeClass, ChangedStructure, VISIBLE, chi_square, draw_repeatability};
 use super::truth::PairTruth;
 use crate::blind_check::{DrawError, RecordedTest, log_uniform, record_channels};
 use rand::seq::SliceRandom;
@@ -10,7 +10,9 @@ use std::fmt::Write;
 use tapjoint_beam::specimen::{Body, Specimen};
 use tapjoint_compare::ItemKind;
 use tapjoint_description::TestDescription;
-use tapjoint_simulate::{Damping, Laboratory, TestPlan, nominal_description, plan_test};
+use tapjoint_simulate::{
+    Damping, Laboratory, ScatterTails, SetUpScatter, TestPlan, nominal_description, plan_test,
+};
 
 /// A check to be drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,8 +90,9 @@ impl PairCampaign {
     ) -> Result<DrawnPair, DrawError> {
         let name = format!("pair-{index:04}");
         let scatter = SetUpScatter {
-            repeatability: SetUpScatter::draw_repeatability(random),
+            repeatability: draw_repeatability(random),
             share: 0.5 * random.random::<f64>(),
+            tails: ScatterTails::Long,
         };
         let is_stated = random.random::<bool>();
         let chi_square = chi_square(&modes.frequencies, scatter.repeatability);

@@ -42,7 +42,9 @@ impl PairConduct {
             .map(|(to, from)| (cases[*to].0.clone(), cases[*from].1.clone()))
             .collect();
         Self {
-            shuffled: score_pairs(&dealt).first_right.value(),
+            shuffled: score_pairs(&dealt)
+                .rate("first_right")
+                .and_then(|rate| rate.value()),
             ..self
         }
     }
@@ -70,39 +72,150 @@ pub struct PairScores {
     pub counts: [usize; 4],
     /// Pairs without an answer: one of the tests could not be analysed, or both have too few modes in common.
     pub failed: usize,
-    /// One change: its cause is the most probable one, `no-change` left out.
-    pub first_right: Rate,
-    /// `first_right` of the visible changes.
-    pub first_right_visible: Rate,
-    /// One visible change about an item, whose cause comes first: the item is right.
-    pub item_right: Rate,
-    /// One visible change: a cause or a group of causes is named.
-    pub named: Rate,
-    /// One change, named: the name is right.
-    pub named_right: Rate,
-    /// All pairs: a wrong name, which any name is where nothing changed or something outside of the causes.
-    pub named_wrongly: Rate,
-    /// Visible changes: the name, the group or the list has a right cause. For one outside of the causes it is `unknown`.
-    pub list_holds: Rate,
-    /// `list_holds`, where `unknown` is right for all.
-    pub list_holds_or_unknown: Rate,
-    /// Nothing: named, unknown, or a list without `no-change`.
-    pub nothing_called_change: Rate,
-    /// Outside of the causes: named.
-    pub outside_named: Rate,
-    /// Outside of the causes, visible: called unknown.
-    pub outside_unknown: Rate,
-    /// Several changes, visible: the first cause is one of them.
-    pub several_first_right: Rate,
-    /// The joint changed: the interval of Kt holds its change.
-    pub kt_interval: Rate,
-    /// The joint changed: the interval of Kr holds its change.
-    pub kr_interval: Rate,
-    /// A mass was added, and is visible: the interval of the mass holds it.
-    pub mass_interval: Rate,
-    /// A mass was added, and is visible: the interval of its place holds it.
-    pub place_interval: Rate,
+    /// A rate for each of [`FIGURES`].
+    rates: [Rate; FIGURES.len()],
 }
+
+impl PairScores {
+    /// Returns the rate of this key, such as "first_right"; `None` where there is no such rate.
+    pub fn rate(&self, key: &str) -> Option<Rate> {
+        let mut both = FIGURES.iter().zip(&self.rates);
+        let (_, rate) = both.find(|(figure, _)| figure.key == key)?;
+        Some(*rate)
+    }
+}
+
+/// A rate of a check: which pairs count, and which of them are hits.
+struct PairFigure {
+    /// Name for programs.
+    key: &'static str,
+    /// Its meaning.
+    meaning: &'static str,
+    /// Kinds of pairs that count, by their index in [`PairScores::counts`].
+    kinds: &'static [usize],
+    /// True for a hit; `None` where a pair does not count.
+    is_hit: fn(AnsweredPair<'_>) -> Option<bool>,
+}
+
+/// Indices of the kinds of pairs.
+const NOTHING: usize = 0;
+const SINGLE: usize = 1;
+const SEVERAL: usize = 2;
+const OUTSIDE: usize = 3;
+const ALL: &[usize] = &[NOTHING, SINGLE, SEVERAL, OUTSIDE];
+
+/// All rates in the order of reading. A first cause is the most probable one, `no-change` left out. Any name is wrong where nothing
+/// changed, or something outside of the causes did.
+const FIGURES: [PairFigure; 16] = [
+    PairFigure {
+        key: "first_right",
+        meaning: "one change: first cause is right",
+        kinds: &[SINGLE],
+        is_hit: |one| Some(one.first_is_right()),
+    },
+    PairFigure {
+        key: "first_right_visible",
+        meaning: "the same where it is visible",
+        kinds: &[SINGLE],
+        is_hit: |one| one.is_visible().then(|| one.first_is_right()),
+    },
+    PairFigure {
+        key: "item_right",
+        meaning: "lost or moved: item is right",
+        kinds: &[SINGLE],
+        is_hit: |one| one.item_is_right().filter(|_| one.is_visible()),
+    },
+    PairFigure {
+        key: "named",
+        meaning: "one visible change: named",
+        kinds: &[SINGLE],
+        is_hit: |one| one.is_visible().then(|| one.is_named()),
+    },
+    PairFigure {
+        key: "named_right",
+        meaning: "one change, named: name is right",
+        kinds: &[SINGLE],
+        is_hit: |one| one.is_named().then(|| one.name_is_right()),
+    },
+    PairFigure {
+        key: "named_wrongly",
+        meaning: "any pair: a wrong name",
+        kinds: ALL,
+        is_hit: |one| Some(one.is_named() && !one.name_is_right()),
+    },
+    PairFigure {
+        key: "list_holds",
+        meaning: "visible: the answer holds it",
+        kinds: ALL,
+        is_hit: |one| one.is_visible().then(|| one.list_holds()),
+    },
+    PairFigure {
+        key: "list_holds_or_unknown",
+        meaning: "the same, or says unknown",
+        kinds: ALL,
+        is_hit: |one| {
+            one.is_visible()
+                .then(|| one.list_holds() || one.says_unknown())
+        },
+    },
+    PairFigure {
+        key: "nothing_called_change",
+        meaning: "nothing: called a change",
+        kinds: &[NOTHING],
+        is_hit: |one| Some(one.is_called_change()),
+    },
+    PairFigure {
+        key: "outside_named",
+        meaning: "outside: named",
+        kinds: &[OUTSIDE],
+        is_hit: |one| Some(one.is_named()),
+    },
+    PairFigure {
+        key: "outside_unknown",
+        meaning: "outside, visible: unknown",
+        kinds: &[OUTSIDE],
+        is_hit: |one| {
+            one.is_visible()
+                .then(|| one.verdict().kind == VerdictKind::Unknown)
+        },
+    },
+    PairFigure {
+        key: "several_first_right",
+        meaning: "two, visible: first is one of them",
+        kinds: &[SEVERAL],
+        is_hit: |one| one.is_visible().then(|| one.first_is_right()),
+    },
+    PairFigure {
+        key: "kt_interval",
+        meaning: "95 % interval of Kt holds",
+        kinds: &[SINGLE],
+        is_hit: |one| one.holds(CauseKind::JointChange, "kt"),
+    },
+    PairFigure {
+        key: "kr_interval",
+        meaning: "95 % interval of Kr holds",
+        kinds: &[SINGLE],
+        is_hit: |one| one.holds(CauseKind::JointChange, "kr"),
+    },
+    PairFigure {
+        key: "mass_interval",
+        meaning: "visible: interval of mass holds",
+        kinds: &[SINGLE],
+        is_hit: |one| {
+            one.holds(CauseKind::AddedMass, "mass")
+                .filter(|_| one.is_visible())
+        },
+    },
+    PairFigure {
+        key: "place_interval",
+        meaning: "visible: interval of place holds",
+        kinds: &[SINGLE],
+        is_hit: |one| {
+            one.holds(CauseKind::AddedMass, "position")
+                .filter(|_| one.is_visible())
+        },
+    },
+];
 
 /// A pair with an answer.
 #[derive(Debug, Clone, Copy)]
@@ -206,134 +319,50 @@ impl AnsweredPair<'_> {
 /// Scores all pairs. Those without an answer count in `failed` alone.
 pub fn score_pairs(cases: &[PairCase]) -> PairScores {
     let mut counts = [0; 4];
-    let (mut all, mut nothing, mut single, mut several, mut outside) =
-        (vec![], vec![], vec![], vec![], vec![]);
+    let mut answered = Vec::new();
     for (truth, answer) in cases {
-        let (index, kind) = match truth.kind() {
-            PairKind::Nothing => (0, &mut nothing),
-            PairKind::Single(_) => (1, &mut single),
-            PairKind::Several => (2, &mut several),
-            PairKind::Outside => (3, &mut outside),
+        let kind = match truth.kind() {
+            PairKind::Nothing => NOTHING,
+            PairKind::Single(_) => SINGLE,
+            PairKind::Several => SEVERAL,
+            PairKind::Outside => OUTSIDE,
         };
-        counts[index] += 1;
+        counts[kind] += 1;
         if let Some(found) = answer.found() {
-            kind.push(AnsweredPair { truth, found });
-            all.push(AnsweredPair { truth, found });
+            answered.push((kind, AnsweredPair { truth, found }));
         }
     }
-    let joint = CauseKind::JointChange;
-    let added = CauseKind::AddedMass;
     PairScores {
         counts,
-        failed: cases.len() - all.len(),
-        first_right: Rate::of(&single, |one| Some(one.first_is_right())),
-        first_right_visible: Rate::of(&single, |one| {
-            one.is_visible().then(|| one.first_is_right())
-        }),
-        item_right: Rate::of(&single, |one| {
-            one.item_is_right().filter(|_| one.is_visible())
-        }),
-        named: Rate::of(&single, |one| one.is_visible().then(|| one.is_named())),
-        named_right: Rate::of(&single, |one| one.is_named().then(|| one.name_is_right())),
-        named_wrongly: Rate::of(&all, |one| Some(one.is_named() && !one.name_is_right())),
-        list_holds: Rate::of(&all, |one| one.is_visible().then(|| one.list_holds())),
-        list_holds_or_unknown: Rate::of(&all, |one| {
-            one.is_visible()
-                .then(|| one.list_holds() || one.says_unknown())
-        }),
-        nothing_called_change: Rate::of(&nothing, |one| Some(one.is_called_change())),
-        outside_named: Rate::of(&outside, |one| Some(one.is_named())),
-        outside_unknown: Rate::of(&outside, |one| {
-            one.is_visible()
-                .then(|| one.verdict().kind == VerdictKind::Unknown)
-        }),
-        several_first_right: Rate::of(&several, |one| {
-            one.is_visible().then(|| one.first_is_right())
-        }),
-        kt_interval: Rate::of(&single, |one| one.holds(joint, "kt")),
-        kr_interval: Rate::of(&single, |one| one.holds(joint, "kr")),
-        mass_interval: Rate::of(&single, |one| {
-            one.holds(added, "mass").filter(|_| one.is_visible())
-        }),
-        place_interval: Rate::of(&single, |one| {
-            one.holds(added, "position").filter(|_| one.is_visible())
+        failed: cases.len() - answered.len(),
+        rates: FIGURES.map(|figure| {
+            let own = answered
+                .iter()
+                .filter(|(kind, _)| figure.kinds.contains(kind));
+            Rate::of(own, |(_, pair)| (figure.is_hit)(*pair))
         }),
     }
 }
 
 /// Returns all figures in the order of reading.
 pub fn pair_rows(scores: &PairScores) -> Vec<Row> {
-    let s = scores;
-    let rates = [
-        (
-            "first_right",
-            "one change: first cause is right",
-            s.first_right,
-        ),
-        (
-            "first_right_visible",
-            "the same where it is visible",
-            s.first_right_visible,
-        ),
-        ("item_right", "lost or moved: item is right", s.item_right),
-        ("named", "one visible change: named", s.named),
-        (
-            "named_right",
-            "one change, named: name is right",
-            s.named_right,
-        ),
-        ("named_wrongly", "any pair: a wrong name", s.named_wrongly),
-        ("list_holds", "visible: the answer holds it", s.list_holds),
-        (
-            "list_holds_or_unknown",
-            "the same, or says unknown",
-            s.list_holds_or_unknown,
-        ),
-        (
-            "nothing_called_change",
-            "nothing: called a change",
-            s.nothing_called_change,
-        ),
-        ("outside_named", "outside: named", s.outside_named),
-        (
-            "outside_unknown",
-            "outside, visible: unknown",
-            s.outside_unknown,
-        ),
-        (
-            "several_first_right",
-            "two, visible: first is one of them",
-            s.several_first_right,
-        ),
-        ("kt_interval", "95 % interval of Kt holds", s.kt_interval),
-        ("kr_interval", "95 % interval of Kr holds", s.kr_interval),
-        (
-            "mass_interval",
-            "visible: interval of mass holds",
-            s.mass_interval,
-        ),
-        (
-            "place_interval",
-            "visible: interval of place holds",
-            s.place_interval,
-        ),
-    ];
+    let rates = FIGURES.iter().zip(&scores.rates);
     let mut rows: Vec<Row> = rates
-        .map(|(key, meaning, rate)| Row {
-            key,
-            meaning,
+        .map(|(figure, rate)| Row {
+            key: figure.key,
+            meaning: figure.meaning,
             value: rate.value(),
             interval: rate.interval(),
             counts: Some((rate.hits, rate.of)),
             target: Target::None,
             ideal: None,
         })
-        .to_vec();
-    let pairs: usize = s.counts.iter().sum();
+        .collect();
+    let pairs: usize = scores.counts.iter().sum();
     rows.push(Row {
         key: "no_answer",
         meaning: "pairs without an answer",
-        value: (pairs > 0).then_some(s.failed as f64),
+        value: (pairs > 0).then_some(scores.failed as f64),
         interval: None,
         counts: None,
         target: Target::None,

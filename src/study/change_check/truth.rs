@@ -7,9 +7,9 @@
 use crate::blind_check::TruthError;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use tapjoint_beam::effects::{Effect, EffectId};
-use tapjoint_compare::CauseKind;
+use tapjoint_compare::{CauseKind, REPEATABILITY_LIMITS};
 use tapjoint_description::TestDescription;
 use tapjoint_simulate::{Change, moved_sensor};
 
@@ -28,8 +28,6 @@ const CAUSES: [CauseKind; 8] = [
     CauseKind::SensorPosition,
     CauseKind::AxialLoad,
 ];
-/// Limits of a repeatability that a comparison accepts (1).
-const REPEATABILITY: [f64; 2] = [1e-6, 0.1];
 
 /// A change between two tests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -177,17 +175,23 @@ pub fn parse_pair_truths(text: &str) -> Result<PairTruthFile, TruthError> {
     let truths: Vec<PairTruth> =
         serde_json::from_str(text).map_err(|source| TruthError::PairEntry { source })?;
     let mut doubts = Vec::new();
+    let mut names = HashSet::new();
     for (index, truth) in truths.iter().enumerate() {
         let name = &truth.name;
-        if truths[..index].iter().any(|other| other.name == *name) {
+        if !names.insert(name) {
             return Err(TruthError::Twice { name: name.clone() });
         }
-        let [least, most] = REPEATABILITY;
+        let [least, most] = REPEATABILITY_LIMITS;
         if let Some(value) = truth.repeatability
             && !(least..=most).contains(&value)
         {
             let name = name.clone();
-            return Err(TruthError::Repeatability { name, value });
+            return Err(TruthError::Repeatability {
+                name,
+                value,
+                least,
+                most,
+            });
         }
         for change in &truth.changes {
             let cause = change.cause.as_str();

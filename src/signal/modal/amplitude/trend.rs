@@ -227,6 +227,11 @@ impl Trend {
         reaches.then(|| self.curve.read(Some(from), to))
     }
 
+    /// Returns the least and the largest amplitude at which the curve can be read: those of the points, and a little beyond.
+    pub fn reach(&self) -> [f64; 2] {
+        [self.curve.low - BEYOND, self.curve.high + BEYOND].map(f64::exp)
+    }
+
     /// Degrees of freedom of the standard uncertainties, for Student's t.
     pub fn freedom(&self) -> f64 {
         self.curve.freedom()

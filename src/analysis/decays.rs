@@ -137,8 +137,10 @@ impl DecayCollector {
             force.truncate(before);
             force
         });
-        let decays = responses.iter();
-        let decays = decays.map(|samples| samples.get(before..).unwrap_or_default());
+        let decays = responses.iter().map(|samples| {
+            let end = samples.len().min(before + self.samples);
+            samples.get(before..end).unwrap_or_default()
+        });
         let Some(groups) = &mut self.groups else {
             self.decays.push(Decay {
                 start: begin as f64 / rate - tap.time,
@@ -159,7 +161,7 @@ impl DecayCollector {
             return;
         }
         for (sum, decay) in groups.sum.iter_mut().zip(decays) {
-            add_weighted(sum, decay.get(..self.samples).unwrap_or(decay), tap.peak);
+            add_weighted(sum, decay, tap.peak);
         }
         if let Some(mut force) = force {
             // Both end where the decay begins.

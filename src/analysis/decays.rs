@@ -252,6 +252,7 @@ impl DecayCollector {
                 self.finish_group();
             }
         }
+        let taps_together = self.groups.as_ref().map(|groups| groups.size);
         let thinning = self.groups.and_then(|groups| groups.thinning);
         let high = thinning.map_or(lines.high, |thinning| thinning.highest());
         let lengths = self
@@ -261,6 +262,7 @@ impl DecayCollector {
             .map(Vec::len);
         let samples = largest_smooth_block(lengths.min()?.min(self.samples))?;
         Some(CollectedDecays {
+            taps_together,
             samples,
             band: (lines.low, lines.high.min(high)),
             decays: self.decays,
@@ -284,6 +286,8 @@ fn add_weighted(sum: &mut Vec<f64>, values: &[f64], weight: f64) {
 
 /// Decays of taps, or of groups of them.
 pub(super) struct CollectedDecays {
+    /// Taps of a group; `None` where each tap is by itself.
+    pub taps_together: Option<usize>,
     /// Samples of each that are fitted.
     pub samples: usize,
     /// Lowest and highest frequency that they have (Hz).

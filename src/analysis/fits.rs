@@ -374,6 +374,7 @@ impl FreeDecays {
     /// [`FitError`]: too few lines.
     pub(super) fn new(collected: CollectedDecays) -> Result<Self, FitError> {
         let CollectedDecays {
+            taps_together: _,
             samples,
             band,
             decays,

@@ -178,6 +178,7 @@ fn spectra_of_magnitudes(
         force_noise: None,
         force_window: None,
         stabilisation: Stabilisation::default(),
+        taps_together: None,
     }
 }
 
@@ -238,5 +239,6 @@ fn spectra_of_functions(
         force_noise: None,
         force_window: None,
         stabilisation,
+        taps_together: None,
     }
 }

@@ -97,6 +97,8 @@ pub struct MeasuredSpectra {
     pub force_window: Option<ForceWindow>,
     /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
+    /// Taps of which each fitted decay is the mean; `None` where each tap is fitted by itself.
+    pub taps_together: Option<usize>,
 }
 
 /// The window that keeps noise and offset of the hammer before and after a pulse out of the functions.
@@ -348,6 +350,7 @@ impl<'a> Stage<'a> {
         let level = self.level(&averages, &quiet, window);
         let mut readings = self.readings(&level, &averages, &transforms, &quiet, window);
         drop(transforms);
+        let taps_together = decays.as_ref().and_then(|decays| decays.taps_together);
         let decays = decays.and_then(|decays| FreeDecays::new(decays).ok());
         let stabilisation = match decays {
             Some(decays) => {
@@ -374,6 +377,7 @@ impl<'a> Stage<'a> {
             readings,
             force_noise: quiet.force_noise(&self.lines),
             stabilisation,
+            taps_together,
         })
     }
 

@@ -32,6 +32,7 @@ mod interval_coverage;
 mod joint_law;
 mod laboratory;
 mod mains;
+mod many_taps;
 mod modal_fit;
 mod mode_file;
 mod moved_clamp;

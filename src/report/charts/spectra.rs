@@ -661,6 +661,7 @@ mod tests {
             force_noise: None,
             force_window: None,
             stabilisation: Default::default(),
+            taps_together: None,
         };
         let mut panels = magnitude_panels(&spectra, frfs, &[]);
         assert_eq!(panels.len(), 1);

@@ -61,6 +61,10 @@ pub struct RecordingSection {
     pub lines: Option<usize>,
     /// Taps averaged.
     pub averages: usize,
+    /// Number of consecutive taps of which each fitted decay is the mean, weighted by their peaks; left out where each tap is
+    /// fitted by itself, which holds up to 100 taps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub taps_together: Option<usize>,
     /// Circumstances, as described.
     #[serde(flatten)]
     pub conditions: Conditions,
@@ -259,6 +263,7 @@ impl RecordingSection {
             block: lines.map(|lines| lines.block),
             lines: lines.map(|lines| lines.displayed()),
             averages: spectra.map_or(0, |spectra| spectra.averages.taps),
+            taps_together: spectra.and_then(|spectra| spectra.taps_together),
             conditions: recording.conditions.clone(),
             band: lines.map(|lines| [lines.low, lines.high]),
             window: spectra.map(|spectra| spectra.window.name().to_string()),
@@ -426,7 +431,7 @@ pub struct FitSection {
     pub residual_correlation: f64,
     /// Band of the fit (Hz).
     pub band: [f64; 2],
-    /// Every tap alone.
+    /// Every tap alone; of more than 100 taps every group of them, see `taps_together`.
     pub taps: Vec<TapFit>,
     /// Modal constants of the sensors.
     pub constants: Vec<ModalConstant>,

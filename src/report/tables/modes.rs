@@ -237,7 +237,9 @@ fn details(table: Table) -> Option<Table> {
 pub fn fitted_to(document: &Document) -> &'static str {
     let recordings = document.recordings.as_deref().unwrap_or_default();
     let functions = recordings.iter().filter(|one| one.sample_rate.is_none());
+    let has_groups = recordings.iter().any(|one| one.taps_together.is_some());
     match functions.count() {
+        0 if has_groups => "the free decays of groups of taps and all sensors",
         0 => "the free decays of all taps and sensors",
         count if count == recordings.len() => "the frequency response functions of all sensors",
         _ => {

@@ -143,6 +143,7 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
         block: Some(lines.block),
         lines: Some(lines.displayed()),
         averages: 4,
+        taps_together: None,
         band: Some(band),
         window: Some("exponential".into()),
         window_decay: Some(1.27),
@@ -349,6 +350,7 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
         force_noise: None,
         force_window: None,
         stabilisation: Default::default(),
+        taps_together: None,
     };
     spectra.stabilisation.searches = vec![band_search(band)];
     let response = |name: &str| Response {

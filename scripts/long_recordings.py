@@ -81,11 +81,15 @@ def measured(command):
     """Processor seconds, wall seconds, megabytes and bytes read of one run."""
     start = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    read = 0
+    read, peak = 0, 0.0
     while True:
         try:
-            with open(f"/proc/{process.pid}/io") as counters:
-                read = int(counters.readline().split()[1])
+            counters = Path(f"/proc/{process.pid}/io").read_text()
+            read = int(counters.split()[1])
+            # Of the program itself: the resource usage counts the script's memory before the program began.
+            for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
+                if line.startswith("VmHWM:"):
+                    peak = int(line.split()[1]) / 1000
         except (OSError, IndexError, ValueError):
             pass
         pid, status, usage = os.wait4(process.pid, os.WNOHANG)
@@ -94,7 +98,7 @@ def measured(command):
         time.sleep(0.02)
     if os.waitstatus_to_exitcode(status) != 0:
         sys.exit(f"failed: {' '.join(command)}")
-    return usage.ru_utime + usage.ru_stime, time.monotonic() - start, usage.ru_maxrss / 1000, read
+    return usage.ru_utime + usage.ru_stime, time.monotonic() - start, peak, read
 
 
 def main():

@@ -1,7 +1,8 @@
 //! The free decays after the taps, gathered while the taps are transformed.
 //!
-//! Up to a hundred taps are kept one by one. Of more taps groups are kept, as many as memory allows. A group is the mean
-//! of its taps weighted by their peaks. The sum of free decays is a free decay: its poles are those of the taps.
+//! Up to a hundred taps are kept one by one. Of more taps, or of records that memory does not hold, groups are kept.
+//! With a hammer a group is the mean of its taps weighted by their peaks. The sum of free decays is a free decay: its poles
+//! are those of the taps. Without a hammer the taps differ in phase, and a group is its strongest tap.
 
 use super::pulse_window::{PulseWindow, offset_stretch, remove_offset};
 use tapjoint_signal::modal::amplitude::Decay;
@@ -48,7 +49,7 @@ struct Groups {
     size: usize,
     thinning: Option<Thinning>,
     is_settled: bool,
-    /// The group that is being summed.
+    /// The group that is being summed: its decays times their weights, and the weights' sum.
     sum: Vec<Vec<f64>>,
     force: Vec<f64>,
     weight: f64,
@@ -160,16 +161,23 @@ impl DecayCollector {
             groups.taps -= 1;
             return;
         }
-        for (sum, decay) in groups.sum.iter_mut().zip(decays) {
-            add_weighted(sum, decay, tap.peak);
+        groups.count += 1;
+        let is_weaker = tap.peak <= groups.weight;
+        if !self.has_force && !is_weaker {
+            groups.sum.iter_mut().for_each(Vec::clear);
+            groups.weight = 0.0;
+        }
+        if self.has_force || !is_weaker {
+            for (sum, decay) in groups.sum.iter_mut().zip(decays) {
+                add_weighted(sum, decay, tap.peak);
+            }
+            groups.weight += tap.peak;
         }
         if let Some(mut force) = force {
             // Both end where the decay begins.
             force.reverse();
             add_weighted(&mut groups.force, &force, tap.peak);
         }
-        groups.weight += tap.peak;
-        groups.count += 1;
         if groups.count >= groups.size && groups.is_settled {
             self.finish_group();
         }
@@ -253,6 +261,7 @@ impl DecayCollector {
             }
         }
         let taps_together = self.groups.as_ref().map(|groups| groups.size);
+        let taps_together = taps_together.filter(|size| *size > 1);
         let thinning = self.groups.and_then(|groups| groups.thinning);
         let high = thinning.map_or(lines.high, |thinning| thinning.highest());
         let lengths = self
@@ -286,7 +295,7 @@ fn add_weighted(sum: &mut Vec<f64>, values: &[f64], weight: f64) {
 
 /// Decays of taps, or of groups of them.
 pub(super) struct CollectedDecays {
-    /// Taps of a group; `None` where each tap is by itself.
+    /// Taps of a group, of which the last may have fewer; `None` where each tap is by itself.
     pub taps_together: Option<usize>,
     /// Samples of each that are fitted.
     pub samples: usize,

@@ -97,7 +97,8 @@ pub struct MeasuredSpectra {
     pub force_window: Option<ForceWindow>,
     /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
-    /// Taps of which each fitted decay is the mean; `None` where each tap is fitted by itself.
+    /// Consecutive taps for each fitted decay: with a hammer it is their mean, without one the strongest of them. `None`
+    /// where each tap is fitted by itself.
     pub taps_together: Option<usize>,
 }
 
@@ -107,7 +108,7 @@ pub struct ForceWindow {
     /// Length (s), half of the taper included: mean of the accepted taps.
     pub length: f64,
     /// Largest relative change of H1 that the window causes at a resonance (1): sqrt(sum |H1w - H1|^2 / sum |H1|^2) over
-    /// the responses, H1w with the window, H1 without it. `None` without a resonance.
+    /// the responses, H1w with the window, H1 without it, both of the first 32 taps. `None` without a resonance.
     pub h1_change: Option<f64>,
 }
 

@@ -49,11 +49,17 @@ fn tapped(seed: u64, rate: f64, taps: usize, seconds: f64) -> Recording {
 }
 
 fn measured(recording: &Recording) -> Measurement {
-    let settings = MeasureSettings::new(TapSource::Hammer {
-        channel: 0,
-        responses: vec![1],
-    });
-    measure(recording, &settings).expect("a measurement")
+    measured_by(
+        recording,
+        TapSource::Hammer {
+            channel: 0,
+            responses: vec![1],
+        },
+    )
+}
+
+fn measured_by(recording: &Recording, source: TapSource) -> Measurement {
+    measure(recording, &MeasureSettings::new(source)).expect("a measurement")
 }
 
 /// Number of modes whose interval holds the truth; every mode must have been fitted.
@@ -83,7 +89,7 @@ fn recover_frequencies_of_many_taps_lie_in_their_intervals() {
         assert_eq!(spectra.taps_together, Some(9));
         inside += held(&measurement);
     }
-    // 95 % of 40 are 38; fewer than 34 have a probability of 1 %.
+    // 95 % of 40 are 38; fewer than 34 have a probability below 1 %.
     assert!(inside >= 34, "{inside} of 40");
 }
 
@@ -107,4 +113,18 @@ fn limit_a_hundred_taps_are_fitted_one_by_one() {
     assert_eq!(spectra.taps_together, None);
     let reading = spectra.readings.iter().find_map(|one| one.fit.as_ref());
     assert_eq!(reading.expect("a fit").mode.taps.len(), 100);
+}
+
+#[test]
+fn recover_frequencies_of_many_taps_without_a_hammer() {
+    let mut inside = 0;
+    for seed in 0..4 {
+        let recording = tapped(seed, 1024.0, 130, 1.0);
+        let measurement = measured_by(&recording, TapSource::Responses(vec![1]));
+        let spectra = measurement.spectra.as_ref().expect("spectra");
+        assert!(spectra.taps_together.is_some_and(|taps| taps > 1));
+        inside += held(&measurement);
+    }
+    // Fewer than 5 of 8 have a probability of 4 in 10,000.
+    assert!(inside >= 5, "{inside} of 8");
 }

@@ -61,8 +61,8 @@ pub struct RecordingSection {
     pub lines: Option<usize>,
     /// Taps averaged.
     pub averages: usize,
-    /// Number of consecutive taps of which each fitted decay is the mean, weighted by their peaks; left out where each tap is
-    /// fitted by itself, which holds up to 100 taps.
+    /// Number of consecutive taps for each fitted decay. With a hammer it is their mean, weighted by their peaks; without one
+    /// it is the strongest of them. Left out where each tap is fitted by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taps_together: Option<usize>,
     /// Circumstances, as described.
@@ -431,7 +431,7 @@ pub struct FitSection {
     pub residual_correlation: f64,
     /// Band of the fit (Hz).
     pub band: [f64; 2],
-    /// Every tap alone; of more than 100 taps every group of them, see `taps_together`.
+    /// Every tap alone, or every group of taps where `taps_together` is stated.
     pub taps: Vec<TapFit>,
     /// Modal constants of the sensors.
     pub constants: Vec<ModalConstant>,

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_rate};
@@ -79,7 +80,6 @@ pub(super) fn open_csv(
             &mut warnings,
         ));
     }
-    let kept = kept.unwrap_or_else(|| KeptSamples::new(0));
     Ok(Recording {
         name: file,
         format,
@@ -87,7 +87,10 @@ pub(super) fn open_csv(
         frames: source.frames,
         channels,
         warnings,
-        source: kept.or_file(source),
+        source: match kept {
+            Some(kept) => kept.or_file(source),
+            None => Arc::new(source),
+        },
         parts: Vec::new(),
     })
 }

@@ -63,13 +63,21 @@ pub(super) struct Band {
 impl Band {
     /// Returns the gain of the filter at a pole relative to the band's middle:
     /// sum h(m) e^{p (m - (M-1)/2)/rate}.
+    ///
+    /// The filter is symmetric about its middle, so the sum is h_0 + P(z) + P(1/z) with z = e^{p/rate} and
+    /// P(z) = h_1 z + h_2 z^2 + ..., both by Horner's scheme.
     pub fn gain(&self, pole: Complex64) -> Complex64 {
-        let middle = (self.taps.len() - 1) as f64 / 2.0;
-        let mut sum = Complex64::ZERO;
-        for (m, h) in self.taps.iter().enumerate() {
-            sum += (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h;
+        let Some((middle, side)) = self.taps[self.taps.len() / 2..].split_first() else {
+            return Complex64::ZERO;
+        };
+        let step = pole / self.sample_rate;
+        let (ahead, back) = (step.exp(), (-step).exp());
+        let (mut after, mut before) = (Complex64::ZERO, Complex64::ZERO);
+        for h in side.iter().rev() {
+            after = (after + h) * ahead;
+            before = (before + h) * back;
         }
-        sum
+        after + before + middle
     }
 
     /// Returns the undamped frequency (Hz) of a pole relative to the middle.
@@ -306,4 +314,40 @@ pub(super) fn noise_variance(values: &[Complex64], band: &Band) -> f64 {
         .collect();
     let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len().max(1) as f64;
     (median(&mut squares) / (1.5 * std::f64::consts::LN_2)).max(FLOOR * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prop_the_gain_is_the_sum_over_the_filter() {
+        let rate = 25600.0;
+        let half = 200.0;
+        let taps = low_pass(half, 0.01);
+        let band = Band {
+            tap: 0,
+            omega: 0.0,
+            decay: -1.0,
+            scale: 1.0,
+            first: 0.0,
+            step: 1.0,
+            filter: taps.len() as f64 / rate,
+            length: 1.0,
+            noise_ratio: 1.0,
+            taps: taps.clone(),
+            sample_rate: rate,
+            sensors: Vec::new(),
+            neighbours: Vec::new(),
+        };
+        assert!((band.gain(Complex64::ZERO) - 1.0).norm() < 1e-14);
+        for pole in [(-3.0, 0.0), (-40.0, 90.0), (25.0, -200.0), (-400.0, 5.0)] {
+            let pole = Complex64::new(pole.0, pole.1);
+            let terms = taps.iter().enumerate();
+            let sum: Complex64 = terms
+                .map(|(m, h)| (pole * ((m as f64 - half) / rate)).exp() * *h)
+                .sum();
+            assert!((band.gain(pole) / sum - 1.0).norm() < 1e-12, "{pole}");
+        }
+    }
 }

@@ -114,13 +114,16 @@ impl FollowedMode {
     /// Damping ratio that the models of a mode that drifts have, where it differs from the listed one. A pole that does not
     /// change takes the change of the frequency for damping.
     pub fn other_damping(&self) -> Option<f64> {
+        if !self.drifts() {
+            return None;
+        }
         let decays = self.decays.iter();
         let mut decays: Vec<f64> = decays.map(|(band, model)| model.mean_decay(band)).collect();
         let ratio = median(&mut decays) / TAU / self.mode.frequency;
         let change = ratio / self.mode.damping_ratio;
         let differs = (change - 1.0).abs() > OTHER_DAMPING
             && (LEAST_SHARE..1.0 / LEAST_SHARE).contains(&change);
-        (self.drifts() && differs).then_some(ratio)
+        differs.then_some(ratio)
     }
 
     /// Lowest and highest frequency (Hz) along the decays.

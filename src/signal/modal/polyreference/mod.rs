@@ -28,6 +28,7 @@
 //! # What it does not do
 //! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit.
 
+mod roots;
 mod selection;
 mod stabilisation;
 

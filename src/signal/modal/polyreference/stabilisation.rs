@@ -15,7 +15,7 @@
 //! modes outside the band is then modelled equally well at every order, and M of a lower order is a
 //! leading part of M of the highest, so that one factorisation serves the whole diagram.
 //!
-//! The roots of the matrix polynomial A are the eigenvalues of its block companion matrix.
+//! `roots` finds the roots of the matrix polynomial A.
 
 use std::f64::consts::TAU;
 
@@ -23,6 +23,7 @@ use nalgebra::{Cholesky, DMatrix, Dyn};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
+use super::roots::inverse_roots;
 use super::{
     LEAST_ORDER, MOST_DAMPING, PolyreferenceError, PolyreferenceSettings, ResponseMatrix,
     least_lines,
@@ -89,8 +90,14 @@ pub fn stabilise_poles(
     let denominators = Denominators::new(matrix, &map, settings.order).ok_or(singular)?;
     let mut diagram: Vec<StabilisationPole> = Vec::new();
     let mut before: Vec<StabilisationPole> = Vec::new();
+    let mut roots: Vec<Complex64> = Vec::new();
     for order in LEAST_ORDER..=settings.order {
-        let mut poles = poles_of_order(matrix, &map, &denominators, order, settings);
+        let Some(coefficients) = denominators.coefficients(order) else {
+            (before, roots) = (Vec::new(), Vec::new());
+            continue;
+        };
+        roots = inverse_roots(&coefficients, &roots);
+        let mut poles = poles_of_order(matrix, &map, &coefficients, &roots, settings);
         for pole in &mut poles {
             pole.stability = stability(pole, &before, matrix.spacing);
         }
@@ -103,18 +110,15 @@ pub fn stabilise_poles(
 fn poles_of_order(
     matrix: &ResponseMatrix,
     map: &CircleMap,
-    denominators: &Denominators,
-    order: usize,
+    coefficients: &DMatrix<Complex64>,
+    roots: &[Complex64],
     settings: &PolyreferenceSettings,
 ) -> Vec<StabilisationPole> {
-    let Some(coefficients) = denominators.coefficients(order) else {
-        return Vec::new();
-    };
+    let order = coefficients.nrows() / matrix.inputs;
     let (low, high) = matrix.ends();
-    let mut poles: Vec<StabilisationPole> = inverse_roots(&coefficients)
-        .into_iter()
+    let mut poles: Vec<StabilisationPole> = (roots.iter())
         .filter(|root| root.norm_sqr() > 0.0)
-        .filter_map(|root| {
+        .filter_map(|&root| {
             let seen = map.pole(root);
             let pole = seen + settings.added_decay;
             let frequency = pole.norm() / TAU;
@@ -126,7 +130,7 @@ fn poles_of_order(
                 pole,
                 frequency,
                 damping_ratio,
-                participation: participation(&coefficients, map.inverse_root(seen)),
+                participation: participation(coefficients, map.inverse_root(seen)),
                 stability: PoleStability::New,
             })
         })
@@ -383,7 +387,12 @@ fn reduced_matrix(
 
 /// Negative lags stand at the end of a transform.
 fn at_lag(lags: &[Complex64], lag: i64) -> Complex64 {
-    lags[lag.rem_euclid(lags.len() as i64) as usize]
+    let place = if lag < 0 {
+        lag + lags.len() as i64
+    } else {
+        lag
+    };
+    lags[place as usize]
 }
 
 /// Sums over the lines of x_k z_k^lag, for all lags, as one inverse transform.
@@ -405,132 +414,5 @@ impl Sums {
         self.transform
             .process_with_scratch(&mut buffer, &mut self.scratch);
         buffer
-    }
-}
-
-/// Steps allowed for each eigenvalue; two or three are usual.
-const MOST_STEPS: usize = 60;
-
-/// Inverse roots w = 1/z of I + A_1 z + ... + A_n z^n, `coefficients` being A_1 ... A_n one below the
-/// other.
-///
-/// With A_0 = I the polynomial in w, I w^n + A_1 w^{n-1} + ... + A_n, is monic; its block companion
-/// matrix has -A_1 ... -A_n as first row of blocks and identities below the diagonal.
-pub(super) fn inverse_roots(coefficients: &DMatrix<Complex64>) -> Vec<Complex64> {
-    let (size, inputs) = coefficients.shape();
-    let mut companion = DMatrix::zeros(size, size);
-    for index in 0..size {
-        let block = index / inputs * inputs;
-        for row in 0..inputs {
-            companion[(row, index)] = -coefficients[(block + row, index % inputs)];
-        }
-        if index + inputs < size {
-            companion[(index + inputs, index)] = Complex64::ONE;
-        }
-    }
-    if inputs > 1 && size > 2 {
-        companion = companion.hessenberg().unpack_h();
-    }
-    hessenberg_eigenvalues(companion)
-}
-
-/// Eigenvalues of an upper Hessenberg matrix by the shifted QR algorithm (Golub & Van Loan, 7.5), complex
-/// single shifts after Wilkinson. Those that do not converge are left out.
-///
-/// nalgebra's complex Schur decomposition finds the same eigenvalues as exactly, in about six times the time
-/// (`benches/polyreference.rs`). Here each step turns the active block alone, and a companion matrix needs no
-/// reduction first.
-fn hessenberg_eigenvalues(mut h: DMatrix<Complex64>) -> Vec<Complex64> {
-    let mut found = Vec::with_capacity(h.nrows());
-    let mut end = h.nrows();
-    let mut steps = 0;
-    while end > 0 {
-        // First row of the block that ends before `end` and has no negligible subdiagonal.
-        let mut rows = (1..end).rev();
-        let start = rows.find(|&k| {
-            let scale = h[(k, k)].l1_norm() + h[(k - 1, k - 1)].l1_norm();
-            h[(k, k - 1)].l1_norm() <= f64::EPSILON * scale
-        });
-        let start = start.unwrap_or(0);
-        if start + 1 == end || steps >= MOST_STEPS {
-            if start + 1 == end {
-                found.push(h[(end - 1, end - 1)]);
-            }
-            end -= 1;
-            steps = 0;
-            continue;
-        }
-        steps += 1;
-        let shift = if steps % 10 == 0 {
-            // An exceptional shift breaks a cycle.
-            h[(end - 1, end - 1)] + h[(end - 1, end - 2)].norm()
-        } else {
-            wilkinson_shift(&h, end)
-        };
-        qr_step(&mut h, start, end, shift);
-    }
-    found
-}
-
-/// Eigenvalue of the last two by two block that is nearer to its last entry.
-fn wilkinson_shift(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
-    let (a, b) = (h[(end - 2, end - 2)], h[(end - 2, end - 1)]);
-    let (c, d) = (h[(end - 1, end - 2)], h[(end - 1, end - 1)]);
-    // d - bc/(t + sign sqrt(t^2 + bc)), t = (a - d)/2.
-    let half = (a - d) * 0.5;
-    let product = b * c;
-    let root = (half * half + product).sqrt();
-    let ahead = (half.conj() * root).re >= 0.0;
-    let sum = if ahead { half + root } else { half - root };
-    match sum.norm_sqr() == 0.0 {
-        true => d,
-        false => d - product / sum,
-    }
-}
-
-/// One step H - s I = Q R, H' = R Q + s I on the rows and columns from `start` to `end`.
-///
-/// Every inner loop runs over elements that do not depend on each other, so that the processor can
-/// overlap them.
-fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex64) {
-    let rows = h.nrows();
-    let values = h.as_mut_slice();
-    for index in start..end {
-        values[index * rows + index] -= shift;
-    }
-    let mut turns: Vec<(f64, Complex64)> = Vec::with_capacity(end - start);
-    for k in start..end - 1 {
-        let place = k * rows + k;
-        // Cosine (real) and sine of the rotation [c s; -conj(s) c] that takes (a, b) to (r, 0).
-        let (a, b) = (values[place], values[place + 1]);
-        let length = (a.norm_sqr() + b.norm_sqr()).sqrt();
-        // Companion matrices of a fit are of order one: no overflow to guard against.
-        let size = a.norm_sqr().sqrt();
-        let (c, s) = if length == 0.0 {
-            (1.0, Complex64::ZERO)
-        } else if size == 0.0 {
-            (0.0, b.conj() / length)
-        } else {
-            (size / length, a / size * b.conj() / length)
-        };
-        for column in values[k * rows..end * rows].chunks_exact_mut(rows) {
-            let (x, y) = (column[k], column[k + 1]);
-            column[k] = x * c + s * y;
-            column[k + 1] = y * c - s.conj() * x;
-        }
-        turns.push((c, s));
-    }
-    for (k, &(c, s)) in (start..).zip(&turns) {
-        // R Q: columns turn with the conjugate; R is zero below row k + 1 here.
-        let (left, right) = values[k * rows..(k + 2) * rows].split_at_mut(rows);
-        let (left, right) = (&mut left[start..k + 2], &mut right[start..k + 2]);
-        for (a, b) in left.iter_mut().zip(right) {
-            let (x, y) = (*a, *b);
-            *a = x * c + y * s.conj();
-            *b = y * c - x * s;
-        }
-    }
-    for index in start..end {
-        values[index * rows + index] += shift;
     }
 }

@@ -1,107 +1,127 @@
-//! Roots of the denominator.
+//! Roots of the denominator that decay.
 //!
-//! For one input the denominator is a scalar polynomial. Its roots follow from those of the order before by the
-//! simultaneous iteration of Aberth and Ehrlich (Aberth 1973, Bini 1996). Its sweeps cost n^2 operations, where the
-//! eigenvalues of a companion matrix cost n^3.
+//! A pole decays where its inverse root w lies outside the unit circle. Most roots lie within: the constraint A_0 = I
+//! puts the surplus ones there. For one input the denominator is a scalar polynomial, and the test of Schur and Cohn
+//! counts the roots outside in n^2/2 operations (Henrici 1974, section 6.8). Where the order before had as many, the
+//! simultaneous iteration of Aberth and Ehrlich refines those alone (Aberth 1973, Bini 1996).
 //!
-//! The eigenvalues serve matrix polynomials, the first order, and the rare polynomial where the iteration does not
-//! converge or finds a root twice.
-
-use std::f64::consts::TAU;
+//! The eigenvalues of a companion matrix cost n^3 operations. They serve matrix polynomials, and orders at which a root
+//! appears.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Sweeps allowed; five to ten are usual.
-const MOST_SWEEPS: usize = 40;
+/// Least |1 - |k|^2| of a reflection coefficient k: nearer to 1 the rounding of a count is no longer far below it.
+const LEAST_REST: f64 = 1e-8;
+/// Sweeps allowed; two to four are usual.
+const MOST_SWEEPS: usize = 20;
 /// Last step over the distance to the nearest root: its square is below the rounding.
 const SETTLED: f64 = 1e-8;
-/// Largest error of the sum of the roots, relative to the sum of their moduli. A root found twice exceeds it.
-const SUM_TOLERANCE: f64 = 1e-8;
 
-/// Returns the inverse roots w = 1/z of I + A_1 z + ... + A_n z^n, `coefficients` being A_1 ... A_n one below the
-/// other. `before` are those of the order before.
-pub(super) fn inverse_roots(
+/// Returns the inverse roots w = 1/z outside the unit circle of I + A_1 z + ... + A_n z^n, `coefficients` being
+/// A_1 ... A_n one below the other. `before` are those of the order before.
+pub(super) fn decaying_roots(
     coefficients: &DMatrix<Complex64>,
     before: &[Complex64],
 ) -> Vec<Complex64> {
-    let (size, inputs) = coefficients.shape();
-    let simultaneous = (inputs == 1 && before.len() + 1 == size)
-        .then(|| simultaneous_roots(coefficients.as_slice(), before))
-        .flatten();
-    simultaneous.unwrap_or_else(|| companion_roots(coefficients))
+    if coefficients.ncols() == 1
+        && let Some(count) = count_outside(coefficients.as_slice())
+    {
+        if count == 0 {
+            return Vec::new();
+        }
+        // Distinct roots, as many as there are, are all of them.
+        if let Some(mut roots) = refined_roots(coefficients.as_slice(), before) {
+            roots.retain(|root| root.norm_sqr() > 1.0);
+            if roots.len() == count {
+                return roots;
+            }
+        }
+    }
+    let mut roots = companion_roots(coefficients);
+    roots.retain(|root| root.norm_sqr() > 1.0);
+    roots
 }
 
-/// Returns the roots of w^n + a_1 w^{n-1} + ... + a_n; `None` where the iteration does not converge.
+/// Returns the number of roots outside the unit circle of p(w) = w^n + a_1 w^{n-1} + ... + a_n; `None` where rounding
+/// leaves it open.
+///
+/// With k = a_n and p*(w) = w^n conj(p(1/conj w)) the polynomial p - k p* = (1 - |k|^2) w q(w) has a monic q of degree
+/// n - 1. On the circle |p| = |p*|. By Rouche's theorem q has as many roots outside as p where |k| < 1, and otherwise
+/// as many as p has within.
+fn count_outside(coefficients: &[Complex64]) -> Option<usize> {
+    let mut p = coefficients.to_vec();
+    let mut are_kept = Vec::with_capacity(p.len());
+    while let Some(k) = p.pop() {
+        let rest = 1.0 - k.norm_sqr();
+        // A rest that is no number counts nothing.
+        if rest.abs().is_nan() || rest.abs() < LEAST_REST {
+            return None;
+        }
+        are_kept.push(rest > 0.0);
+        // q_j = (a_j - k conj(a_{n-j}))/(1 - |k|^2), both ends at once.
+        let (scale, turned, last) = (1.0 / rest, k / rest, p.len());
+        for j in 0..last.div_ceil(2) {
+            let (a, b) = (p[j], p[last - 1 - j]);
+            p[j] = a * scale - turned * b.conj();
+            p[last - 1 - j] = b * scale - turned * a.conj();
+        }
+    }
+    let by_degree = (1..).zip(are_kept.iter().rev());
+    Some(
+        by_degree.fold(0, |outside, (degree, is_kept)| match is_kept {
+            true => outside,
+            false => degree - outside,
+        }),
+    )
+}
+
+/// Refines some of the roots of w^n + a_1 w^{n-1} + ... + a_n from the starts `roots`; `None` where they do not converge
+/// to as many.
 ///
 /// A step takes N/(1 - N S) from the root w_i. N = p(w_i)/p'(w_i) is Newton's step, and S = sum over k other than i of
 /// 1/(w_i - w_k) takes the other roots out of p. A root is found where |p| is within the rounding of Horner's scheme, or
-/// where the step is so small that what it leaves, its square at most, is rounding. The roots sum to -a_1, which shows a
-/// root that was found twice.
-fn simultaneous_roots(coefficients: &[Complex64], before: &[Complex64]) -> Option<Vec<Complex64>> {
+/// where the step is so small that what it leaves, its square at most, is rounding.
+fn refined_roots(coefficients: &[Complex64], before: &[Complex64]) -> Option<Vec<Complex64>> {
     let mut roots = before.to_vec();
-    roots.push(in_widest_gap(before));
-    let moduli: Vec<f64> = coefficients.iter().map(|a| a.norm()).collect();
     let mut open: Vec<usize> = (0..roots.len()).collect();
     for _ in 0..MOST_SWEEPS {
         open.retain(|&index| {
             let root = roots[index];
             let (mut value, mut slope) = (Complex64::ONE, Complex64::ZERO);
-            let (mut size, radius) = (1.0, root.norm());
-            for (a, modulus) in coefficients.iter().zip(&moduli) {
+            let (mut size, radius) = (1.0, root.norm_sqr().sqrt());
+            for a in coefficients {
                 slope = slope * root + value;
                 value = value * root + a;
-                size = size * radius + modulus;
+                size = size * radius + a.l1_norm();
             }
-            if value.norm() <= f64::EPSILON * size {
-                return false;
-            }
-            let (mut re, mut im, mut nearest) = (0.0, 0.0, f64::INFINITY);
-            let (left, right) = roots.split_at(index);
-            for other in left.iter().chain(&right[1..]) {
+            let (mut inverses, mut nearest) = (Complex64::ZERO, root.norm_sqr());
+            for other in roots[..index].iter().chain(&roots[index + 1..]) {
                 let away = root - other;
                 let square = away.norm_sqr();
                 nearest = square.min(nearest);
-                let inverse = 1.0 / square;
-                re += away.re * inverse;
-                im -= away.im * inverse;
+                inverses += away.conj() / square;
             }
             // N/(1 - N S) = p/(p' - p S), which no p' of 0 disturbs.
-            let step = value / (slope - value * Complex64::new(re, im));
+            let step = value / (slope - value * inverses);
+            if value.l1_norm() <= f64::EPSILON * size && step.norm_sqr() < nearest {
+                return false;
+            }
             roots[index] = root - step;
             // A step that is no number stays open.
-            !(step.norm_sqr() <= SETTLED * SETTLED * nearest.min(radius * radius))
+            !(step.norm_sqr() <= SETTLED * SETTLED * nearest)
         });
         if open.is_empty() {
-            break;
+            return Some(roots);
         }
     }
-    let sum: Complex64 = roots.iter().sum();
-    let size: f64 = roots.iter().map(|root| root.norm()).sum();
-    let is_whole = (sum + coefficients[0]).norm() <= SUM_TOLERANCE * size;
-    (open.is_empty() && is_whole).then_some(roots)
-}
-
-/// Returns a start for one more root: in the middle of the widest angle between two roots, at their mean modulus.
-fn in_widest_gap(roots: &[Complex64]) -> Complex64 {
-    let mut angles: Vec<f64> = roots.iter().map(|root| root.arg()).collect();
-    angles.sort_by(f64::total_cmp);
-    let first = angles.first().map(|angle| angle + TAU);
-    let after = angles.iter().skip(1).copied().chain(first);
-    let gaps = angles
-        .iter()
-        .zip(after)
-        .map(|(angle, next)| (next - angle, *angle));
-    let widest = gaps.max_by(|a, b| a.0.total_cmp(&b.0));
-    let (gap, angle) = widest.unwrap_or_default();
-    let modulus = roots.iter().map(|root| root.norm()).sum::<f64>() / roots.len().max(1) as f64;
-    Complex64::from_polar(modulus, angle + 0.5 * gap)
+    None
 }
 
 /// Steps allowed for each eigenvalue; two or three are usual.
 const MOST_STEPS: usize = 60;
 
-/// Returns the inverse roots as eigenvalues.
+/// Returns all inverse roots as eigenvalues.
 ///
 /// With A_0 = I the polynomial in w, I w^n + A_1 w^{n-1} + ... + A_n, is monic; its block companion
 /// matrix has -A_1 ... -A_n as first row of blocks and identities below the diagonal.
@@ -226,6 +246,8 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -253,46 +275,77 @@ mod tests {
         a.iter().map(nearest).fold(0.0, f64::max)
     }
 
+    /// Roots near the unit circle at every order, `share` of them outside.
+    fn roots_about_the_circle(order: usize, share: f64, random: &mut ChaCha8Rng) -> Vec<Complex64> {
+        (1..=order)
+            .map(|k| {
+                let is_outside = random.random_range(0.0..1.0) < share;
+                let away = random.random_range(0.002..0.15);
+                let modulus = if is_outside { 1.0 + away } else { 1.0 - away };
+                // Turns by the golden angle spread over the circle.
+                let angle = 2.4 * k as f64 + random.random_range(-0.03..0.03);
+                Complex64::from_polar(modulus, angle)
+            })
+            .collect()
+    }
+
     #[test]
-    fn prop_both_ways_find_the_roots_of_every_order() {
+    fn prop_the_roots_outside_the_circle_are_counted() {
         let mut random = ChaCha8Rng::seed_from_u64(7);
-        let mut roots = Vec::new();
         for order in 1..=40 {
-            let modulus = random.random_range(0.8..1.05);
-            // Turns by the golden angle spread over the circle at every order.
-            let angle = 2.4 * f64::from(order) + random.random_range(-0.03..0.03);
-            let before = roots.clone();
-            roots.push(Complex64::from_polar(modulus, angle));
-            let coefficients = polynomial(&roots);
-            let size = coefficients.len();
-            let eigenvalues = companion_roots(&DMatrix::from_column_slice(size, 1, &coefficients));
-            let found = simultaneous_roots(&coefficients, &before).unwrap();
-            assert_eq!(found.len(), roots.len());
-            assert!(distance(&found, &eigenvalues) < 1e-9, "{order}");
-            assert!(distance(&roots, &found) < 1e-9, "{order}");
+            for share in [0.0, 0.1, 0.5, 1.0] {
+                let roots = roots_about_the_circle(order, share, &mut random);
+                let outside = roots.iter().filter(|root| root.norm() > 1.0).count();
+                let counted = count_outside(&polynomial(&roots));
+                assert_eq!(counted, Some(outside), "{order}, {share}");
+            }
         }
     }
 
     #[test]
-    fn limit_roots_of_unity_are_found_from_those_of_any_start() {
-        // w^n - 1.
+    fn prop_both_ways_find_the_roots_outside_of_every_order() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        for order in 3..=40 {
+            let roots = roots_about_the_circle(order, 0.2, &mut random);
+            let mut outside = roots.clone();
+            outside.retain(|root| root.norm() > 1.0);
+            let starts: Vec<Complex64> = outside
+                .iter()
+                .map(|root| root * Complex64::from_polar(0.99, 0.01))
+                .collect();
+            let coefficients = polynomial(&roots);
+            let refined = refined_roots(&coefficients, &starts).unwrap();
+            let column = DMatrix::from_column_slice(order, 1, &coefficients);
+            let [found, without_start] =
+                [&starts[..], &[]].map(|starts| decaying_roots(&column, starts));
+            assert_eq!(found, refined, "{order}");
+            assert_eq!(without_start.len(), outside.len(), "{order}");
+            assert!(distance(&found, &without_start) < 1e-9, "{order}");
+            assert!(distance(&outside, &found) < 1e-9, "{order}");
+        }
+    }
+
+    #[test]
+    fn limit_roots_on_the_circle_are_not_counted() {
+        // w^12 - 1.
         let mut coefficients = vec![Complex64::ZERO; 12];
         coefficients[11] = -Complex64::ONE;
-        let before: Vec<Complex64> = (0..11)
-            .map(|k| Complex64::from_polar(0.7, 0.4 * f64::from(k)))
-            .collect();
-        let found = simultaneous_roots(&coefficients, &before).unwrap();
+        assert_eq!(count_outside(&coefficients), None);
+        coefficients[11] *= 1.1f64.powi(12);
+        assert_eq!(count_outside(&coefficients), Some(12));
+        let column = DMatrix::from_column_slice(12, 1, &coefficients);
         let exact: Vec<Complex64> = (0..12)
-            .map(|k| Complex64::from_polar(1.0, TAU * f64::from(k) / 12.0))
+            .map(|k| Complex64::from_polar(1.1, TAU * f64::from(k) / 12.0))
             .collect();
-        assert!(distance(&exact, &found) < 1e-14);
+        assert!(distance(&exact, &decaying_roots(&column, &[])) < 1e-13);
     }
 
     #[test]
     fn limit_a_start_with_equal_roots_falls_back_to_the_eigenvalues() {
-        let exact = [0.5, 0.6, 0.9].map(Complex64::from);
+        let exact = [0.5, 1.2, 1.4].map(Complex64::from);
         let coefficients = DMatrix::from_column_slice(3, 1, &polynomial(&exact));
-        let found = inverse_roots(&coefficients, &[Complex64::from(0.7); 2]);
-        assert!(distance(&exact, &found) < 1e-12);
+        let found = decaying_roots(&coefficients, &[Complex64::from(1.3); 2]);
+        assert_eq!(found.len(), 2);
+        assert!(distance(&exact[1..], &found) < 1e-12);
     }
 }

@@ -15,15 +15,15 @@
 //! modes outside the band is then modelled equally well at every order, and M of a lower order is a
 //! leading part of M of the highest, so that one factorisation serves the whole diagram.
 //!
-//! `roots` finds the roots of the matrix polynomial A.
+//! `roots` finds the roots of the matrix polynomial A that decay.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::{Cholesky, ComplexField, DMatrix, Dyn};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::roots::inverse_roots;
+use super::roots::decaying_roots;
 use super::{
     LEAST_ORDER, MOST_DAMPING, PolyreferenceError, PolyreferenceSettings, ResponseMatrix,
     least_lines,
@@ -87,7 +87,7 @@ pub fn stabilise_poles(
     let map = CircleMap::new(matrix);
     let (low, high) = matrix.ends();
     let singular = PolyreferenceError::Singular { low, high };
-    let denominators = Denominators::new(matrix, &map, settings.order).ok_or(singular)?;
+    let denominators = Denominators::new(matrix, settings.order).ok_or(singular)?;
     let mut diagram: Vec<StabilisationPole> = Vec::new();
     let mut before: Vec<StabilisationPole> = Vec::new();
     let mut roots: Vec<Complex64> = Vec::new();
@@ -96,7 +96,7 @@ pub fn stabilise_poles(
             (before, roots) = (Vec::new(), Vec::new());
             continue;
         };
-        roots = inverse_roots(&coefficients, &roots);
+        roots = decaying_roots(&coefficients, &roots);
         let mut poles = poles_of_order(matrix, &map, &coefficients, &roots, settings);
         for pole in &mut poles {
             pole.stability = stability(pole, &before, matrix.spacing);
@@ -117,7 +117,6 @@ fn poles_of_order(
     let order = coefficients.nrows() / matrix.inputs;
     let (low, high) = matrix.ends();
     let mut poles: Vec<StabilisationPole> = (roots.iter())
-        .filter(|root| root.norm_sqr() > 0.0)
         .filter_map(|&root| {
             let seen = map.pole(root);
             let pole = seen + settings.added_decay;
@@ -225,51 +224,42 @@ const RIDGE: f64 = 1e-15;
 /// Number of times that the ridge is raised a hundredfold before the equations are given up.
 const RIDGE_STEPS: i32 = 4;
 
-/// Map of the band onto the unit circle: line k is at z_k = e^{j k step}.
+/// Map of the band onto the unit circle: line k is at z_k = e^{j step (k - (K - 1)/2)}, K being the number of lines.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CircleMap {
-    /// Frequency of the first line (Hz), at z = 1.
-    first: f64,
+struct CircleMap {
+    /// Frequency in the middle of the band (Hz), at z = 1.
+    middle: f64,
     /// Sampling time T_a of the discrete-time model (s): step/(2 pi spacing).
     time: f64,
-    /// Angle of the gap's middle, where the circle is cut.
-    cut: f64,
-    transform: usize,
 }
 
 impl CircleMap {
-    pub(super) fn new(matrix: &ResponseMatrix) -> Self {
-        let points = matrix.points();
-        let transform = smallest_smooth_block((points as f64 / SHARE_OF_CIRCLE).ceil() as usize);
-        let arc = (points.max(1) - 1) as f64 / transform as f64 * TAU;
+    fn new(matrix: &ResponseMatrix) -> Self {
+        let (low, high) = matrix.ends();
         CircleMap {
-            first: matrix.frequency(0),
-            time: 1.0 / (transform as f64 * matrix.spacing),
-            cut: 0.5 * (arc + TAU),
-            transform,
+            middle: 0.5 * (low + high),
+            time: 1.0 / (transform_length(matrix) as f64 * matrix.spacing),
         }
     }
 
-    /// Pole (1/s) of the root w = 1/z: p = j 2 pi f_first - ln(w)/T_a.
-    pub(super) fn pole(&self, inverse_root: Complex64) -> Complex64 {
-        let angle = -inverse_root.arg();
-        // Angles from the gap's middle downwards by a turn belong to the band.
-        let lower = self.cut - TAU;
-        let angle = lower + (angle - lower).rem_euclid(TAU);
-        Complex64::new(
-            -inverse_root.norm().ln() / self.time,
-            TAU * self.first + angle / self.time,
-        )
+    /// Pole (1/s) of the root w = 1/z: p = j 2 pi f_middle - ln(w)/T_a.
+    fn pole(&self, inverse_root: Complex64) -> Complex64 {
+        Complex64::new(0.0, TAU * self.middle) - inverse_root.ln() / self.time
     }
 
-    /// Inverse root w = 1/z of a pole, e^{-(p - j 2 pi f_first) T_a}.
-    pub(super) fn inverse_root(&self, pole: Complex64) -> Complex64 {
-        (-(pole - Complex64::new(0.0, TAU * self.first)) * self.time).exp()
+    /// Inverse root w = 1/z of a pole, e^{-(p - j 2 pi f_middle) T_a}.
+    fn inverse_root(&self, pole: Complex64) -> Complex64 {
+        (-(pole - Complex64::new(0.0, TAU * self.middle)) * self.time).exp()
     }
 }
 
+/// Steps of the whole circle: the lines are its share, and the transforms are fast.
+fn transform_length(matrix: &ResponseMatrix) -> usize {
+    smallest_smooth_block((matrix.points() as f64 / SHARE_OF_CIRCLE).ceil() as usize)
+}
+
 /// Denominator coefficients of every order, from one factorisation.
-pub(super) struct Denominators {
+struct Denominators {
     inputs: usize,
     /// L of M = L L^H without the rows of A_0.
     factor: DMatrix<Complex64>,
@@ -279,9 +269,9 @@ pub(super) struct Denominators {
 
 impl Denominators {
     /// `None` where the responses are all zero or the equations cannot be solved.
-    pub(super) fn new(matrix: &ResponseMatrix, map: &CircleMap, order: usize) -> Option<Self> {
+    fn new(matrix: &ResponseMatrix, order: usize) -> Option<Self> {
         let inputs = matrix.inputs;
-        let reduced = reduced_matrix(matrix, map, order)?;
+        let reduced = reduced_matrix(matrix, order)?;
         let unknowns = order * inputs;
         let block = reduced.view((inputs, inputs), (unknowns, unknowns));
         let factor = factorise(&block.into_owned())?.unpack();
@@ -297,7 +287,7 @@ impl Denominators {
     }
 
     /// A_1 ... A_n one below the other, A_0 being the identity.
-    pub(super) fn coefficients(&self, order: usize) -> Option<DMatrix<Complex64>> {
+    fn coefficients(&self, order: usize) -> Option<DMatrix<Complex64>> {
         let unknowns = order * self.inputs;
         let factor = self.factor.view((0, 0), (unknowns, unknowns));
         let mut solution = self.reduced.rows(0, unknowns).into_owned();
@@ -307,112 +297,123 @@ impl Denominators {
     }
 }
 
-/// Cholesky factor with the smallest ridge that allows one.
-fn factorise(matrix: &DMatrix<Complex64>) -> Option<Cholesky<Complex64, Dyn>> {
-    let trace = matrix.trace().re;
+/// Cholesky factor with the smallest ridge that allows one. Only the lower triangle is read.
+fn factorise<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> Option<Cholesky<T, Dyn>> {
+    let trace = matrix.trace().real();
     if !(trace.is_finite() && trace > 0.0) {
         return None;
     }
     (0..=RIDGE_STEPS).find_map(|step| {
         let mut raised = matrix.clone();
-        let ridge = Complex64::from(RIDGE * 100f64.powi(step) * trace);
+        let ridge = T::from_real(RIDGE * 100f64.powi(step) * trace);
         for index in 0..raised.nrows() {
-            raised[(index, index)] += ridge;
+            raised[(index, index)] += ridge.clone();
         }
         Cholesky::new(raised)
     })
 }
 
-/// Returns M for the highest order, unknown (power j, input i) at j * inputs + i.
-fn reduced_matrix(
-    matrix: &ResponseMatrix,
-    map: &CircleMap,
-    order: usize,
-) -> Option<DMatrix<Complex64>> {
+/// Returns the lower triangle of M for the highest order, unknown (power j, input i) at j * inputs + i.
+fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Complex64>> {
     let inputs = matrix.inputs;
     let columns = (order + 1) * inputs;
     let powers = order + 1 + 2 * EXTRA_POWERS;
-    let mut sums = Sums::new(map.transform);
-    let ones = vec![Complex64::ONE; matrix.points()];
-    let lags = sums.at(&ones);
-    // Hermitian Toeplitz matrix R, entry (j, k) at lag k - j.
-    let numerator = DMatrix::from_fn(powers, powers, |j, k| at_lag(&lags, k as i64 - j as i64));
+    let mut sums = Sums::new(matrix, powers - 1);
+    // The lines lie about z = 1: R is real, a Toeplitz matrix of sum_k z_k^lag = sin(K x)/sin(x), x = lag step/2.
+    let (points, half_step) = (matrix.points() as f64, PI / transform_length(matrix) as f64);
+    let numerator = DMatrix::from_fn(powers, powers, |j, k| match j.abs_diff(k) {
+        0 => points,
+        lag => (points * lag as f64 * half_step).sin() / (lag as f64 * half_step).sin(),
+    });
     let numerator = factorise(&numerator)?.unpack();
     let mut reduced = DMatrix::zeros(columns, columns);
+    // Y = L^{-1} S, so that Y^H Y is S^H R^{-1} S, of all outputs: its real part, and Re(Y)' Im(Y).
+    let mut real = DMatrix::zeros(columns, columns);
+    let mut cross = DMatrix::zeros(columns, columns);
     for output in 0..matrix.outputs {
         let row: Vec<&[Complex64]> = (0..inputs).map(|i| matrix.entry(output, i)).collect();
         // T of this output.
         for (i, left) in row.iter().enumerate() {
             for (k, right) in row.iter().enumerate() {
-                let pairs = left.iter().zip(*right);
-                let product: Vec<Complex64> = pairs.map(|(a, b)| a.conj() * b).collect();
-                let lags = sums.at(&product);
+                let lags = sums.at(matrix.points(), |line| left[line].conj() * right[line]);
                 for q in 0..=order {
-                    for p in 0..=order {
-                        let entry = at_lag(&lags, q as i64 - p as i64);
+                    for p in q..=order {
+                        let entry = lags[powers - 1 + q - p];
                         reduced[(p * inputs + i, q * inputs + k)] += entry;
                     }
                 }
             }
         }
-        let mut mixed = DMatrix::zeros(powers, columns);
+        let [mut mixed_real, mut mixed_imaginary] =
+            [(); 2].map(|()| DMatrix::zeros(powers, columns));
         for (input, entry) in row.iter().enumerate() {
-            let lags = sums.at(entry);
-            // Row j stands for the numerator's power j - e.
+            let lags = sums.at(matrix.points(), |line| entry[line]);
             for power in 0..=order {
-                for j in 0..powers {
-                    let lag = power as i64 - (j as i64 - EXTRA_POWERS as i64);
-                    mixed[(j, power * inputs + input)] = at_lag(&lags, lag);
+                // Row j stands for the numerator's power j - e.
+                let lags = &lags[power + EXTRA_POWERS..][..powers];
+                for (j, lag) in lags.iter().rev().enumerate() {
+                    mixed_real[(j, power * inputs + input)] = lag.re;
+                    mixed_imaginary[(j, power * inputs + input)] = lag.im;
                 }
             }
         }
-        numerator
-            .solve_lower_triangular_mut(&mut mixed)
-            .then_some(())?;
-        // Y^H Y with Y = L^{-1} S is S^H R^{-1} S; one side of the diagonal gives the other.
-        let left: Vec<&[Complex64]> = mixed.as_slice().chunks_exact(powers).collect();
-        for q in 0..columns {
-            for p in 0..=q {
-                let pairs = left[p].iter().zip(left[q]);
-                let product: Complex64 = pairs.map(|(a, b)| a.conj() * b).sum();
-                reduced[(p, q)] -= product;
-                if p != q {
-                    reduced[(q, p)] -= product.conj();
-                }
-            }
+        for mixed in [&mut mixed_real, &mut mixed_imaginary] {
+            numerator.solve_lower_triangular_mut(mixed).then_some(())?;
+        }
+        let turned = mixed_real.transpose();
+        real.gemm(1.0, &turned, &mixed_real, 1.0);
+        real.gemm(1.0, &mixed_imaginary.transpose(), &mixed_imaginary, 1.0);
+        cross.gemm(1.0, &turned, &mixed_imaginary, 1.0);
+    }
+    for q in 0..columns {
+        for p in q..columns {
+            let imaginary = cross[(p, q)] - cross[(q, p)];
+            reduced[(p, q)] -= Complex64::new(real[(p, q)], imaginary);
         }
     }
     Some(reduced)
 }
 
-/// Negative lags stand at the end of a transform.
-fn at_lag(lags: &[Complex64], lag: i64) -> Complex64 {
-    let place = if lag < 0 {
-        lag + lags.len() as i64
-    } else {
-        lag
-    };
-    lags[place as usize]
-}
-
-/// Sums over the lines of x_k z_k^lag, for all lags, as one inverse transform.
+/// Sums over the lines of x_k z_k^lag, for all lags up to the largest, each as one inverse transform.
 struct Sums {
     transform: std::sync::Arc<dyn rustfft::Fft<f64>>,
     scratch: Vec<Complex64>,
+    /// z^lag of the first line, from 0 on.
+    first: Vec<Complex64>,
 }
 
 impl Sums {
-    fn new(length: usize) -> Self {
+    fn new(matrix: &ResponseMatrix, largest: usize) -> Self {
+        let length = transform_length(matrix);
         let transform = FftPlanner::new().plan_fft_inverse(length);
         let scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
-        Sums { transform, scratch }
+        let angle = -0.5 * matrix.points().saturating_sub(1) as f64 * TAU / length as f64;
+        let lags = 0..=largest;
+        Sums {
+            transform,
+            scratch,
+            first: lags
+                .map(|lag| Complex64::from_polar(1.0, angle * lag as f64))
+                .collect(),
+        }
     }
 
-    fn at(&mut self, values: &[Complex64]) -> Vec<Complex64> {
+    /// Returns the sums from minus the largest lag to the largest.
+    fn at(&mut self, points: usize, value: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
         let mut buffer = vec![Complex64::ZERO; self.transform.len()];
-        buffer[..values.len()].copy_from_slice(values);
+        for (line, place) in buffer[..points].iter_mut().enumerate() {
+            *place = value(line);
+        }
         self.transform
             .process_with_scratch(&mut buffer, &mut self.scratch);
-        buffer
+        // Negative lags stand at the end of a transform.
+        let negative = (1..self.first.len()).rev();
+        let negative = negative.map(|lag| self.first[lag].conj() * buffer[buffer.len() - lag]);
+        let positive = self
+            .first
+            .iter()
+            .zip(&buffer)
+            .map(|(first, sum)| first * sum);
+        negative.chain(positive).collect()
     }
 }

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::band::{Band, DISTINCT, noise_variance};
-use super::exponentials::{Exponentials, Fit, Prior, fit_exponentials};
+use super::exponentials::{Exponentials, Fit, Prior, Times, fit_exponentials};
 use super::{AmplitudeVerdict, Companion};
 use crate::modal::Subspace;
 
@@ -235,6 +235,15 @@ struct WholeDecay<'a> {
 }
 
 impl WholeDecay<'_> {
+    /// Times of the values.
+    fn times(&self) -> Times {
+        Times {
+            first: 0.0,
+            step: self.band.step,
+            count: self.series.len(),
+        }
+    }
+
     /// Time of the last value.
     fn last(&self) -> f64 {
         (self.series.len() - 1) as f64 * self.band.step
@@ -256,8 +265,7 @@ impl WholeDecay<'_> {
             })
             .collect();
         let unknowns = 2.0 * model.parameters().len() as f64;
-        let times: Vec<f64> = (0..count).map(|n| n as f64 * self.band.step).collect();
-        let fit = fit_exponentials(&times, self.series, model, &priors)?;
+        let fit = fit_exponentials(self.times(), self.series, model, &priors)?;
         fit.inverse()?;
         let values = 2.0 * count as f64;
         let squares = fit.squares.max(f64::MIN_POSITIVE);
@@ -328,8 +336,7 @@ impl WholeDecay<'_> {
             let pole = Complex64::new(decay, offset);
             // sum conj(e) r and sum |e|^2, whose quotient is the amplitude.
             let (mut product, mut energy) = (Complex64::ZERO, f64::MIN_POSITIVE);
-            for (n, residual) in residuals.iter().enumerate() {
-                let value = (pole * (n as f64 * self.band.step)).exp();
+            for (value, residual) in self.times().exponentials(pole).iter().zip(residuals) {
                 product += value.conj() * residual;
                 energy += value.norm_sqr();
             }

@@ -48,34 +48,16 @@ impl Exponentials {
         sum
     }
 
-    /// Returns q1 t + q2 v + q3 v^2 + ..., the powers by Horner's scheme.
+    /// Returns q1 t + q2 v + q3 v^2 + ...
     pub fn exponent(&self, t: f64) -> Complex64 {
         let v = 1.0 - (-self.rate * t).exp();
-        let drift = self.exponents.iter().skip(1).rev();
-        let drift = drift.fold(Complex64::ZERO, |sum, q| (sum + q) * v);
-        self.exponents.first().copied().unwrap_or_default() * t + drift
+        self.exponents.first().copied().unwrap_or_default() * t + self.drift(v)
     }
 
-    /// Returns the value at a time. `derivatives` are those to the parameters, in their order.
-    fn value(&self, t: f64, derivatives: &mut Vec<Complex64>) -> Complex64 {
-        derivatives.clear();
-        let growth = self.exponent(t).exp();
-        let mut sum = self.amplitude * growth;
-        derivatives.push(growth);
-        derivatives.push(sum * t);
-        let v = 1.0 - (-self.rate * t).exp();
-        let mut power = sum;
-        for _ in self.exponents.iter().skip(1) {
-            power *= v;
-            derivatives.push(power);
-        }
-        for (amplitude, pole) in &self.others {
-            let growth = (pole * t).exp();
-            sum += amplitude * growth;
-            derivatives.push(growth);
-            derivatives.push(amplitude * growth * t);
-        }
-        sum
+    /// Returns q2 v + q3 v^2 + ..., by Horner's scheme.
+    fn drift(&self, v: f64) -> Complex64 {
+        let drift = self.exponents.iter().skip(1).rev();
+        drift.fold(Complex64::ZERO, |sum, q| (sum + q) * v)
     }
 }
 
@@ -91,18 +73,32 @@ impl Exponentials {
     pub fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
         const PARTS: usize = 200;
         let first = -0.5 * band.filter;
-        let above = |t: f64| self.log_amplitude(t, band) > amplitude.ln();
+        let above = |t: f64| self.log_amplitude(t, band) - amplitude.ln();
         let time = |part: usize| first + (last - first) * part as f64 / PARTS as f64;
-        let part = (0..=PARTS).find(|part| !above(time(*part)))?;
+        let part =
+            (0..=PARTS).find(|part| above(time(*part)).is_nan() || above(time(*part)) <= 0.0)?;
         let (mut early, mut late) = (time(part.checked_sub(1)?), time(part));
+        let mut t = late;
         for _ in 0..50 {
-            let middle = 0.5 * (early + late);
-            match above(middle) {
-                true => early = middle,
-                false => late = middle,
+            let excess = above(t);
+            match excess > 0.0 {
+                true => early = t,
+                false => late = t,
             }
+            // The filter's gain hardly changes: Newton's step with the decay alone, and the middle where it leads astray.
+            let newton = t - excess / self.pole(t).re;
+            let is_within = early < newton && newton < late;
+            let next = if is_within {
+                newton
+            } else {
+                0.5 * (early + late)
+            };
+            if (next - t).abs() <= f64::EPSILON * (last - first) {
+                break;
+            }
+            t = next;
         }
-        Some(late)
+        Some(t)
     }
 
     /// Derivative of the pole with time (1/s^2).
@@ -165,6 +161,41 @@ impl Fit {
     }
 }
 
+/// Times from one exponential anew to the next: in between their rounding grows to sixteen times its own.
+const ANEW: usize = 16;
+
+/// Equally spaced times.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Times {
+    /// The first (s).
+    pub first: f64,
+    /// Distance of two (s).
+    pub step: f64,
+    /// Number of times.
+    pub count: usize,
+}
+
+impl Times {
+    fn at(&self, n: usize) -> f64 {
+        self.first + n as f64 * self.step
+    }
+
+    /// Returns e^{pole t} at every time, as a geometric sequence.
+    pub fn exponentials(&self, pole: Complex64) -> Vec<Complex64> {
+        let step = (pole * self.step).exp();
+        let mut all = Vec::with_capacity(self.count);
+        let mut value = Complex64::ONE;
+        for n in 0..self.count {
+            value = match n % ANEW {
+                0 => (pole * self.at(n)).exp(),
+                _ => value * step,
+            };
+            all.push(value);
+        }
+        all
+    }
+}
+
 /// A parameter known beforehand: index, value, and 1/variance (of both parts together).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prior {
@@ -186,7 +217,7 @@ const LARGEST: f64 = 1e100;
 ///
 /// Priors take the noise variance as 1: scale their weights by it.
 pub(super) fn fit_exponentials(
-    times: &[f64],
+    times: Times,
     values: &[Complex64],
     start: Exponentials,
     priors: &[Prior],
@@ -196,9 +227,11 @@ pub(super) fn fit_exponentials(
         .iter()
         .flat_map(|x| [x.re, x.im])
         .collect();
+    let falls = times.exponentials(Complex64::from(-start.rate));
     let problem = ExponentialFit {
         times,
         values,
+        drifts: falls.into_iter().map(|fall| 1.0 - fall.re).collect(),
         terms: start,
         priors,
     };
@@ -210,13 +243,15 @@ pub(super) fn fit_exponentials(
         damping: 1e6,
         ..Settings::default()
     };
-    Some(minimise(&problem, &parameters, &settings)?.state)
+    Some(minimise(&problem, &parameters, &settings)?.state.fit)
 }
 
 /// Least squares of a sum of exponentials. Its parameters are the real and imaginary parts of the model's.
 struct ExponentialFit<'a> {
-    times: &'a [f64],
+    times: Times,
     values: &'a [Complex64],
+    /// v at every time.
+    drifts: Vec<f64>,
     /// A model with the terms that are fitted.
     terms: Exponentials,
     priors: &'a [Prior],
@@ -251,8 +286,73 @@ impl Fit {
     }
 }
 
+/// A fit, and what its slopes need besides.
+struct Evaluation {
+    fit: Fit,
+    /// e to the exponent of the mode, then of everything else, at every time.
+    growths: Vec<Vec<Complex64>>,
+}
+
+impl ExponentialFit<'_> {
+    /// Returns e to the exponent of the mode, then of everything else, at every time.
+    fn growths(&self, model: &Exponentials) -> Vec<Vec<Complex64>> {
+        let pole = model.exponents.first().copied().unwrap_or_default();
+        let mut growth = self.times.exponentials(pole);
+        if model.exponents.len() > 1 {
+            for (growth, v) in growth.iter_mut().zip(&self.drifts) {
+                *growth *= model.drift(*v).exp();
+            }
+        }
+        let others = model.others.iter();
+        let others = others.map(|(_, pole)| self.times.exponentials(*pole));
+        std::iter::once(growth).chain(others).collect()
+    }
+
+    /// Returns the derivatives of the model to its parameters at all times, one parameter after the other: the real
+    /// parts, then the imaginary parts.
+    fn derivatives(&self, model: &Exponentials, growths: &[Vec<Complex64>]) -> Vec<f64> {
+        let size = 1 + model.exponents.len() + 2 * model.others.len();
+        let mut all = Vec::with_capacity(2 * self.times.count * size);
+        let mut put = |column: &[Complex64]| {
+            all.extend(column.iter().map(|x| x.re));
+            all.extend(column.iter().map(|x| x.im));
+        };
+        let others = model.others.iter().map(|(amplitude, _)| *amplitude);
+        let amplitudes = std::iter::once(model.amplitude).chain(others);
+        for (place, (amplitude, growth)) in amplitudes.zip(growths).enumerate() {
+            put(growth);
+            let mut term: Vec<Complex64> = growth.iter().map(|growth| amplitude * growth).collect();
+            let timed = term.iter().enumerate();
+            let timed: Vec<Complex64> = timed.map(|(n, x)| x * self.times.at(n)).collect();
+            put(&timed);
+            // The mode alone drifts.
+            for _ in 1..if place == 0 { model.exponents.len() } else { 1 } {
+                for (term, v) in term.iter_mut().zip(&self.drifts) {
+                    *term *= v;
+                }
+                put(&term);
+            }
+        }
+        all
+    }
+}
+
+/// Returns the sum of the products of two slices, in eight sums at once.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (wide, narrow) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest = wide.remainder().iter().zip(narrow.remainder());
+    let rest: f64 = rest.map(|(x, y)| x * y).sum();
+    for (x, y) in wide.zip(narrow) {
+        for lane in 0..8 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
 impl Problem for ExponentialFit<'_> {
-    type State = Fit;
+    type State = Evaluation;
 
     fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
         let parts = parameters.chunks_exact(2);
@@ -264,62 +364,70 @@ impl Problem for ExponentialFit<'_> {
             rate: self.terms.rate,
             others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
         };
-        let size = all.len();
-        let mut products = vec![Complex64::ZERO; size * size];
-        let mut right = DVector::zeros(size);
-        let (mut squares, mut prior_squares) = (0.0, 0.0);
-        let mut row = Vec::with_capacity(size);
-        let mut residuals = Vec::with_capacity(self.times.len());
-        for (t, value) in self.times.iter().zip(self.values) {
-            let residual = value - model.value(*t, &mut row);
-            squares += residual.norm_sqr();
-            residuals.push(residual);
-            for ((i, a), sums) in row.iter().enumerate().zip(products.chunks_mut(size)) {
-                let a = a.conj();
-                right[i] += a * residual;
-                for (sum, b) in sums.iter_mut().zip(&row[..=i]) {
-                    *sum += a * b;
-                }
+        let growths = self.growths(&model);
+        let mut residuals = self.values.to_vec();
+        let others = model.others.iter().map(|(amplitude, _)| *amplitude);
+        for (amplitude, growth) in std::iter::once(model.amplitude).chain(others).zip(&growths) {
+            for (residual, growth) in residuals.iter_mut().zip(growth) {
+                *residual -= amplitude * growth;
             }
         }
-        // Only the lower triangle was summed; the matrix is Hermitian.
-        let mut normal = DMatrix::from_fn(size, size, |i, k| {
-            if k <= i {
-                products[i * size + k]
-            } else {
-                products[k * size + i].conj()
-            }
+        let squares: f64 = residuals.iter().map(Complex64::norm_sqr).sum();
+        let away = self.priors.iter().map(|prior| {
+            let away = prior.value - all[prior.parameter];
+            away.norm_sqr() * prior.weight
         });
-        let current = model.parameters();
-        for prior in self.priors {
-            let k = prior.parameter;
-            let away = prior.value - current[k];
-            normal[(k, k)] += prior.weight;
-            right[k] += away * prior.weight;
-            prior_squares += away.norm_sqr() * prior.weight;
-        }
-        (squares + prior_squares < LARGEST).then_some(Fit {
-            model,
-            normal,
-            right,
-            residuals,
-            squares,
-            prior_squares,
+        let prior_squares: f64 = away.sum();
+        (squares + prior_squares < LARGEST).then(|| Evaluation {
+            fit: Fit {
+                model,
+                normal: DMatrix::zeros(all.len(), all.len()),
+                right: DVector::zeros(all.len()),
+                residuals,
+                squares,
+                prior_squares,
+            },
+            growths,
         })
     }
 
     fn cost(&self, state: &Self::State) -> f64 {
-        0.5 * (state.squares + state.prior_squares)
+        0.5 * (state.fit.squares + state.fit.prior_squares)
     }
 
     /// With a step x + j y, J (x + j y) has the real parts Re J x - Im J y and the imaginary parts
     /// Im J x + Re J y. The curvature of the real problem is therefore J^H J with each entry a + j b as
     /// the block (a, -b; b, a).
     fn linearise(&self, _: &[f64], state: &mut Self::State) -> Option<Linearised> {
-        let size = 2 * state.right.len();
+        let count = self.times.count;
+        let derivatives = self.derivatives(&state.fit.model, &state.growths);
+        let columns: Vec<&[f64]> = derivatives.chunks_exact((2 * count).max(1)).collect();
+        // sum conj(a) b of two columns.
+        let product = |a: &[f64], b: &[f64]| {
+            let imaginary = dot(&a[..count], &b[count..]) - dot(&a[count..], &b[..count]);
+            Complex64::new(dot(a, b), imaginary)
+        };
+        let fit = &mut state.fit;
+        let parts = [|x: &Complex64| x.re, |x: &Complex64| x.im];
+        let residuals = parts.map(|part| fit.residuals.iter().map(part)).into_iter();
+        let residuals: Vec<f64> = residuals.flatten().collect();
+        for (i, a) in columns.iter().enumerate() {
+            fit.right[i] = product(a, &residuals);
+            for (k, b) in columns[..=i].iter().enumerate() {
+                fit.normal[(i, k)] = product(a, b);
+                fit.normal[(k, i)] = fit.normal[(i, k)].conj();
+            }
+        }
+        let current = fit.model.parameters();
+        for prior in self.priors {
+            let k = prior.parameter;
+            fit.normal[(k, k)] += prior.weight;
+            fit.right[k] += (prior.value - current[k]) * prior.weight;
+        }
+        let size = 2 * fit.right.len();
         Some(Linearised::Normal {
             curvature: DMatrix::from_fn(size, size, |i, k| {
-                let entry = state.normal[(i / 2, k / 2)];
+                let entry = fit.normal[(i / 2, k / 2)];
                 match (i % 2, k % 2) {
                     (0, 1) => -entry.im,
                     (1, 0) => entry.im,
@@ -327,9 +435,104 @@ impl Problem for ExponentialFit<'_> {
                 }
             }),
             gradient: DVector::from_fn(size, |i, _| {
-                let entry = state.right[i / 2];
+                let entry = fit.right[i / 2];
                 -if i % 2 == 0 { entry.re } else { entry.im }
             }),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mode that drifts, and a line beside it.
+    fn model() -> Exponentials {
+        Exponentials {
+            amplitude: Complex64::new(0.8, -0.3),
+            exponents: vec![Complex64::new(-3.0, 2.0), Complex64::new(0.1, 0.4)],
+            rate: 1.5,
+            others: vec![(Complex64::new(0.1, 0.2), Complex64::new(-2.0, 40.0))],
+        }
+    }
+
+    const TIMES: Times = Times {
+        first: -0.05,
+        step: 0.01,
+        count: 100,
+    };
+
+    fn values(model: &Exponentials) -> Vec<Complex64> {
+        let times = (0..TIMES.count).map(|n| TIMES.at(n));
+        times
+            .map(|t| {
+                let others = model.others.iter().map(|(c, p)| c * (p * t).exp());
+                model.amplitude * model.exponent(t).exp() + others.sum::<Complex64>()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn prop_exponentials_are_those_of_every_time() {
+        let pole = Complex64::new(-3.0, 250.0);
+        for (n, value) in TIMES.exponentials(pole).iter().enumerate() {
+            let exact = (pole * TIMES.at(n)).exp();
+            assert!((value / exact - 1.0).norm() < 1e-14, "{n}");
+        }
+    }
+
+    #[test]
+    fn prop_the_gradient_is_the_difference_of_the_cost() {
+        let exact = values(&model());
+        let mut start = model();
+        start.amplitude *= 1.1;
+        start.others[0].1 += Complex64::new(0.5, 1.0);
+        let problem = ExponentialFit {
+            times: TIMES,
+            values: &exact,
+            drifts: (0..TIMES.count)
+                .map(|n| 1.0 - (-1.5 * TIMES.at(n)).exp())
+                .collect(),
+            terms: start.clone(),
+            priors: &[Prior {
+                parameter: 4,
+                value: Complex64::new(-2.0, 41.0),
+                weight: 0.1,
+            }],
+        };
+        let parameters = start.parameters();
+        let parameters: Vec<f64> = parameters.iter().flat_map(|x| [x.re, x.im]).collect();
+        let mut state = problem.evaluate(&parameters, None).unwrap();
+        let Some(Linearised::Normal { gradient, .. }) = problem.linearise(&parameters, &mut state)
+        else {
+            panic!("normal equations");
+        };
+        let step = 1e-6;
+        for k in 0..parameters.len() {
+            let [above, below] = [step, -step].map(|by| {
+                let mut moved = parameters.clone();
+                moved[k] += by;
+                problem.cost(&problem.evaluate(&moved, None).unwrap())
+            });
+            // Rounding of the costs over the step.
+            let slope = (above - below) / (2.0 * step);
+            assert!(
+                (slope - gradient[k]).abs() < 1e-7,
+                "{k}: {slope}, {}",
+                gradient[k]
+            );
+        }
+    }
+
+    #[test]
+    fn recover_a_mode_that_drifts_beside_a_line() {
+        let mut start = model();
+        start.exponents[0] += Complex64::new(0.3, -0.2);
+        start.exponents[1] = Complex64::ZERO;
+        let fit = fit_exponentials(TIMES, &values(&model()), start, &[]).unwrap();
+        let found = fit.model.parameters();
+        for (found, exact) in found.iter().zip(model().parameters()) {
+            assert!((found - exact).norm() < 1e-6, "{found} {exact}");
+        }
     }
 }

@@ -42,6 +42,8 @@ pub(super) struct FollowedMode {
     points: Vec<AmplitudePoint>,
     companions: Vec<Companion>,
     doubts: Vec<AmplitudeVerdict>,
+    /// True where the decays show that the mode's frequency or damping changes.
+    pub drifts: bool,
 }
 
 impl FollowedMode {
@@ -67,6 +69,7 @@ impl FollowedMode {
             points: Vec::new(),
             companions: Vec::new(),
             doubts: Vec::new(),
+            drifts: false,
         };
         for band in bands {
             let Some(series) = band::combine(&band, sensor) else {
@@ -88,12 +91,9 @@ impl FollowedMode {
             followed.doubts.extend(model.doubt(&band));
             followed.decays.push((band, model));
         }
+        let whole = WholeDecays::new(&followed.decays, &followed.mode);
+        followed.drifts = whole.is_some_and(|whole| whole.changes());
         Some(followed)
-    }
-
-    /// Returns true where the decays show that the mode's frequency or damping changes.
-    pub fn drifts(&self) -> bool {
-        WholeDecays::new(&self.decays, &self.mode).is_some_and(|whole| whole.changes())
     }
 
     /// Returns true where another mode lies in the band of this one, and is not one with it.
@@ -114,7 +114,7 @@ impl FollowedMode {
     /// Damping ratio that the models of a mode that drifts have, where it differs from the listed one. A pole that does not
     /// change takes the change of the frequency for damping.
     pub fn other_damping(&self) -> Option<f64> {
-        if !self.drifts() {
+        if !self.drifts {
             return None;
         }
         let decays = self.decays.iter();

@@ -213,7 +213,7 @@ pub fn follow_amplitude(
         let again = followed.par_iter().flatten().filter_map(|mode| {
             let neighbours = followed.iter().flatten();
             let neighbours: Vec<&FollowedMode> = neighbours
-                .filter(|other| other.drifts() && mode.is_disturbed_by(other))
+                .filter(|other| other.drifts && mode.is_disturbed_by(other))
                 .collect();
             let taken: Vec<usize> = neighbours.iter().map(|other| other.index).collect();
             let has_changed = !taken.is_empty() || dampings[mode.index].is_some();
@@ -231,7 +231,7 @@ pub fn follow_amplitude(
     }
     let drifting = followed.iter().flatten().filter(|mode| {
         let mut others = followed.iter().flatten();
-        mode.drifts() && others.all(|other| other.index == mode.index || other.is_apart_from(mode))
+        mode.drifts && others.all(|other| other.index == mode.index || other.is_apart_from(mode))
     });
     let drifting: Vec<&FollowedMode> = drifting.collect();
     let curves = followed.iter().map(|mode| match mode {

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::band::Band;
 use super::decay::DecayModel;
-use super::exponentials::{Exponentials, Prior, fit_exponentials};
+use super::exponentials::{Exponentials, Prior, Times, fit_exponentials};
 use super::{AIM, AmplitudePoint, END, LONGEST, SHORTEST};
 
 /// Fewest values of a segment: 24 real numbers against four unknowns.
@@ -165,7 +165,12 @@ fn fit_segment(
         rate: model.exponentials.rate,
         others,
     };
-    let fit = fit_exponentials(&local, &straight, start, &priors)?;
+    let equal = Times {
+        first: local[0],
+        step: (local[local.len() - 1] - local[0]) / (local.len() - 1) as f64,
+        count: local.len(),
+    };
+    let fit = fit_exponentials(equal, &straight, start, &priors)?;
     let pairs = fit.residuals.windows(2);
     Some(Segment {
         time: reference,

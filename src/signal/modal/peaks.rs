@@ -140,20 +140,21 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
         if !is_maximum || is_drift {
             continue;
         }
-        let peak = Peak {
-            index,
-            prominence_db: prominence(db, index),
-            above_noise_db: (level.noise_db.as_ref()).map(|noise| db[index] - noise[index]),
-        };
-        let least = match peak.above_noise_db {
+        let above_noise_db = (level.noise_db.as_ref()).map(|noise| db[index] - noise[index]);
+        let least = match above_noise_db {
             // Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB; six times that is out of its
             // reach on any line.
             Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
             None => settings.blind_prominence_db,
         };
-        if peak.prominence_db.is_nan() || peak.prominence_db < least {
+        let Some(prominence_db) = prominence(db, index, least) else {
             continue;
-        }
+        };
+        let peak = Peak {
+            index,
+            prominence_db,
+            above_noise_db,
+        };
         // Where no noise is known, the height is that over the median of the surroundings: 25 lines or a tenth of
         // the position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
         let height = peak.above_noise_db.unwrap_or_else(|| {
@@ -180,32 +181,58 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
     kept
 }
 
-/// Returns the height over the higher of the two lowest points between the peak and the next higher ground. A
-/// side that meets the end of the axis before higher ground says nothing: the band just ends there,
-/// perhaps on the flank. The highest peak of all stands over the lower of its two sides.
-fn prominence(level: &[f64], index: usize) -> f64 {
+/// Returns the height over the higher of the two lowest points between the peak and the next higher ground; `None` where
+/// that is less than `least`. A side that meets the end of the axis before higher ground says nothing: the band just ends
+/// there, perhaps on the flank. The highest peak of all stands over the lower of its two sides.
+fn prominence(level: &[f64], index: usize, least: f64) -> Option<f64> {
     let height = level[index];
-    let (left, left_ends) = valley(level[..index].iter().rev(), height);
-    let (right, right_ends) = valley(level[index + 1..].iter(), height);
-    height
-        - match (left_ends, right_ends) {
-            (true, false) => right,
-            (false, true) => left,
-            (true, true) => left.min(right),
-            (false, false) => left.max(right),
+    let [mut left, mut right] = [Valley::Open(height); 2];
+    let mut distance = 1;
+    // Both sides at once: the nearer higher ground decides about most peaks.
+    let prominence = loop {
+        left.widen(
+            index.checked_sub(distance).map(|place| level[place]),
+            height,
+        );
+        right.widen(level.get(index + distance).copied(), height);
+        distance += 1;
+        match (left, right) {
+            (Valley::Closed(low), _) | (_, Valley::Closed(low)) if height - low < least => {
+                return None;
+            }
+            (Valley::Closed(left), Valley::Closed(right)) => break height - left.max(right),
+            (Valley::Ended(left), Valley::Ended(right)) => break height - left.min(right),
+            (Valley::Closed(low), Valley::Ended(_)) | (Valley::Ended(_), Valley::Closed(low)) => {
+                break height - low;
+            }
+            (Valley::Open(_), _) | (_, Valley::Open(_)) => {}
         }
+    };
+    (prominence >= least).then_some(prominence)
 }
 
-/// Returns the lowest point before higher ground, and true where the axis ended before there was any.
-fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
-    let mut lowest = height;
-    for &level in side {
-        if level > height {
-            return (lowest, false);
+/// The lowest level on one side of a peak.
+#[derive(Clone, Copy)]
+enum Valley {
+    /// Higher ground may still come.
+    Open(f64),
+    /// Up to higher ground.
+    Closed(f64),
+    /// Up to the end of the axis.
+    Ended(f64),
+}
+
+impl Valley {
+    /// Takes the next level, if there is one; `height` is the peak's.
+    fn widen(&mut self, next: Option<f64>, height: f64) {
+        if let Valley::Open(low) = *self {
+            *self = match next {
+                None => Valley::Ended(low),
+                Some(level) if level > height => Valley::Closed(low),
+                Some(level) => Valley::Open(low.min(level)),
+            };
         }
-        lowest = lowest.min(level);
     }
-    (lowest, true)
 }
 
 #[cfg(test)]

@@ -67,6 +67,8 @@ pub(super) struct DecayModel {
     last: f64,
     /// Largest modulus of the values.
     largest: f64,
+    /// True where a model could be fitted.
+    is_fitted: bool,
     /// The models with what the best one found beside the mode, for every number of exponents from its own on.
     ways: Vec<Candidate>,
     /// How much better a pole that drifts explains the decay than one that does not.
@@ -97,18 +99,8 @@ impl Candidate {
 impl DecayModel {
     /// Fits models to a whole decay, and takes the best of them.
     pub fn fit(series: &[Complex64], band: &Band) -> Self {
-        let noise = noise_variance(series, band);
-        // Beyond the last stretch with twice the power of noise the values say nothing.
-        let last = series.chunks(STRETCH).rposition(|stretch| {
-            let power: f64 = stretch.iter().map(Complex64::norm_sqr).sum();
-            power > 2.0 * noise * stretch.len() as f64
-        });
-        let above_noise = (last.unwrap_or(0) + 1) * STRETCH;
-        let whole = WholeDecay {
-            series: &series[..above_noise.max(LEAST_VALUES).min(series.len())],
-            band,
-            noise,
-        };
+        let whole = WholeDecay::new(series, band);
+        let noise = whole.noise;
         let largest = series.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
         let start = Exponentials {
             amplitude: series.first().copied().unwrap_or(Complex64::ONE),
@@ -151,7 +143,8 @@ impl DecayModel {
                 last: whole.last(),
                 largest,
                 noise: noise.min(best.fit.squares / whole.series.len() as f64),
-                ways: whole.with_more_exponents(&best),
+                is_fitted: true,
+                ways: Vec::new(),
                 evidence: whole.evidence(&best.fit.model),
                 exponentials: best.fit.model,
             },
@@ -160,9 +153,18 @@ impl DecayModel {
                 largest,
                 exponentials: start,
                 noise,
+                is_fitted: false,
                 ways: Vec::new(),
                 evidence: Evidence::default(),
             },
+        }
+    }
+
+    /// Fits the models from which [`frequency_at`](Self::frequency_at) takes its mean. `series` and `band` are those of
+    /// the fit.
+    pub fn add_ways(&mut self, series: &[Complex64], band: &Band) {
+        if self.is_fitted {
+            self.ways = WholeDecay::new(series, band).with_more_exponents(&self.exponentials);
         }
     }
 
@@ -234,7 +236,22 @@ struct WholeDecay<'a> {
     noise: f64,
 }
 
-impl WholeDecay<'_> {
+impl<'a> WholeDecay<'a> {
+    fn new(series: &'a [Complex64], band: &'a Band) -> Self {
+        let noise = noise_variance(series, band);
+        // Beyond the last stretch with twice the power of noise the values say nothing.
+        let last = series.chunks(STRETCH).rposition(|stretch| {
+            let power: f64 = stretch.iter().map(Complex64::norm_sqr).sum();
+            power > 2.0 * noise * stretch.len() as f64
+        });
+        let above_noise = (last.unwrap_or(0) + 1) * STRETCH;
+        WholeDecay {
+            series: &series[..above_noise.max(LEAST_VALUES).min(series.len())],
+            band,
+            noise,
+        }
+    }
+
     /// Times of the values.
     fn times(&self) -> Times {
         Times {
@@ -277,12 +294,11 @@ impl WholeDecay<'_> {
 
     /// Fits the model again with its own number of exponents and with every larger one, from three on. The criterion may
     /// not see a change linear in the amplitude that the interval must hold.
-    fn with_more_exponents(&self, best: &Candidate) -> Vec<Candidate> {
-        let own = best.fit.model.exponents.len().max(LINEAR_DRIFT);
+    fn with_more_exponents(&self, best: &Exponentials) -> Vec<Candidate> {
+        let own = best.exponents.len().max(LINEAR_DRIFT);
         let mut all: Vec<Candidate> = Vec::new();
         for degree in DEGREES.into_iter().filter(|degree| *degree >= own) {
-            let start = all.last().unwrap_or(best);
-            let mut model = start.fit.model.clone();
+            let mut model = all.last().map_or(best, |fewer| &fewer.fit.model).clone();
             model.exponents.resize(degree, Complex64::ZERO);
             all.extend(self.fit(model));
         }
@@ -450,7 +466,7 @@ impl DecayModel {
     }
 
     /// Returns the frequency (Hz) at an amplitude (unit of the sensor) and its standard uncertainty, as the mean over
-    /// the models; `None` where the decay does not reach that amplitude.
+    /// the models that were added; `None` where the decay does not reach that amplitude.
     pub fn frequency_at(&self, amplitude: f64, band: &Band) -> Option<(f64, f64)> {
         let akaike = |way: &Candidate| {
             let values = 2.0 * way.fit.residuals.len() as f64;

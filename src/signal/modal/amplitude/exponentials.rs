@@ -477,7 +477,8 @@ mod tests {
         let pole = Complex64::new(-3.0, 250.0);
         for (n, value) in TIMES.exponentials(pole).iter().enumerate() {
             let exact = (pole * TIMES.at(n)).exp();
-            assert!((value / exact - 1.0).norm() < 1e-14, "{n}");
+            // Sixteen roundings, and that of an exponent of 250.
+            assert!((value / exact - 1.0).norm() < 1e-13, "{n}");
         }
     }
 

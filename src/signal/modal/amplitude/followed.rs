@@ -71,6 +71,7 @@ impl FollowedMode {
             doubts: Vec::new(),
             drifts: false,
         };
+        let mut all_series = Vec::new();
         for band in bands {
             let Some(series) = band::combine(&band, sensor) else {
                 continue;
@@ -90,9 +91,16 @@ impl FollowedMode {
             followed.points.extend(points);
             followed.doubts.extend(model.doubt(&band));
             followed.decays.push((band, model));
+            all_series.push(series);
         }
         let whole = WholeDecays::new(&followed.decays, &followed.mode);
         followed.drifts = whole.is_some_and(|whole| whole.changes());
+        // A mode that does not change has its frequency at every amplitude.
+        if followed.drifts {
+            for ((band, model), series) in followed.decays.iter_mut().zip(&all_series) {
+                model.add_ways(series, band);
+            }
+        }
         Some(followed)
     }
 

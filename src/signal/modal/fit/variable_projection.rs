@@ -72,8 +72,8 @@ impl Lines {
         self.positions.len()
     }
 
-    /// Returns phi and d phi/dq.
-    fn value(&self, pole: Complex64, line: f64) -> [Complex64; 2] {
+    /// Returns phi and d phi/dq. `grown` is e^x - 1 with the real part x of kappa q, the same on every line.
+    fn value(&self, pole: Complex64, grown: f64, line: f64) -> [Complex64; 2] {
         let distance = pole - Complex64::new(0.0, line);
         match self.kappa {
             // phi = kappa/(1 - e^u), d phi/dq = e^u phi^2, u = kappa (q - j m).
@@ -82,7 +82,6 @@ impl Lines {
                 // (e^x - 1) cos y - 2 sin^2(y/2) + j e^x sin y.
                 let u = kappa * distance;
                 let (half_sin, half_cos) = (0.5 * u.im).sin_cos();
-                let grown = u.re.exp_m1();
                 let versine = 2.0 * half_sin * half_sin;
                 let less_one = Complex64::new(
                     grown * (1.0 - versine) - versine,
@@ -121,9 +120,10 @@ impl Lines {
         let count = self.count();
         let mut columns = DMatrix::zeros(2 * count, 2 * poles.len());
         for (place, &pole) in poles.iter().enumerate() {
+            let grown = self.kappa.map_or(0.0, |kappa| (kappa * pole.re).exp_m1());
             for (line, &m) in self.positions.iter().enumerate() {
-                let own = self.value(pole, m)[derivative];
-                let image = self.value(pole.conj(), m)[derivative];
+                let own = self.value(pole, grown, m)[derivative];
+                let image = self.value(pole.conj(), grown, m)[derivative];
                 let sum = own + image;
                 let turned = Complex64::i() * (own - image);
                 columns[(line, 2 * place)] = sum.re;

@@ -41,6 +41,7 @@ use super::{CompositeLevel, PeakSettings, find_peaks, noise_of_function};
 use crate::spectral::{DISPLAY_RATIO, Lines};
 
 pub use selection::{PolyreferenceMode, select_modes};
+use stabilisation::{Circles, stabilise_on};
 pub use stabilisation::{PoleStability, StabilisationPole, stabilise_poles};
 
 /// Reason why a polyreference fit is impossible.
@@ -448,7 +449,8 @@ pub fn find_modes(
         high: ends.1,
         core: ends,
     };
-    let mut searches = vec![search(matrix, whole_band, settings)?];
+    let mut circles = Circles::new();
+    let mut searches = vec![search(&mut circles, matrix, whole_band, settings)?];
     let mut bands = sub_bands(matrix, settings.peaks);
     let about_peaks = bands.len();
     // Of functions every entry has its own peaks, and a narrow band without any finds little but noise.
@@ -456,7 +458,7 @@ pub fn find_modes(
         bands.extend(bands_between(matrix, &bands));
     }
     for (index, band) in bands.into_iter().enumerate() {
-        let mut part = search(matrix, band, settings)?;
+        let mut part = search(&mut circles, matrix, band, settings)?;
         // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
         // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds
         // noise. Otherwise the sub-band decides, except on modes too wide for it.
@@ -503,6 +505,7 @@ const LINES_PER_ORDER: usize = 5;
 const WIDEST_SHARE: f64 = 0.125;
 
 fn search(
+    circles: &mut Circles,
     matrix: &ResponseMatrix,
     band: SubBand,
     settings: &PolyreferenceSettings,
@@ -517,7 +520,7 @@ fn search(
     let order = orders.find(|&order| least_lines(&part, order) <= points);
     let order = order.unwrap_or(settings.order);
     let settings = PolyreferenceSettings { order, ..*settings };
-    let diagram = stabilise_poles(&part, &settings)?;
+    let diagram = stabilise_on(circles, &part, &settings)?;
     let mut modes = select_modes(&part, &diagram, &settings);
     modes.retain(|mode| band.core_holds(mode));
     Ok(BandSearch {

@@ -18,10 +18,11 @@
 //! `roots` finds the roots of the matrix polynomial A that decay.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, ComplexField, DMatrix, Dyn};
 use num_complex::Complex64;
-use rustfft::FftPlanner;
+use rustfft::{Fft, FftPlanner};
 
 use super::roots::decaying_roots;
 use super::{
@@ -75,6 +76,15 @@ pub fn stabilise_poles(
     matrix: &ResponseMatrix,
     settings: &PolyreferenceSettings,
 ) -> Result<Vec<StabilisationPole>, PolyreferenceError> {
+    stabilise_on(&mut Circles::new(), matrix, settings)
+}
+
+/// As [`stabilise_poles`], with what bands of the same number of lines share.
+pub(super) fn stabilise_on(
+    circles: &mut Circles,
+    matrix: &ResponseMatrix,
+    settings: &PolyreferenceSettings,
+) -> Result<Vec<StabilisationPole>, PolyreferenceError> {
     // Each column of unknowns meets outputs times lines equations.
     let least = least_lines(matrix, settings.order);
     if matrix.points() < least || settings.order == 0 {
@@ -84,10 +94,12 @@ pub fn stabilise_poles(
             least,
         });
     }
-    let map = CircleMap::new(matrix);
     let (low, high) = matrix.ends();
     let singular = PolyreferenceError::Singular { low, high };
-    let denominators = Denominators::new(matrix, settings.order).ok_or(singular)?;
+    let circle = circles.on(matrix.points(), settings.order);
+    let circle = circle.ok_or(singular.clone())?;
+    let map = CircleMap::new(matrix, circle);
+    let denominators = Denominators::new(matrix, circle, settings.order).ok_or(singular)?;
     let mut diagram: Vec<StabilisationPole> = Vec::new();
     let mut before: Vec<StabilisationPole> = Vec::new();
     let mut roots: Vec<Complex64> = Vec::new();
@@ -234,11 +246,11 @@ struct CircleMap {
 }
 
 impl CircleMap {
-    fn new(matrix: &ResponseMatrix) -> Self {
+    fn new(matrix: &ResponseMatrix, circle: &Circle) -> Self {
         let (low, high) = matrix.ends();
         CircleMap {
             middle: 0.5 * (low + high),
-            time: 1.0 / (transform_length(matrix) as f64 * matrix.spacing),
+            time: 1.0 / (circle.transform.len() as f64 * matrix.spacing),
         }
     }
 
@@ -253,11 +265,6 @@ impl CircleMap {
     }
 }
 
-/// Steps of the whole circle: the lines are its share, and the transforms are fast.
-fn transform_length(matrix: &ResponseMatrix) -> usize {
-    smallest_smooth_block((matrix.points() as f64 / SHARE_OF_CIRCLE).ceil() as usize)
-}
-
 /// Denominator coefficients of every order, from one factorisation.
 struct Denominators {
     inputs: usize,
@@ -269,9 +276,9 @@ struct Denominators {
 
 impl Denominators {
     /// `None` where the responses are all zero or the equations cannot be solved.
-    fn new(matrix: &ResponseMatrix, order: usize) -> Option<Self> {
+    fn new(matrix: &ResponseMatrix, circle: &mut Circle, order: usize) -> Option<Self> {
         let inputs = matrix.inputs;
-        let reduced = reduced_matrix(matrix, order)?;
+        let reduced = reduced_matrix(matrix, circle, order)?;
         let unknowns = order * inputs;
         let block = reduced.view((inputs, inputs), (unknowns, unknowns));
         let factor = factorise(&block.into_owned())?.unpack();
@@ -314,18 +321,14 @@ fn factorise<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> Option<Ch
 }
 
 /// Returns the lower triangle of M for the highest order, unknown (power j, input i) at j * inputs + i.
-fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Complex64>> {
+fn reduced_matrix(
+    matrix: &ResponseMatrix,
+    circle: &mut Circle,
+    order: usize,
+) -> Option<DMatrix<Complex64>> {
     let inputs = matrix.inputs;
     let columns = (order + 1) * inputs;
-    let powers = order + 1 + 2 * EXTRA_POWERS;
-    let mut sums = Sums::new(matrix, powers - 1);
-    // The lines lie about z = 1: R is real, a Toeplitz matrix of sum_k z_k^lag = sin(K x)/sin(x), x = lag step/2.
-    let (points, half_step) = (matrix.points() as f64, PI / transform_length(matrix) as f64);
-    let numerator = DMatrix::from_fn(powers, powers, |j, k| match j.abs_diff(k) {
-        0 => points,
-        lag => (points * lag as f64 * half_step).sin() / (lag as f64 * half_step).sin(),
-    });
-    let numerator = factorise(&numerator)?.unpack();
+    let powers = circle.powers();
     let mut reduced = DMatrix::zeros(columns, columns);
     // Y = L^{-1} S, so that Y^H Y is S^H R^{-1} S, of all outputs: its real part, and Re(Y)' Im(Y).
     let mut real = DMatrix::zeros(columns, columns);
@@ -335,7 +338,7 @@ fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Compl
         // T of this output.
         for (i, left) in row.iter().enumerate() {
             for (k, right) in row.iter().enumerate() {
-                let lags = sums.at(matrix.points(), |line| left[line].conj() * right[line]);
+                let lags = circle.sums(|line| left[line].conj() * right[line]);
                 for q in 0..=order {
                     for p in q..=order {
                         let entry = lags[powers - 1 + q - p];
@@ -347,7 +350,7 @@ fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Compl
         let [mut mixed_real, mut mixed_imaginary] =
             [(); 2].map(|()| DMatrix::zeros(powers, columns));
         for (input, entry) in row.iter().enumerate() {
-            let lags = sums.at(matrix.points(), |line| entry[line]);
+            let lags = circle.sums(|line| entry[line]);
             for power in 0..=order {
                 // Row j stands for the numerator's power j - e.
                 let lags = &lags[power + EXTRA_POWERS..][..powers];
@@ -358,6 +361,7 @@ fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Compl
             }
         }
         for mixed in [&mut mixed_real, &mut mixed_imaginary] {
+            let numerator = &circle.numerator;
             numerator.solve_lower_triangular_mut(mixed).then_some(())?;
         }
         let turned = mixed_real.transpose();
@@ -374,34 +378,86 @@ fn reduced_matrix(matrix: &ResponseMatrix, order: usize) -> Option<DMatrix<Compl
     Some(reduced)
 }
 
-/// Sums over the lines of x_k z_k^lag, for all lags up to the largest, each as one inverse transform.
-struct Sums {
-    transform: std::sync::Arc<dyn rustfft::Fft<f64>>,
+/// What follows from the number of lines and the order alone: bands between the peaks share it.
+pub(super) struct Circle {
+    points: usize,
+    transform: Arc<dyn Fft<f64>>,
     scratch: Vec<Complex64>,
-    /// z^lag of the first line, from 0 on.
+    /// z^lag of the first line, for all lags from 0 on.
     first: Vec<Complex64>,
+    /// Cholesky factor of R.
+    numerator: DMatrix<f64>,
 }
 
-impl Sums {
-    fn new(matrix: &ResponseMatrix, largest: usize) -> Self {
-        let length = transform_length(matrix);
-        let transform = FftPlanner::new().plan_fft_inverse(length);
-        let scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
-        let angle = -0.5 * matrix.points().saturating_sub(1) as f64 * TAU / length as f64;
-        let lags = 0..=largest;
-        Sums {
-            transform,
-            scratch,
-            first: lags
-                .map(|lag| Complex64::from_polar(1.0, angle * lag as f64))
-                .collect(),
+/// The circles in use, and the plans of their transforms.
+pub(super) struct Circles {
+    all: Vec<Circle>,
+    plans: FftPlanner<f64>,
+}
+
+impl Circles {
+    pub(super) fn new() -> Self {
+        Circles {
+            all: Vec::new(),
+            plans: FftPlanner::new(),
         }
     }
 
-    /// Returns the sums from minus the largest lag to the largest.
-    fn at(&mut self, points: usize, value: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
+    /// Returns that of a band; `None` where its equations cannot be solved.
+    fn on(&mut self, points: usize, order: usize) -> Option<&mut Circle> {
+        let powers = order + 1 + 2 * EXTRA_POWERS;
+        let mut known = self.all.iter();
+        let known = known.position(|one| one.points == points && one.powers() == powers);
+        let place = match known {
+            Some(place) => place,
+            None => {
+                self.all.push(Circle::new(points, powers, &mut self.plans)?);
+                self.all.len() - 1
+            }
+        };
+        self.all.get_mut(place)
+    }
+}
+
+impl Circle {
+    fn new(points: usize, powers: usize, plans: &mut FftPlanner<f64>) -> Option<Self> {
+        // Steps of the whole circle.
+        let length = smallest_smooth_block((points as f64 / SHARE_OF_CIRCLE).ceil() as usize);
+        let transform = plans.plan_fft_inverse(length);
+        let half_step = PI / length as f64;
+        let first = (0..powers).map(|lag| {
+            let angle = points.saturating_sub(1) as f64 * lag as f64 * half_step;
+            Complex64::from_polar(1.0, -angle)
+        });
+        // The lines lie about z = 1, so that R is real: sum_k z_k^lag = sin(K x)/sin(x) with x = lag step/2.
+        let lags = (0..powers).map(|lag| match lag {
+            0 => points as f64,
+            _ => {
+                let x = lag as f64 * half_step;
+                (points as f64 * x).sin() / x.sin()
+            }
+        });
+        let lags: Vec<f64> = lags.collect();
+        let numerator = DMatrix::from_fn(powers, powers, |j, k| lags[j.abs_diff(k)]);
+        Some(Circle {
+            points,
+            first: first.collect(),
+            scratch: vec![Complex64::ZERO; transform.get_inplace_scratch_len()],
+            transform,
+            numerator: factorise(&numerator)?.unpack(),
+        })
+    }
+
+    /// Number of powers of the numerator.
+    fn powers(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Returns the sums over the lines of x_k z_k^lag, from minus the largest lag to the largest, as one inverse
+    /// transform.
+    fn sums(&mut self, value: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
         let mut buffer = vec![Complex64::ZERO; self.transform.len()];
-        for (line, place) in buffer[..points].iter_mut().enumerate() {
+        for (line, place) in buffer[..self.points].iter_mut().enumerate() {
             *place = value(line);
         }
         self.transform
@@ -409,11 +465,8 @@ impl Sums {
         // Negative lags stand at the end of a transform.
         let negative = (1..self.first.len()).rev();
         let negative = negative.map(|lag| self.first[lag].conj() * buffer[buffer.len() - lag]);
-        let positive = self
-            .first
-            .iter()
-            .zip(&buffer)
-            .map(|(first, sum)| first * sum);
+        let positive = self.first.iter().zip(&buffer);
+        let positive = positive.map(|(first, sum)| first * sum);
         negative.chain(positive).collect()
     }
 }

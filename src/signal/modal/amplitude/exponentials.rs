@@ -1,5 +1,6 @@
 //! A mode whose pole drifts, and lines beside it: a sum of exponentials, and its fit by least squares.
 
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
@@ -73,14 +74,16 @@ impl Exponentials {
     pub fn time_at(&self, amplitude: f64, last: f64, band: &Band) -> Option<f64> {
         const PARTS: usize = 200;
         let first = -0.5 * band.filter;
-        let above = |t: f64| self.log_amplitude(t, band) - amplitude.ln();
+        let excess = |t: f64| self.log_amplitude(t, band) - amplitude.ln();
         let time = |part: usize| first + (last - first) * part as f64 / PARTS as f64;
-        let part =
-            (0..=PARTS).find(|part| above(time(*part)).is_nan() || above(time(*part)) <= 0.0)?;
+        let part = (0..=PARTS).find(|part| {
+            let order = excess(time(*part)).partial_cmp(&0.0);
+            order != Some(Ordering::Greater)
+        })?;
         let (mut early, mut late) = (time(part.checked_sub(1)?), time(part));
         let mut t = late;
         for _ in 0..50 {
-            let excess = above(t);
+            let excess = excess(t);
             match excess > 0.0 {
                 true => early = t,
                 false => late = t,

@@ -3,10 +3,13 @@
 //! A pole decays where its inverse root w lies outside the unit circle. Most roots lie within: the constraint A_0 = I
 //! puts the surplus ones there. For one input the denominator is a scalar polynomial, and the test of Schur and Cohn
 //! counts the roots outside in n^2/2 operations (Henrici 1974, section 6.8). Where the order before had as many, the
-//! simultaneous iteration of Aberth and Ehrlich refines those alone (Aberth 1973, Bini 1996).
+//! simultaneous iteration of Aberth and Ehrlich refines those alone (Aberth 1973, Bini 1996). A root that appears is
+//! looked for about the circle.
 //!
-//! The eigenvalues of a companion matrix cost n^3 operations. They serve matrix polynomials, and orders at which a root
-//! appears.
+//! The eigenvalues of a companion matrix cost n^3 operations. They serve matrix polynomials, and orders at which fewer
+//! roots are found than counted.
+
+use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -30,17 +33,68 @@ pub(super) fn decaying_roots(
         if count == 0 {
             return Vec::new();
         }
+        let coefficients = coefficients.as_slice();
+        let mut roots = refined_roots(coefficients, before).unwrap_or_default();
+        // A root that appears at this order has no start among those before.
+        while roots.len() < count
+            && let Some(more) = with_one_more(coefficients, &roots)
+        {
+            roots = more;
+        }
         // Distinct roots, as many as there are, are all of them.
-        if let Some(mut roots) = refined_roots(coefficients.as_slice(), before) {
-            roots.retain(|root| root.norm_sqr() > 1.0);
-            if roots.len() == count {
-                return roots;
-            }
+        if roots.len() == count {
+            return roots;
         }
     }
     let mut roots = companion_roots(coefficients);
     roots.retain(|root| root.norm_sqr() > 1.0);
     roots
+}
+
+/// Points about the unit circle at which a root is looked for. 128: three for each root of the highest order.
+const POINTS: usize = 128;
+/// Their distance from the origin: a root that appears lies just outside the unit circle.
+const POINTS_AT: f64 = 1.03;
+/// Most points from which the iteration is tried.
+const MOST_TRIES: usize = 8;
+
+/// Returns the `known` roots outside the unit circle with one more; `None` where none is found.
+///
+/// The iteration begins at the points with the shortest steps p/(p' - p S).
+fn with_one_more(coefficients: &[Complex64], known: &[Complex64]) -> Option<Vec<Complex64>> {
+    let angles = (0..POINTS).map(|k| k as f64 * TAU / POINTS as f64);
+    let points: Vec<Complex64> = angles
+        .map(|angle| Complex64::from_polar(POINTS_AT, angle))
+        .collect();
+    let (mut values, mut slopes) = (vec![Complex64::ONE; POINTS], vec![Complex64::ZERO; POINTS]);
+    for a in coefficients {
+        for ((value, slope), point) in values.iter_mut().zip(&mut slopes).zip(&points) {
+            *slope = *slope * point + *value;
+            *value = *value * point + a;
+        }
+    }
+    let all = points.iter().zip(values).zip(slopes);
+    let lengths: Vec<f64> = all
+        .map(|((point, value), slope)| {
+            let inverses: Complex64 = known.iter().map(|root| (point - root).inv()).sum();
+            (value / (slope - value * inverses)).norm_sqr()
+        })
+        .collect();
+    let mut starts: Vec<usize> = (0..POINTS)
+        .filter(|&k| {
+            let sides = [
+                lengths[(k + POINTS - 1) % POINTS],
+                lengths[(k + 1) % POINTS],
+            ];
+            sides.iter().all(|side| lengths[k] <= *side)
+        })
+        .collect();
+    starts.sort_by(|a, b| lengths[*a].total_cmp(&lengths[*b]));
+    starts.iter().take(MOST_TRIES).find_map(|&start| {
+        let mut more = known.to_vec();
+        more.push(points[start]);
+        refined_roots(coefficients, &more).filter(|roots| roots.len() > known.len())
+    })
 }
 
 /// Returns the number of roots outside the unit circle of p(w) = w^n + a_1 w^{n-1} + ... + a_n; `None` where rounding
@@ -76,14 +130,14 @@ fn count_outside(coefficients: &[Complex64]) -> Option<usize> {
     )
 }
 
-/// Refines some of the roots of w^n + a_1 w^{n-1} + ... + a_n from the starts `roots`; `None` where they do not converge
-/// to as many.
+/// Refines roots of w^n + a_1 w^{n-1} + ... + a_n, and returns those outside the unit circle; `None` where the starts do
+/// not converge to as many roots.
 ///
 /// A step takes N/(1 - N S) from the root w_i. N = p(w_i)/p'(w_i) is Newton's step, and S = sum over k other than i of
 /// 1/(w_i - w_k) takes the other roots out of p. A root is found where |p| is within the rounding of Horner's scheme, or
 /// where the step is so small that what it leaves, its square at most, is rounding.
-fn refined_roots(coefficients: &[Complex64], before: &[Complex64]) -> Option<Vec<Complex64>> {
-    let mut roots = before.to_vec();
+fn refined_roots(coefficients: &[Complex64], starts: &[Complex64]) -> Option<Vec<Complex64>> {
+    let mut roots = starts.to_vec();
     let mut open: Vec<usize> = (0..roots.len()).collect();
     for _ in 0..MOST_SWEEPS {
         open.retain(|&index| {
@@ -112,6 +166,7 @@ fn refined_roots(coefficients: &[Complex64], before: &[Complex64]) -> Option<Vec
             !(step.norm_sqr() <= SETTLED * SETTLED * nearest)
         });
         if open.is_empty() {
+            roots.retain(|root| root.norm_sqr() > 1.0);
             return Some(roots);
         }
     }
@@ -246,8 +301,6 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
-
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -303,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn prop_both_ways_find_the_roots_outside_of_every_order() {
+    fn prop_all_ways_find_the_roots_outside_of_every_order() {
         let mut random = ChaCha8Rng::seed_from_u64(7);
         for order in 3..=40 {
             let roots = roots_about_the_circle(order, 0.2, &mut random);
@@ -320,7 +373,10 @@ mod tests {
                 [&starts[..], &[]].map(|starts| decaying_roots(&column, starts));
             assert_eq!(found, refined, "{order}");
             assert_eq!(without_start.len(), outside.len(), "{order}");
+            let mut eigenvalues = companion_roots(&column);
+            eigenvalues.retain(|root| root.norm() > 1.0);
             assert!(distance(&found, &without_start) < 1e-9, "{order}");
+            assert!(distance(&found, &eigenvalues) < 1e-9, "{order}");
             assert!(distance(&outside, &found) < 1e-9, "{order}");
         }
     }

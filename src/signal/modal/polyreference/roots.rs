@@ -163,7 +163,8 @@ fn refined_roots(coefficients: &[Complex64], starts: &[Complex64]) -> Option<Vec
             }
             roots[index] = root - step;
             // A step that is no number stays open.
-            !(step.norm_sqr() <= SETTLED * SETTLED * nearest)
+            let is_settled = step.norm_sqr() <= SETTLED * SETTLED * nearest;
+            !is_settled
         });
         if open.is_empty() {
             roots.retain(|root| root.norm_sqr() > 1.0);

@@ -163,11 +163,12 @@ fn participation(coefficients: &DMatrix<Complex64>, inverse_root: Complex64) -> 
         value *= inverse_root;
         value += coefficients.rows(block * inputs, inputs);
     }
-    let svd = value.svd(true, false);
-    let smallest = svd.singular_values.imin();
-    let vector: Vec<Complex64> = svd.u.map_or_else(Vec::new, |u| {
-        u.column(smallest).iter().map(Complex64::conj).collect()
-    });
+    // The left null vector is that of the smallest eigenvalue of A A^H.
+    let eigen = (&value * value.adjoint()).symmetric_eigen();
+    let smallest = eigen.eigenvalues.imin();
+    let vector: Vec<Complex64> = (eigen.eigenvectors.column(smallest).iter())
+        .map(Complex64::conj)
+        .collect();
     // Turned so that the largest entry is real and positive.
     let mut largest = Complex64::ZERO;
     for value in &vector {

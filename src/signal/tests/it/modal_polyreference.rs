@@ -407,3 +407,28 @@ fn limit_what_cannot_be_fitted_is_refused_with_place_and_remedy() {
     let error = ResponseMatrix::new(0.0, 1.0, &[vec![&zero[..]], vec![&line[..]]]).unwrap_err();
     assert!(matches!(error, PolyreferenceError::Shape { output: 2, .. }));
 }
+#[test]
+fn recover_participation_at_every_order() {
+    let modes = [
+        mode(80.0, 0.004, &[1.0, 0.4, -0.7], &[0.8, 0.5]),
+        mode(200.0, 0.003, &[0.9, -0.3, 0.5], &[1.0, 0.3]),
+    ];
+    let responses = accelerances(&modes, 0.25);
+    let diagram = stabilise_poles(&responses.matrix(), &PolyreferenceSettings::default()).unwrap();
+    for truth in &modes {
+        let poles = diagram.iter();
+        let stable = poles.filter(|pole| {
+            pole.stability == PoleStability::All
+                && (pole.frequency / truth.frequency - 1.0).abs() < 1e-6
+        });
+        let exact = truth.inputs[1] / truth.inputs[0];
+        let mut orders = 0;
+        for pole in stable {
+            let ratio = pole.participation[1] / pole.participation[0];
+            // Without noise the poles are right to some 1e-9; a hundred times that.
+            assert!((ratio - exact).norm() < 1e-7, "{pole:?}");
+            orders += 1;
+        }
+        assert!(orders > 15, "{orders} orders");
+    }
+}

@@ -404,7 +404,7 @@ pub(crate) const RESONATOR_ROW: usize = 7;
 /// A symmetric banded matrix. A row has the entries left of the diagonal (nearest last), and the diagonal at the end.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BandedMatrix<const N: usize = BEAM_ROW> {
-    rows: Vec<[f64; N]>,
+    pub(crate) rows: Vec<[f64; N]>,
 }
 
 /// Lower Cholesky factor of a positive definite matrix. The diagonal holds reciprocals.
@@ -543,31 +543,6 @@ impl<const N: usize> BandedMatrix<N> {
             count += usize::from(inverse.is_sign_negative());
         }
         Some(count)
-    }
-}
-
-impl<const N: usize> LdlFactor<N> {
-    const HALF_BAND: usize = N - 1;
-
-    /// Returns the solution x of L D L^T x = b.
-    pub(crate) fn solve(&self, mut x: Vec<f64>) -> Vec<f64> {
-        // D y = L^-1 b: the rows' own entries are those of L D.
-        for row in 0..x.len() {
-            let entries = &self.rows[row];
-            for back in 1..=Self::HALF_BAND.min(row) {
-                x[row] -= entries[Self::HALF_BAND - back] * x[row - back];
-            }
-            x[row] *= entries[Self::HALF_BAND];
-        }
-        for row in (0..x.len()).rev() {
-            let (entries, value) = (&self.rows[row], x[row]);
-            for back in 1..=Self::HALF_BAND.min(row) {
-                x[row - back] -= entries[Self::HALF_BAND - back]
-                    * self.rows[row - back][Self::HALF_BAND]
-                    * value;
-            }
-        }
-        x
     }
 }
 

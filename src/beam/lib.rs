@@ -29,6 +29,7 @@ pub mod width;
 
 mod eigen;
 mod modal_interface;
+mod rayleigh;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::{Assembly, Joint, JointStiffness};

@@ -176,6 +176,8 @@ pub fn reading_evidence(test: Test<'_>, mode: usize) -> Option<f64> {
 fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);
     let first = fit_nominal(&dataset)?;
+    let models = Forward::new(&dataset, &[]).solve(first.parameters())?;
+    dataset.nominal_modes = models.into_iter().map(|one| one.own).collect();
     set_joint_motions(&mut dataset, test.observations, &first);
     set_section_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);

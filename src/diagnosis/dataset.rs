@@ -18,7 +18,9 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use tapjoint_beam::WidthStiffening;
+use tapjoint_beam::specimen::BeamModes;
 use tapjoint_identify::consistent::WIDTH_HOLD_STD;
 use tapjoint_identify::observation::{
     Configuration, DecayVerdict, Observations, Observed, ObservedMode,
@@ -285,6 +287,8 @@ pub struct Dataset {
     pub shape_slopes: Option<DMatrix<f64>>,
     /// Logarithm of the frequency of each mode with a damping ratio over their geometric mean.
     pub tilts: BTreeMap<usize, f64>,
+    /// Modes of each configuration's structure at the nominal optimum: those of other structures are sought from them.
+    pub nominal_modes: Vec<Arc<BeamModes>>,
     /// Peaks of no mode.
     pub peaks: UnpairedPeaks,
 }
@@ -346,6 +350,7 @@ impl Dataset {
             scatter: BTreeMap::new(),
             section: SectionSlopes::default(),
             shape_slopes: None,
+            nominal_modes: Vec::new(),
             tilts: BTreeMap::new(),
             peaks: UnpairedPeaks::new(observations, thresholds),
         };

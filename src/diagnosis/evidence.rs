@@ -107,7 +107,7 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
     for _ in 0..RETURNS {
         let own = found.priors.clone();
         let there = &found.optimum.parameters;
-        let (predicted, _) = forward.predict(there)?;
+        let (predicted, _) = forward.predict(there, None)?;
         let truly = objective_at(&dataset.data, &own, there, &predicted);
         if (truly - found.optimum.objective).abs() < LINEAR_ENOUGH {
             return Some(found);
@@ -468,11 +468,11 @@ mod tests {
     impl Model for TwoParameters {
         type Solution = ();
 
-        fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+        fn predict(&self, parameters: &[f64], _: Option<&()>) -> Option<(Vec<f64>, ())> {
             Some(((self.model)(parameters[0], parameters[1]), ()))
         }
 
-        fn slopes(&self, parameters: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
+        fn slopes(&self, parameters: &[f64], _: &[Prior], _: &()) -> Option<DMatrix<f64>> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
             let here = (self.model)(a, t);
@@ -610,12 +610,12 @@ mod tests {
     impl Model for Placed {
         type Solution = ();
 
-        fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
-            self.0.predict(parameters)
+        fn predict(&self, parameters: &[f64], _: Option<&()>) -> Option<(Vec<f64>, ())> {
+            self.0.predict(parameters, None)
         }
 
-        fn slopes(&self, parameters: &[f64], known: &[Prior], _: ()) -> Option<DMatrix<f64>> {
-            let own = self.0.slopes(parameters, known, ())?;
+        fn slopes(&self, parameters: &[f64], known: &[Prior], _: &()) -> Option<DMatrix<f64>> {
+            let own = self.0.slopes(parameters, known, &())?;
             Some(own.insert_column(2, 1e-5))
         }
     }

@@ -708,7 +708,7 @@ impl CoarseModel {
     }
 
     fn objective(&self, forward: &Forward<'_>, at: &[f64]) -> Option<f64> {
-        let (predicted, _) = forward.predict(at)?;
+        let (predicted, _) = forward.predict(at, None)?;
         let priors = forward.priors();
         Some(objective_at(&self.dataset.data, &priors, at, &predicted))
     }

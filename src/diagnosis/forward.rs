@@ -41,27 +41,28 @@ type SolvedModes = (Arc<BeamModes>, Option<Vec<f64>>);
 impl Model for Forward<'_> {
     type Solution = Solution;
 
-    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
-        self.predict_with(self.solve(parameters)?, parameters)
+    fn predict(&self, parameters: &[f64], near: Option<&Solution>) -> Option<(Vec<f64>, Solution)> {
+        let models = self.solve_by(parameters, |configuration, specimen| {
+            let there = near.map(|near| &near.models[configuration].own);
+            Some((self.modes_of(configuration, specimen, there)?, None))
+        });
+        self.predict_with(models?, parameters)
     }
 
     fn slopes(
         &self,
         parameters: &[f64],
         priors: &[Prior],
-        solution: Solution,
+        solution: &Solution,
     ) -> Option<DMatrix<f64>> {
-        let Solution {
-            models,
-            base,
-            mut slopes,
-        } = solution;
+        let Solution { models, base, .. } = solution;
+        let mut slopes = solution.slopes.clone();
         let near = Some(&models[..]);
-        self.set_joint_slopes(&models, &mut slopes);
+        self.set_joint_slopes(models, &mut slopes);
         if self.layout.has_set_up_error() {
             // Those of shapes at the nominal optimum are those of the described set-up.
             for column in 0..self.layout.joint.len() {
-                let change = self.difference(parameters, column, WIDE_STEP, near, &base)?;
+                let change = self.difference(parameters, column, WIDE_STEP, near, base)?;
                 for (row, observable) in self.observables.iter().enumerate() {
                     if observable.is_shape() {
                         slopes[(row, column)] = change[row];
@@ -72,7 +73,7 @@ impl Model for Forward<'_> {
         for index in 0..self.layout.effects.len() {
             for (column, step) in self.steps(index, parameters) {
                 if !priors[column].is_held() {
-                    let change = self.difference(parameters, column, step, near, &base)?;
+                    let change = self.difference(parameters, column, step, near, base)?;
                     slopes.set_column(column, &change.into());
                 }
             }
@@ -80,7 +81,7 @@ impl Model for Forward<'_> {
         let nuisance = self.dataset.nuisance_index(NuisanceParameter::Amplitude);
         if let Some(k) = nuisance.filter(|_| self.amplitude_effect(parameters).is_some()) {
             let column = self.layout.first_nuisance() + k;
-            if let Some(change) = self.difference(parameters, column, WIDE_STEP, near, &base) {
+            if let Some(change) = self.difference(parameters, column, WIDE_STEP, near, base) {
                 slopes.set_column(column, &change.into());
             }
         }
@@ -206,8 +207,8 @@ impl<'a> Forward<'a> {
 
     /// Returns the modal model of each configuration; equal structures are solved once.
     pub fn solve(&self, parameters: &[f64]) -> Option<Vec<ModalModel>> {
-        self.solve_by(parameters, |_, specimen| {
-            Some((self.modes_of(specimen)?, None))
+        self.solve_by(parameters, |configuration, specimen| {
+            Some((self.modes_of(configuration, specimen, None)?, None))
         })
     }
 
@@ -233,7 +234,8 @@ impl<'a> Forward<'a> {
                 return Some((known.own.clone(), Some(all)));
             }
             let near = known.own.perturbed(specimen).ok()?.map(Arc::new);
-            Some((near.or_else(|| self.modes_of(specimen))?, None))
+            let solved = near.or_else(|| self.modes_of(configuration, specimen, Some(&known.own)));
+            Some((solved?, None))
         })
     }
 
@@ -296,9 +298,21 @@ impl<'a> Forward<'a> {
         }
     }
 
-    fn modes_of(&self, specimen: &Specimen) -> Option<Arc<BeamModes>> {
-        let elements = self.dataset.elements;
-        let found = specimen.beam_modes(self.dataset.modes, Mesh { elements });
+    /// Returns the modes of a configuration's structure, from those of a structure next to it.
+    fn modes_of(
+        &self,
+        configuration: usize,
+        specimen: &Specimen,
+        near: Option<&Arc<BeamModes>>,
+    ) -> Option<Arc<BeamModes>> {
+        let Dataset {
+            elements, modes, ..
+        } = *self.dataset;
+        let mesh = Mesh { elements };
+        let found = match near.or_else(|| self.dataset.nominal_modes.get(configuration)) {
+            Some(near) => specimen.beam_modes_from(near, modes, mesh),
+            None => specimen.beam_modes(modes, mesh),
+        };
         Some(Arc::new(found.ok()?))
     }
 

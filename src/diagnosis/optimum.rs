@@ -16,22 +16,27 @@ pub struct Linearised {
 
 /// Model that predicts at many points and gives slopes, which cost more, at few of them.
 pub trait Model {
-    /// Intermediate results of a prediction, for the slopes at the same point.
+    /// Intermediate results of a prediction, for the slopes at the same point and for predictions next to it.
     type Solution;
-    /// Returns the predictions at a point; `None` where there is no such structure.
-    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Self::Solution)>;
+    /// Returns the predictions at a point; `None` where there is no such structure. `near` is the solution at a point next
+    /// to it, which shortens the way and changes nothing.
+    fn predict(
+        &self,
+        parameters: &[f64],
+        near: Option<&Self::Solution>,
+    ) -> Option<(Vec<f64>, Self::Solution)>;
     /// Returns the slopes at a solved point with respect to all parameters that are not held.
     fn slopes(
         &self,
         parameters: &[f64],
         priors: &[Prior],
-        solution: Self::Solution,
+        solution: &Self::Solution,
     ) -> Option<DMatrix<f64>>;
 
     /// Returns predictions and slopes at a point.
     fn linearise(&self, parameters: &[f64], priors: &[Prior]) -> Option<Linearised> {
-        let (predicted, solution) = self.predict(parameters)?;
-        let slopes = self.slopes(parameters, priors, solution)?;
+        let (predicted, solution) = self.predict(parameters, None)?;
+        let slopes = self.slopes(parameters, priors, &solution)?;
         Some(Linearised { predicted, slopes })
     }
 }
@@ -49,7 +54,7 @@ pub struct LinearModel<'a> {
 impl Model for LinearModel<'_> {
     type Solution = ();
 
-    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+    fn predict(&self, parameters: &[f64], _: Option<&()>) -> Option<(Vec<f64>, ())> {
         let steps = parameters.iter().zip(self.origin);
         let steps = DVector::from_iterator(parameters.len(), steps.map(|(new, old)| new - old));
         let moved = self.slopes * steps;
@@ -57,7 +62,7 @@ impl Model for LinearModel<'_> {
         Some((predicted.map(|(at, by)| at + by).collect(), ()))
     }
 
-    fn slopes(&self, _: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
+    fn slopes(&self, _: &[f64], _: &[Prior], _: &()) -> Option<DMatrix<f64>> {
         Some(self.slopes.clone())
     }
 }
@@ -104,20 +109,20 @@ struct Maximisation<'a, M> {
 struct Point<S> {
     objective: f64,
     predicted: Vec<f64>,
-    /// For the slopes, until they are asked for.
-    solution: Option<S>,
+    solution: S,
     optimum: Option<Optimum>,
 }
 
 impl<M: Model> Problem for Maximisation<'_, M> {
     type State = Point<M::Solution>;
 
-    fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
-        let (predicted, solution) = self.model.predict(parameters)?;
+    fn evaluate(&self, parameters: &[f64], from: Option<&Self::State>) -> Option<Self::State> {
+        let near = from.map(|from| &from.solution);
+        let (predicted, solution) = self.model.predict(parameters, near)?;
         Some(Point {
             objective: objective_at(self.data, self.priors, parameters, &predicted),
             predicted,
-            solution: Some(solution),
+            solution,
             optimum: None,
         })
     }
@@ -131,8 +136,9 @@ impl<M: Model> Problem for Maximisation<'_, M> {
         parameters: &[f64],
         point: &mut Self::State,
     ) -> Option<least_squares::Linearised> {
-        let solution = point.solution.take()?;
-        let slopes = self.model.slopes(parameters, self.priors, solution)?;
+        let slopes = self
+            .model
+            .slopes(parameters, self.priors, &point.solution)?;
         let predicted = std::mem::take(&mut point.predicted);
         let model = Linearised { predicted, slopes };
         let optimum = Optimum::new(self.data, self.priors, parameters.to_vec(), model);

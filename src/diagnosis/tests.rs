@@ -133,7 +133,7 @@ fn worst(dataset: &Dataset, effect: CandidateEffect, share: f64, place: f64) -> 
         let [above, below] = [step, -step].map(|step| {
             let mut moved = here.clone();
             moved[column] += step;
-            forward.predict(&moved).unwrap().0
+            forward.predict(&moved, None).unwrap().0
         });
         let exact = above
             .iter()
@@ -231,7 +231,7 @@ fn limit_the_damping_tilts_slope_is_that_of_predictions() {
     let predicted = |step: f64| {
         let mut moved = at.clone();
         moved[column] += step;
-        forward.predict(&moved).unwrap().0
+        forward.predict(&moved, None).unwrap().0
     };
     let (above, below) = (predicted(1e-4), predicted(-1e-4));
     let mut steepest = 0.0_f64;
@@ -525,7 +525,7 @@ fn limit_slopes_of_shapes_by_properties_are_those_of_new_solutions() {
         let [above, below] = [STEP, -STEP].map(|step| {
             let mut moved = here.clone();
             moved[first + k] += step;
-            forward.predict(&moved).unwrap().0
+            forward.predict(&moved, None).unwrap().0
         });
         for (row, observable) in dataset.observables.iter().enumerate() {
             if observable.is_shape() {

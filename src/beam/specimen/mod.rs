@@ -311,7 +311,7 @@ impl Specimen {
     /// [`StructureError`] where a part cannot exist or lies off the beam, where the axial force
     /// buckles the beam, or the mesh is too coarse for so many modes.
     pub fn modes(&self, count: usize, mesh: Mesh) -> Result<SpecimenModes, StructureError> {
-        SpecimenModes::new(self, count, mesh)
+        SpecimenModes::new(self, count, mesh, None)
     }
 
     /// Returns the lowest `count` modes of the beam, on a fixture that may give and with resonators that move on their own.
@@ -319,7 +319,21 @@ impl Specimen {
     /// # Errors
     /// As [`Specimen::modes`].
     pub fn beam_modes(&self, count: usize, mesh: Mesh) -> Result<BeamModes, StructureError> {
-        BeamModes::new(self, count, mesh)
+        BeamModes::new(self, count, mesh, None)
+    }
+
+    /// Returns the modes that [`Specimen::beam_modes`] returns, for less time where those of a specimen next to this one
+    /// are known.
+    ///
+    /// # Errors
+    /// As [`Specimen::modes`].
+    pub fn beam_modes_from(
+        &self,
+        near: &BeamModes,
+        count: usize,
+        mesh: Mesh,
+    ) -> Result<BeamModes, StructureError> {
+        BeamModes::new(self, count, mesh, Some(near))
     }
 
     /// Returns a lap joint's overlap as masses: two points in either half, where Gauss's rule puts them, carry

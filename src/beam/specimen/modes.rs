@@ -5,6 +5,8 @@ use super::numbering::Motion;
 use super::{Mesh, Specimen};
 use crate::StructureError;
 use crate::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, RESONATOR_ROW, dot, lowest_pairs};
+use crate::rayleigh::{lowest_from, moved};
+
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -124,34 +126,56 @@ fn pairs_of<const N: usize>(model: &Model, count: usize) -> Result<Eigenpairs, S
     Ok(pairs)
 }
 
-/// Moves each mode by one step of Rayleigh quotient iteration to another model, with matrices of so many entries in a
-/// row. `None` where a step fails.
-fn moved_modes<const N: usize>(from: &SpecimenModes, model: &Model) -> Option<Vec<Mode>> {
+/// Which modes of a specimen next to another one are sought.
+#[derive(Clone, Copy)]
+enum From {
+    /// The lowest ones, exactly.
+    Lowest,
+    /// Those that continue each mode, by one step.
+    Each,
+}
+
+/// Returns the modes of another model from those of a specimen next to it, with matrices of so many entries in a row.
+/// `None` where they are not found.
+fn modes_from<const N: usize>(
+    near: &SpecimenModes,
+    model: &Model,
+    what: From,
+) -> Option<Vec<Mode>> {
     let (stiffness, mass) = model.matrices::<N>();
-    let mut modes = Vec::with_capacity(from.modes.len());
-    for mode in &from.modes {
-        let vector = from.model.numbering.vector(&mode.motion);
-        let pulled = mass.times(&vector);
-        let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
-        let mut moved = stiffness.plus(-square, &mass).ldl().solve(pulled.clone());
-        let along = dot(&moved, &pulled);
-        if !along.is_finite() || along == 0.0 {
-            return None;
+    let matrices = [&stiffness, &mass];
+    let modes = near.modes.iter();
+    let vectors: Vec<Vec<f64>> = modes
+        .map(|mode| near.model.numbering.vector(&mode.motion))
+        .collect();
+    let found = match what {
+        From::Lowest => lowest_from(matrices, vectors)?,
+        From::Each => {
+            let moved = moved(matrices, &vectors)?.into_iter();
+            moved.map(|one| one.vector).collect()
         }
-        // As long as the matrix is near to singular, and of either sign.
-        moved.iter_mut().for_each(|value| *value /= along);
-        modes.push(Mode::new(model, &moved));
-    }
-    Some(modes)
+    };
+    let found = found.iter();
+    Some(found.map(|vector| Mode::new(model, vector)).collect())
 }
 
 impl SpecimenModes {
+    /// Returns the lowest `count` modes. Those of a specimen next to it are where the search begins.
     pub(super) fn new(
         specimen: &Specimen,
         count: usize,
         mesh: Mesh,
+        near: Option<&Self>,
     ) -> Result<Self, StructureError> {
         let model = Model::new(specimen, &mesh.divide(&specimen.body))?;
+        let near = near.filter(|near| near.mesh == mesh && near.len() == count);
+        if let Some(near) = near
+            && model.rigid_motions() == 0
+            && !model.is_weakly_held()
+            && let Some(modes) = near.moved_to(model.clone(), From::Lowest)
+        {
+            return Ok(modes);
+        }
         let rigid = model.rigid_motions();
         let pairs = match model.resonators.is_empty() {
             true => pairs_of::<BEAM_ROW>(&model, count + rigid)?,
@@ -331,16 +355,22 @@ impl SpecimenModes {
     /// As [`Specimen::modes`].
     pub fn perturbed(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
         let model = self.model_of(other)?;
-        let is_alike = model.numbering == self.model.numbering
-            && model.has_hinges_in_same_elements(&self.model);
-        if !is_alike || !self.loose.is_empty() {
-            return Ok(None);
+        match model.has_hinges_in_same_elements(&self.model) {
+            true => Ok(self.moved_to(model, From::Each)),
+            false => Ok(None),
+        }
+    }
+
+    /// Returns the modes of a model next to that of these.
+    fn moved_to(&self, model: Model, what: From) -> Option<Self> {
+        if model.numbering != self.model.numbering || !self.loose.is_empty() {
+            return None;
         }
         let modes = match model.resonators.is_empty() {
-            true => moved_modes::<BEAM_ROW>(self, &model),
-            false => moved_modes::<RESONATOR_ROW>(self, &model),
+            true => modes_from::<BEAM_ROW>(self, &model, what),
+            false => modes_from::<RESONATOR_ROW>(self, &model, what),
         };
-        Ok(modes.map(|modes| Self::elastic(model, self.mesh, modes)))
+        Some(Self::elastic(model, self.mesh, modes?))
     }
 
     /// Returns these modes, preceded by the motions that are rigid but for springs to the ground, the
@@ -480,15 +510,17 @@ pub struct BeamModes {
 
 impl BeamModes {
     /// Returns the lowest `count` modes of a specimen's beam. On a fixture that gives, the mode in which it
-    /// moves most is its own.
+    /// moves most is its own. Modes of a specimen next to it are where the search begins.
     pub(super) fn new(
         specimen: &Specimen,
         count: usize,
         mesh: Mesh,
+        near: Option<&Self>,
     ) -> Result<Self, StructureError> {
         let gives = specimen.base.is_some_and(|base| base.ratio > 0.0);
         let others = usize::from(gives) + specimen.resonators.len();
-        let modes = SpecimenModes::new(specimen, count + others, mesh)?;
+        let near = near.map(|near| &near.modes);
+        let modes = SpecimenModes::new(specimen, count + others, mesh, near)?;
         let all = 0..modes.len();
         let shares = all.clone().map(|mode| modes.base_participation(mode));
         let most = all.clone().zip(shares).max_by(|a, b| a.1.total_cmp(&b.1));

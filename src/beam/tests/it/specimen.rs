@@ -977,3 +977,47 @@ fn limit_what_cannot_exist_is_named() {
         .unwrap_err();
     assert!(coarse.to_string().contains("divide finer"));
 }
+
+#[test]
+fn prop_modes_from_those_next_to_it_are_those_of_a_new_solution() {
+    let mut here = cantilever(1400.0, 1.25, 0.0);
+    here.masses = vec![PointMass::new(0.2, 0.01)];
+    let count = 6;
+    let near = here.beam_modes(count, Mesh::DIAGNOSIS).unwrap();
+    let mut others = Vec::new();
+    // From next to nothing to changes that exchange the order of whole modes.
+    for change in [1e-6, 0.01, 0.3, 3.0] {
+        let mut heavier = here.clone();
+        heavier.masses[0].mass *= 1.0 + 10.0 * change;
+        let mut softer = here.clone();
+        softer.joint.as_mut().unwrap().kr /= 1.0 + change;
+        let mut cracked = here.clone();
+        cracked.hinges.push(Hinge {
+            position: 0.15,
+            compliance: 0.01 * change,
+        });
+        let mut supported = here.clone();
+        supported.springs.push(PointSpring {
+            position: 0.4,
+            stiffness: 1e4 * change,
+        });
+        others.extend([heavier, softer, cracked, supported]);
+    }
+    for other in others {
+        let found = other
+            .beam_modes_from(&near, count, Mesh::DIAGNOSIS)
+            .unwrap();
+        let solved = other.beam_modes(count, Mesh::DIAGNOSIS).unwrap();
+        let pairs = found
+            .modes
+            .frequencies()
+            .iter()
+            .zip(solved.modes.frequencies());
+        for (mode, (found_at, solved_at)) in pairs.enumerate() {
+            let error = found_at / solved_at - 1.0;
+            assert!(error.abs() < 1e-11, "mode {mode}: {error:e}");
+            let [a, b] = [&found, &solved].map(|one| one.modes.displacement(mode, 0.3).abs());
+            assert!((a - b).abs() < 1e-6 * b.max(1.0), "mode {mode}: {a} {b}");
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! Eigenpairs of K x = lambda M x that start from the vectors of a problem next to it, by Rayleigh quotient iteration:
+//!
+//! ```text
+//! (K - s M) x' = M x,   s = x^T K x / x^T M x
+//! ```
+//!
+//! The error e of a vector becomes about e^3 in each step (Parlett 1998, "The Symmetric Eigenvalue Problem", 4.6 and 4.7).
+//! The number of negative pivots of K - s M is that of the eigenvalues below s, so that no pair is missed or found twice.
+//!
+//! Rows of a banded matrix wait for each other. Several vectors are moved side by side, which costs hardly more than one.
+
+use crate::eigen::BandedMatrix;
+
+/// Vectors that are moved side by side.
+const LANES: usize = 4;
+
+/// One value of each vector.
+type Lanes = [f64; LANES];
+
+/// Largest distance of a vector from an eigenvector (1): that of [`crate::eigen::lowest_pairs`].
+const DISTANCE: f64 = 1e-8;
+
+/// Steps after which vectors that have not settled are given up.
+const MOST_STEPS: usize = 5;
+
+/// A vector after one step of the iteration.
+pub(crate) struct Moved {
+    /// The vector, of unit x^T M x.
+    pub(crate) vector: Vec<f64>,
+    /// The quotient s of the vector before.
+    shift: f64,
+    /// Sine of the angle between the vector before and this one.
+    turned: f64,
+    /// Largest distance of an eigenvalue from s.
+    distance: f64,
+    /// Number of eigenvalues below s.
+    below: usize,
+    /// Whether the eigenvalue of the vector lies below s.
+    is_below: bool,
+}
+
+/// Returns each vector after one step, in the order of the vectors. `None` where a step fails.
+pub(crate) fn moved<const N: usize>(
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    vectors: &[Vec<f64>],
+) -> Option<Vec<Moved>> {
+    let mut all = Vec::with_capacity(vectors.len());
+    for some in vectors.chunks(LANES) {
+        // Lanes without a vector repeat the last one.
+        let lane = |index: usize| &some[index.min(some.len() - 1)];
+        let before: Vec<Lanes> = (0..mass.size())
+            .map(|row| std::array::from_fn(|index| lane(index)[row]))
+            .collect();
+        let (pulled, kinetic) = product(mass, &before);
+        let (_, strain) = product(stiffness, &before);
+        let shifts: Lanes = std::array::from_fn(|index| strain[index] / kinetic[index]);
+        let (after, below) = solution([stiffness, mass], &shifts, &pulled);
+        let (_, squares) = product(mass, &after);
+        let mut along = [0.0; LANES];
+        for (a, b) in after.iter().zip(&pulled) {
+            for index in 0..LANES {
+                along[index] += a[index] * b[index];
+            }
+        }
+        for index in 0..some.len() {
+            let (size, along) = (squares[index].sqrt(), along[index]);
+            if !size.is_finite() || size == 0.0 || along == 0.0 {
+                return None;
+            }
+            let unit = kinetic[index].sqrt();
+            let cosine = along / (size * unit);
+            all.push(Moved {
+                // Along the vector before: the matrix is near to singular, and of either sign.
+                vector: after
+                    .iter()
+                    .map(|x| x[index] / size.copysign(along))
+                    .collect(),
+                shift: shifts[index],
+                turned: (1.0 - cosine * cosine).max(f64::EPSILON).sqrt(),
+                distance: unit / size,
+                below: below[index],
+                is_below: along < 0.0,
+            });
+        }
+    }
+    Some(all)
+}
+
+/// Returns the vectors of the lowest pairs, in ascending order, from vectors next to them. `None` where they do not
+/// settle, or where others turn out to lie among them.
+pub(crate) fn lowest_from<const N: usize>(
+    matrices: [&BandedMatrix<N>; 2],
+    mut vectors: Vec<Vec<f64>>,
+) -> Option<Vec<Vec<f64>>> {
+    for _ in 0..MOST_STEPS {
+        let mut steps = moved(matrices, &vectors)?;
+        steps.sort_by(|a, b| a.shift.total_cmp(&b.shift));
+        let settled = have_settled(&steps)?;
+        vectors = steps.into_iter().map(|one| one.vector).collect();
+        if settled {
+            return Some(vectors);
+        }
+    }
+    None
+}
+
+/// Returns whether all vectors, by ascending quotients, are those of the lowest pairs. `None` where they have settled on
+/// other ones.
+///
+/// A step leaves of each error the share |lambda - s|/|other lambda - s|, which is at most that of the distance and the gap.
+fn have_settled(steps: &[Moved]) -> Option<bool> {
+    // All eigenvalues are positive.
+    let mut gap = steps.first()?.shift;
+    for (index, one) in steps.iter().enumerate() {
+        let next = steps.get(index + 1);
+        let above = next.map_or(f64::INFINITY, |next| next.shift - next.distance - one.shift);
+        let least = gap.min(above);
+        // A NaN has not settled either.
+        if !(one.distance < least && one.turned * one.distance < DISTANCE * least) {
+            return Some(false);
+        }
+        gap = next.map_or(gap, |next| next.shift - one.shift - one.distance);
+    }
+    let mut all = steps.iter().enumerate();
+    all.all(|(index, one)| one.below == index + usize::from(one.is_below))
+        .then_some(true)
+}
+
+/// Returns A x and x^T A x.
+fn product<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> (Vec<Lanes>, Lanes) {
+    let mut product = vec![[0.0; LANES]; x.len()];
+    for (row, entries) in matrix.rows.iter().enumerate() {
+        let own = x[row];
+        let mut sum = own.map(|value| entries[N - 1] * value);
+        for back in 1..=row.min(N - 1) {
+            let entry = entries[N - 1 - back];
+            let (other, there) = (x[row - back], &mut product[row - back]);
+            for index in 0..LANES {
+                sum[index] += entry * other[index];
+                there[index] += entry * own[index];
+            }
+        }
+        for index in 0..LANES {
+            product[row][index] += sum[index];
+        }
+    }
+    let mut square = [0.0; LANES];
+    for (a, b) in product.iter().zip(x) {
+        for index in 0..LANES {
+            square[index] += a[index] * b[index];
+        }
+    }
+    (product, square)
+}
+
+/// Returns the solution of (K - s M) x = b for each lane, and the number of negative pivots, by L D L^T without exchange
+/// of rows.
+fn solution<const N: usize>(
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    shifts: &Lanes,
+    right: &[Lanes],
+) -> (Vec<Lanes>, [usize; LANES]) {
+    let (band, size) = (N - 1, right.len());
+    // L left of the diagonal, 1/D on it. Rows of zeros before the first and behind the last spare the loops their ends.
+    let mut factor = vec![[[0.0; LANES]; N]; size + 2 * band];
+    let mut x = vec![[0.0; LANES]; size + 2 * band];
+    let mut below = [0; LANES];
+    for row in 0..size {
+        // Left of the diagonal L D.
+        let mut own = [[0.0; LANES]; N];
+        for (entry, (k, m)) in own
+            .iter_mut()
+            .zip(stiffness.rows[row].iter().zip(&mass.rows[row]))
+        {
+            for index in 0..LANES {
+                entry[index] = k - shifts[index] * m;
+            }
+        }
+        for column in 1..band {
+            let other = &factor[row + column];
+            for further in 0..column {
+                for index in 0..LANES {
+                    own[column][index] -=
+                        own[further][index] * other[band - column + further][index];
+                }
+            }
+        }
+        let mut value = right[row];
+        for column in 0..band {
+            let (inverse, above) = (factor[row + column][band], x[row + column]);
+            for index in 0..LANES {
+                let entry = own[column][index] * inverse[index];
+                own[band][index] -= own[column][index] * entry;
+                value[index] -= entry * above[index];
+                own[column][index] = entry;
+            }
+        }
+        for index in 0..LANES {
+            // At an eigenvalue, which rounding moves by as much.
+            if own[band][index] == 0.0 {
+                own[band][index] = f64::EPSILON * stiffness.rows[row][band];
+            }
+            below[index] += usize::from(own[band][index] < 0.0);
+            own[band][index] = 1.0 / own[band][index];
+        }
+        factor[row + band] = own;
+        x[row + band] = value;
+    }
+    for row in (band..band + size).rev() {
+        let mut value = x[row];
+        for index in 0..LANES {
+            value[index] *= factor[row][band][index];
+        }
+        for back in (1..=band).rev() {
+            let (entry, other) = (factor[row + back][band - back], x[row + back]);
+            for index in 0..LANES {
+                value[index] -= entry[index] * other[index];
+            }
+        }
+        x[row] = value;
+    }
+    (x[band..band + size].to_vec(), below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eigen::{Eigenpairs, lowest_pairs};
+
+    const SIZE: usize = 40;
+
+    /// A chain of springs and masses whose first spring has the given stiffness.
+    fn chain(first: f64) -> [BandedMatrix<3>; 2] {
+        let (mut stiffness, mut mass) = (BandedMatrix::zeros(SIZE), BandedMatrix::zeros(SIZE));
+        for row in 0..SIZE {
+            let before = if row == 0 { first } else { 1.0 };
+            stiffness.add(row, row, before + f64::from(u8::from(row + 1 < SIZE)));
+            mass.add(row, row, 1.0 + 0.01 * row as f64);
+            if row > 0 {
+                stiffness.add(row, row - 1, -1.0);
+            }
+        }
+        [stiffness, mass]
+    }
+
+    fn lowest([stiffness, mass]: &[BandedMatrix<3>; 2], count: usize) -> Eigenpairs {
+        lowest_pairs(stiffness, mass, 0.0, 4.0, &[], count).unwrap()
+    }
+
+    fn quotient([stiffness, mass]: &[BandedMatrix<3>; 2], x: &[f64]) -> f64 {
+        use crate::eigen::dot;
+        dot(x, &stiffness.times(x)) / dot(x, &mass.times(x))
+    }
+
+    #[test]
+    fn prop_pairs_from_a_neighbour_are_the_lowest_ones() {
+        for count in [1, 2, 5, 9] {
+            let start = lowest(&chain(1.0), count).vectors;
+            for first in [1.0, 1.0 + 1e-6, 1.1, 3.0] {
+                let own = chain(first);
+                let found = lowest_from([&own[0], &own[1]], start.clone());
+                let found = found.unwrap_or_else(|| panic!("{count} {first}"));
+                for (vector, value) in found.iter().zip(lowest(&own, count).values) {
+                    let error = quotient(&own, vector) / value - 1.0;
+                    assert!(error.abs() < 1e-11, "{count} {first}: {error:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn limit_other_pairs_than_the_lowest_are_refused() {
+        let own = chain(1.0);
+        let mut start = lowest(&own, 6).vectors;
+        start.remove(2);
+        assert!(lowest_from([&own[0], &own[1]], start.clone()).is_none());
+        // Two vectors that become one.
+        start.truncate(2);
+        start.push(start[1].clone());
+        assert!(lowest_from([&own[0], &own[1]], start).is_none());
+    }
+
+    #[test]
+    fn val_the_error_of_a_vector_falls_with_its_third_power() {
+        let own = chain(1.0);
+        let exact = lowest(&own, 2).vectors;
+        let error_after = |error: f64| {
+            let start = exact[0].iter().zip(&exact[1]);
+            let start: Vec<f64> = start.map(|(a, b)| a + error * b).collect();
+            let step = &moved([&own[0], &own[1]], &[start]).unwrap()[0];
+            let rest = own[1].times(&step.vector);
+            crate::eigen::dot(&exact[1], &rest).abs()
+        };
+        let ratio = error_after(2e-2) / error_after(1e-2);
+        assert!((ratio - 8.0).abs() < 0.1, "{ratio}");
+    }
+}

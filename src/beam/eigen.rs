@@ -7,8 +7,8 @@
 //! suffice, each of them two solutions with the banded factor. All pairs come from the dense matrix, whose
 //! time grows with the cube of its size: small ones only.
 //!
-//! The matrices are symmetric and of a fixed half-bandwidth, which lets the compiler unroll every inner loop: 5 for beams, 6 where
-//! a resonator has a motion between two nodes.
+//! The matrices are symmetric and of a fixed half-bandwidth, which lets the compiler unroll every inner loop: 3 for slender beams,
+//! 5 for beams that their width stiffens, 6 where a resonator has a motion between two nodes.
 
 use crate::StructureError;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -395,8 +395,10 @@ fn normalise(vector: &mut [f64]) -> f64 {
     length
 }
 
-/// Entries of a row of a beam's matrices, the diagonal included. Nodes have up to three motions, so that an element reaches
-/// five equations to the left.
+/// Entries of a row of a beam's matrices, the diagonal included, where nodes have two motions: an element reaches three
+/// equations to the left.
+pub(crate) const SLENDER_ROW: usize = 4;
+/// Entries of a row where nodes have three motions, so that an element reaches five equations to the left.
 pub(crate) const BEAM_ROW: usize = 6;
 /// Entries of a row where the motion of a resonator lies between those of two nodes.
 pub(crate) const RESONATOR_ROW: usize = 7;

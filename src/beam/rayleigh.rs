@@ -51,17 +51,11 @@ pub(crate) fn moved<const N: usize>(
         let before: Vec<Lanes> = (0..mass.size())
             .map(|row| std::array::from_fn(|index| lane(index)[row]))
             .collect();
-        let (pulled, kinetic) = product(mass, &before);
-        let (_, strain) = product(stiffness, &before);
+        let pulled = product(mass, &before);
+        let (strain, kinetic) = (square(stiffness, &before), inner(&before, &pulled));
         let shifts: Lanes = std::array::from_fn(|index| strain[index] / kinetic[index]);
         let (after, below) = solution([stiffness, mass], &shifts, &pulled);
-        let (_, squares) = product(mass, &after);
-        let mut along = [0.0; LANES];
-        for (a, b) in after.iter().zip(&pulled) {
-            for index in 0..LANES {
-                along[index] += a[index] * b[index];
-            }
-        }
+        let (squares, along) = (square(mass, &after), inner(&after, &pulled));
         for index in 0..some.len() {
             let (size, along) = (squares[index].sqrt(), along[index]);
             if !size.is_finite() || size == 0.0 || along == 0.0 {
@@ -126,14 +120,15 @@ fn have_settled(steps: &[Moved]) -> Option<bool> {
         .then_some(true)
 }
 
-/// Returns A x and x^T A x.
-fn product<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> (Vec<Lanes>, Lanes) {
+/// Returns A x.
+fn product<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Vec<Lanes> {
+    let band = N - 1;
     let mut product = vec![[0.0; LANES]; x.len()];
     for (row, entries) in matrix.rows.iter().enumerate() {
         let own = x[row];
-        let mut sum = own.map(|value| entries[N - 1] * value);
-        for back in 1..=row.min(N - 1) {
-            let entry = entries[N - 1 - back];
+        let mut sum = own.map(|value| entries[band] * value);
+        for back in 1..=row.min(band) {
+            let entry = entries[band - back];
             let (other, there) = (x[row - back], &mut product[row - back]);
             for index in 0..LANES {
                 sum[index] += entry * other[index];
@@ -144,13 +139,36 @@ fn product<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> (Vec<Lanes>
             product[row][index] += sum[index];
         }
     }
+    product
+}
+
+/// Returns x^T A x.
+fn square<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Lanes {
+    let band = N - 1;
     let mut square = [0.0; LANES];
-    for (a, b) in product.iter().zip(x) {
+    for (row, entries) in matrix.rows.iter().enumerate() {
+        let mut sum = x[row].map(|value| 0.5 * entries[band] * value);
+        for back in 1..=row.min(band) {
+            for index in 0..LANES {
+                sum[index] += entries[band - back] * x[row - back][index];
+            }
+        }
         for index in 0..LANES {
-            square[index] += a[index] * b[index];
+            square[index] += 2.0 * sum[index] * x[row][index];
         }
     }
-    (product, square)
+    square
+}
+
+/// Returns x^T y.
+fn inner(x: &[Lanes], y: &[Lanes]) -> Lanes {
+    let mut inner = [0.0; LANES];
+    for (a, b) in x.iter().zip(y) {
+        for index in 0..LANES {
+            inner[index] += a[index] * b[index];
+        }
+    }
+    inner
 }
 
 /// Returns the solution of (K - s M) x = b for each lane, and the number of negative pivots, by L D L^T without exchange

@@ -195,16 +195,32 @@ impl Optimum {
     /// Returns objective, curvature and gradient at a point.
     pub fn new(data: &[Datum], priors: &[Prior], parameters: Vec<f64>, model: Linearised) -> Self {
         let objective = objective_at(data, priors, &parameters, &model.predicted);
-        let mut weighted = model.slopes.clone();
-        let mut pulled = DVector::zeros(data.len());
+        let count = parameters.len();
+        let mut curvature = DMatrix::zeros(count, count);
+        let mut gradient = DVector::zeros(count);
+        // Most parameters move few of the data.
+        let mut moving: Vec<(usize, f64)> = Vec::with_capacity(count);
         for (row, datum) in data.iter().enumerate() {
             let weight = datum.weight(datum.residual(model.predicted[row]));
             let precision = weight / (datum.std * datum.std);
-            pulled[row] = precision * (datum.value - model.predicted[row]);
-            weighted.row_mut(row).scale_mut(precision);
+            let pulled = precision * (datum.value - model.predicted[row]);
+            let slopes = model.slopes.row(row);
+            moving.clear();
+            moving.extend(
+                slopes
+                    .iter()
+                    .copied()
+                    .enumerate()
+                    .filter(|one| one.1 != 0.0),
+            );
+            for (index, &(k, slope)) in moving.iter().enumerate() {
+                gradient[k] -= slope * pulled;
+                for &(other, beside) in &moving[index..] {
+                    curvature[(other, k)] += precision * slope * beside;
+                }
+            }
         }
-        let mut curvature = model.slopes.tr_mul(&weighted);
-        let mut gradient = -model.slopes.tr_mul(&pulled);
+        curvature.fill_upper_triangle_with_lower_triangle();
         for (k, prior) in priors.iter().enumerate() {
             if prior.is_held() {
                 curvature.row_mut(k).fill(0.0);

@@ -420,6 +420,32 @@ impl Section {
         section
     }
 
+    /// Returns the section with another modulus and density, as multiples of its own. Shear follows the modulus, and rotary
+    /// inertia the density. The static answer to inertia is proportional to the density over the modulus, and its
+    /// inertia once more to the density.
+    pub(super) fn changed(&self, stiffness: f64, mass: f64) -> Self {
+        let element = Element {
+            bending_stiffness: stiffness * self.element.bending_stiffness,
+            mass_per_length: mass * self.element.mass_per_length,
+            rotary_inertia: mass * self.element.rotary_inertia,
+            ..self.element
+        };
+        let flexible = mass / stiffness;
+        let mut across = self.across;
+        across.terms.iter_mut().for_each(|term| term.0 *= stiffness);
+        Self {
+            stiffness: sum(&element.stiffness(), &self.geometric),
+            mass: self.mass.map(|row| row.map(|entry| mass * entry)),
+            second_order: self
+                .second_order
+                .map(|row| row.map(|entry| mass * flexible * entry)),
+            inner: self.inner.map(|one| one.map(|c| flexible * c)),
+            element,
+            across,
+            ..*self
+        }
+    }
+
     /// What the width adds where the element has this curvature at its ends.
     fn across_for(&self, near: &[f64; 4], far: &[f64; 4]) -> Across {
         match &self.curling {

@@ -8,7 +8,7 @@ use super::element::{
 };
 use super::numbering::{ACROSS, HELD, Motion, Numbering};
 use super::{BeamSection, Body, Joint, Specimen};
-use crate::eigen::BandedMatrix;
+use crate::eigen::{BEAM_ROW, BandedMatrix, RESONATOR_ROW, SLENDER_ROW};
 use crate::width::Curling;
 use crate::{Beam, StructureError, WidthStiffening};
 use std::f64::consts::PI;
@@ -154,25 +154,19 @@ impl Model {
             let start = last.map_or(0.0, |_| beams[0].length);
             let first_node = last.map_or(0, |run| run.elements + 1);
             let (shear_rotary, axial_force) = (specimen.shear_rotary, specimen.axial_force);
-            let changed = changed_beams(&specimen.sections, beam, start, elements);
-            let sections = [*beam].into_iter().chain(changed).map(|beam| {
-                Section::new(
-                    &beam,
-                    elements,
-                    shear_rotary,
-                    axial_force,
-                    stiffened,
-                    &units,
-                )
-            });
-            let mut sections: Vec<Section> = sections.collect();
+            let section =
+                Section::new(beam, elements, shear_rotary, axial_force, stiffened, &units);
+            let changes = changes_along(&specimen.sections, beam, start, elements);
+            let own = changes.into_iter();
             runs.push(Run {
                 middle: (beam.width / units.length).powi(2) / 24.0,
                 start: start / units.length,
                 elements,
                 first_node,
-                section: sections.remove(0),
-                own: sections,
+                own: own
+                    .map(|[stiffness, mass]| section.changed(stiffness, mass))
+                    .collect(),
+                section,
             });
         }
         // The base where it gives: k = Kr/ratio, and the inertia that has its frequency on that spring.
@@ -385,7 +379,16 @@ impl Model {
         square.max(0.0).sqrt() * self.units.omega / (2.0 * PI)
     }
 
-    /// Stiffness and mass matrix. Resonators need rows of [`crate::eigen::RESONATOR_ROW`] entries.
+    /// Least number of entries that a row of the matrices needs.
+    pub(super) fn row(&self) -> usize {
+        match (self.resonators.is_empty(), self.numbering.stiffened) {
+            (false, _) => RESONATOR_ROW,
+            (true, true) => BEAM_ROW,
+            (true, false) => SLENDER_ROW,
+        }
+    }
+
+    /// Stiffness and mass matrix. A row needs [`Model::row`] entries.
     pub(crate) fn matrices<const N: usize>(&self) -> (BandedMatrix<N>, BandedMatrix<N>) {
         let size = self.numbering.size;
         let (mut stiffness, mut mass) = (BandedMatrix::zeros(size), BandedMatrix::zeros(size));
@@ -695,11 +698,17 @@ impl Model {
     }
 }
 
-/// Returns the beam as each of its equal elements has it; empty where no section differs. `start` is the beam's left end (m).
+/// Returns stiffness and mass of each of a beam's equal elements over those of the beam; empty where no section differs.
+/// `start` is the beam's left end (m).
 ///
 /// An element that the border of a section cuts takes the mean mass and the mean compliance, so that frequencies are
 /// continuous in the place of the border.
-fn changed_beams(sections: &[BeamSection], beam: &Beam, start: f64, elements: usize) -> Vec<Beam> {
+fn changes_along(
+    sections: &[BeamSection],
+    beam: &Beam,
+    start: f64,
+    elements: usize,
+) -> Vec<[f64; 2]> {
     if sections.is_empty() {
         return Vec::new();
     }
@@ -721,11 +730,7 @@ fn changed_beams(sections: &[BeamSection], beam: &Beam, start: f64, elements: us
             mass += share * factors.0;
             compliance += share / factors.1;
         }
-        Beam {
-            modulus: beam.modulus / compliance,
-            density: beam.density * mass,
-            ..*beam
-        }
+        [compliance.recip(), mass]
     });
     changed.collect()
 }

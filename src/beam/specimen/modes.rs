@@ -4,7 +4,9 @@ use super::model::{Energies, Model};
 use super::numbering::Motion;
 use super::{Mesh, Specimen};
 use crate::StructureError;
-use crate::eigen::{BEAM_ROW, BandedMatrix, Eigenpairs, RESONATOR_ROW, dot, lowest_pairs};
+use crate::eigen::{
+    BEAM_ROW, BandedMatrix, Eigenpairs, RESONATOR_ROW, SLENDER_ROW, dot, lowest_pairs,
+};
 use crate::rayleigh::{lowest_from, moved};
 
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -177,9 +179,10 @@ impl SpecimenModes {
             return Ok(modes);
         }
         let rigid = model.rigid_motions();
-        let pairs = match model.resonators.is_empty() {
-            true => pairs_of::<BEAM_ROW>(&model, count + rigid)?,
-            false => pairs_of::<RESONATOR_ROW>(&model, count + rigid)?,
+        let pairs = match model.row() {
+            SLENDER_ROW => pairs_of::<SLENDER_ROW>(&model, count + rigid)?,
+            BEAM_ROW => pairs_of::<BEAM_ROW>(&model, count + rigid)?,
+            _ => pairs_of::<RESONATOR_ROW>(&model, count + rigid)?,
         };
         let Eigenpairs { values, vectors } = pairs;
         // Rounding moves each value by some parts in 1e16 of the highest one.
@@ -366,9 +369,10 @@ impl SpecimenModes {
         if model.numbering != self.model.numbering || !self.loose.is_empty() {
             return None;
         }
-        let modes = match model.resonators.is_empty() {
-            true => modes_from::<BEAM_ROW>(self, &model, what),
-            false => modes_from::<RESONATOR_ROW>(self, &model, what),
+        let modes = match model.row() {
+            SLENDER_ROW => modes_from::<SLENDER_ROW>(self, &model, what),
+            BEAM_ROW => modes_from::<BEAM_ROW>(self, &model, what),
+            _ => modes_from::<RESONATOR_ROW>(self, &model, what),
         };
         Some(Self::elastic(model, self.mesh, modes?))
     }

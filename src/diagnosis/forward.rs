@@ -120,16 +120,21 @@ impl<'a> Forward<'a> {
         let mut predicted = base.clone();
         let mut slopes = DMatrix::zeros(base.len(), parameters.len());
         let first = self.layout.first_nuisance();
-        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
-            let nuisance = nuisance.parameter;
-            // These enter the solution itself.
-            let enters = nuisance.is_solved();
-            for (row, observable) in self.observables.iter().enumerate() {
-                let is_solved = enters && !observable.is_of_bar();
-                let slope = self.nuisance_slope(row, nuisance, &models, base[row], parameters);
-                slopes[(row, first + k)] = slope;
-                if !is_solved {
-                    predicted[row] += parameters[first + k] * slope;
+        for (row, observable) in self.observables.iter().enumerate() {
+            let (mode, configuration) = (observable.mode, observable.configuration);
+            let setup = self.dataset.arrangements[configuration].setup;
+            let place = ModeInPlace::new(self.dataset, &self.layout, observable, &models);
+            for (column, nuisance) in (first..).zip(&self.dataset.nuisances) {
+                let nuisance = nuisance.parameter;
+                if !nuisance.can_move(mode, configuration, setup) {
+                    continue;
+                }
+                let slope =
+                    self.nuisance_slope(row, nuisance, &models, &place, base[row], parameters);
+                slopes[(row, column)] = slope;
+                // Some enter the solution itself.
+                if !nuisance.is_solved() || observable.is_of_bar() {
+                    predicted[row] += parameters[column] * slope;
                 }
             }
         }
@@ -387,6 +392,7 @@ impl<'a> Forward<'a> {
         row: usize,
         nuisance: NuisanceParameter,
         models: &[ModalModel],
+        place: &Option<ModeInPlace<'_>>,
         predicted: f64,
         parameters: &[f64],
     ) -> f64 {
@@ -413,7 +419,7 @@ impl<'a> Forward<'a> {
             }
             _ => {}
         }
-        let Some(place) = ModeInPlace::new(self.dataset, &self.layout, observable, models) else {
+        let Some(place) = place else {
             return 0.0;
         };
         if let NuisanceParameter::Property { property } = nuisance

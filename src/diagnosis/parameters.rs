@@ -85,6 +85,20 @@ impl NuisanceParameter {
         )
     }
 
+    /// Returns whether it can move what is observed of a mode in one configuration of a set-up.
+    pub fn can_move(self, mode: usize, configuration: usize, setup: usize) -> bool {
+        use NuisanceParameter::{Discrepancy, Drift, Gain, Scatter, TapPosition, Temperature};
+        match self {
+            Drift { setup: own, .. }
+            | Temperature { setup: own }
+            | TapPosition { setup: own }
+            | Gain { setup: own, .. } => own == setup,
+            Scatter { configuration: own } => own == configuration,
+            Discrepancy { mode: own } => own == mode,
+            _ => true,
+        }
+    }
+
     /// Returns whether it is the joint's drift between set-ups.
     pub fn is_drift(self) -> bool {
         matches!(self, NuisanceParameter::Drift { .. })

@@ -152,46 +152,77 @@ impl Residuals {
                 .filter(|&row| dataset.observables[row].mode == mode)
                 .collect();
             if !rows.is_empty() {
-                let predicted = self.predictor(&rows)? * &self.raw;
+                let predicted = self.predictor(&rows)? * self.raw.select_rows(&rows);
                 errors.extend(predicted.iter().map(|x| 100.0 * x));
             }
         }
         (!errors.is_empty()).then(|| root_mean_square(&errors))
     }
 
-    /// Returns the matrix that takes all residuals to the errors with which the data `rows` are predicted from all
+    /// Returns the matrix that takes the residuals of the data `rows` to the errors with which these are predicted from all
     /// others, natural units: with the influence H of each datum on each prediction, both over the standard
     /// deviations s of the fit, these are s_b (I - H)_bb^-1 r_b/s_b (Cook & Weisberg 1982). `None` where the
     /// other data leave a parameter open.
     fn predictor(&self, rows: &[usize]) -> Option<DMatrix<f64>> {
         let block = self.spread.select_rows(rows).select_columns(rows);
-        let inverse = block.cholesky()?.inverse();
-        let mut predictor = DMatrix::zeros(rows.len(), self.raw.len());
+        let mut predictor = block.cholesky()?.inverse();
         for (i, &to) in rows.iter().enumerate() {
             for (j, &from) in rows.iter().enumerate() {
-                let stds = self.weighted_stds[to] / self.weighted_stds[from];
-                predictor[(i, from)] = inverse[(i, j)] * stds;
+                predictor[(i, j)] *= self.weighted_stds[to] / self.weighted_stds[from];
             }
         }
         Some(predictor)
     }
 
-    /// Returns the errors of predictions that were made by this matrix for the data `rows`, with their covariance.
-    fn errors_of(
-        &self,
-        dataset: &Dataset,
-        rows: &[usize],
-        predictor: DMatrix<f64>,
-    ) -> HoldoutErrors {
-        let stds = DMatrix::from_diagonal(&self.weighted_stds);
-        let covariance = &predictor * (&stds * &self.spread * &stds) * predictor.transpose();
-        let own = rows.iter().map(|&row| 100.0 * dataset.data[row].std);
+    /// Returns the errors of predictions that leave out one part of the data after the other, with their covariance.
+    fn errors_of(&self, dataset: &Dataset, parts: &[LeftOut]) -> HoldoutErrors {
+        let predicted: Vec<usize> = parts
+            .iter()
+            .flat_map(|part| part.predicted.clone())
+            .collect();
+        let mut errors = DVector::zeros(predicted.len());
+        let mut spread = DMatrix::zeros(predicted.len(), predicted.len());
+        let mut first = 0;
+        for part in parts {
+            let own = part.predicted.len();
+            let raw = self.raw.select_rows(&part.rows);
+            errors
+                .rows_mut(first, own)
+                .copy_from(&(100.0 * &part.predictor * raw));
+            let mut column = 0;
+            for other in parts {
+                let residuals = DMatrix::from_fn(part.rows.len(), other.rows.len(), |i, j| {
+                    let [row, column] = [part.rows[i], other.rows[j]];
+                    self.weighted_stds[row]
+                        * self.spread[(row, column)]
+                        * self.weighted_stds[column]
+                });
+                let covariance = &part.predictor * residuals * other.predictor.transpose();
+                let block = (own, other.predicted.len());
+                spread
+                    .view_mut((first, column), block)
+                    .copy_from(&(1e4 * covariance));
+                column += other.predicted.len();
+            }
+            first += own;
+        }
+        let stds = predicted.iter().map(|&row| 100.0 * dataset.data[row].std);
         HoldoutErrors {
-            errors: 100.0 * predictor * &self.raw,
-            spread: 1e4 * covariance,
-            stds: DVector::from_iterator(rows.len(), own),
+            errors,
+            spread,
+            stds: DVector::from_iterator(predicted.len(), stds),
         }
     }
+}
+
+/// Part of the data that is predicted from all others.
+struct LeftOut {
+    /// All data that are left out.
+    rows: Vec<usize>,
+    /// Data among them that are predicted.
+    predicted: Vec<usize>,
+    /// Takes the residuals of `rows` to the errors of `predicted`.
+    predictor: DMatrix<f64>,
 }
 
 /// Returns the root mean square of the frequencies' standard uncertainties (%).
@@ -438,9 +469,7 @@ impl LeftOutErrors {
             return None;
         }
         let residuals = Residuals::new(dataset, fit)?;
-        let mut recordings = Vec::new();
-        let mut all_rows: Vec<usize> = Vec::new();
-        let mut all = DMatrix::zeros(0, residuals.raw.len());
+        let (mut recordings, mut parts) = (Vec::new(), Vec::new());
         for setup in setups {
             let mut arrangements = dataset.arrangements.iter();
             let file = &arrangements.find(|one| one.setup == setup)?.file;
@@ -457,19 +486,19 @@ impl LeftOutErrors {
                 .predictor(&rows)
                 .filter(|_| !frequencies.is_empty())
             {
-                let predictor = predictor.select_rows(&frequencies);
-                let rows: Vec<usize> = frequencies.into_iter().map(|k| rows[k]).collect();
-                let known = all.nrows();
-                all = all.resize_vertically(known + rows.len(), 0.0);
-                all.rows_mut(known, rows.len()).copy_from(&predictor);
-                let errors = residuals.errors_of(dataset, &rows, predictor);
+                let part = LeftOut {
+                    predicted: frequencies.iter().map(|&k| rows[k]).collect(),
+                    predictor: predictor.select_rows(&frequencies),
+                    rows,
+                };
+                let errors = residuals.errors_of(dataset, std::slice::from_ref(&part));
                 recordings.push((file.clone(), errors));
-                all_rows.extend(rows);
+                parts.push(part);
             }
         }
-        (!all_rows.is_empty()).then(|| LeftOutErrors {
+        (!parts.is_empty()).then(|| LeftOutErrors {
             recordings,
-            together: residuals.errors_of(dataset, &all_rows, all),
+            together: residuals.errors_of(dataset, &parts),
         })
     }
 

@@ -10,7 +10,9 @@ use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
 use std::time::Instant;
 use tapjoint::identify::MeasuredMode;
-use tapjoint::identify::consistent::{ConsistentEstimator, ConsistentSettings, JointedStructure};
+use tapjoint::identify::consistent::{
+    ConsistentEstimator, ConsistentSettings, JointedStructure, Neighbourhood,
+};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
 
 const NOISE: f64 = 1e-3;
@@ -71,6 +73,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect();
     let (fits, fit) = timed(&noisy, |f| estimator.fit_frequencies(f));
     println!("fit {} {}", fit.0, fit.1);
+    let truth = Neighbourhood::at(&[estimator.fit().point]);
+    let (_, start) = timed(&noisy, |f| estimator.refit(f, &truth));
+    println!("start {} {}", start.0, start.1);
     let (full, time) = timed(&noisy, |frequencies| {
         ConsistentEstimator::new(&structure, &modes(frequencies), &settings)?.estimate()
     });

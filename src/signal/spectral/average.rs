@@ -66,18 +66,22 @@ impl SpectralAverager {
     /// Adds one tap: the force's transform (if there is a hammer) and each response's.
     pub fn add(&mut self, force: Option<&[Complex64]>, responses: &[impl AsRef<[Complex64]>]) {
         self.taps += 1;
-        for (power, response) in self.response_power.iter_mut().zip(responses) {
-            add_power(power, response.as_ref());
-        }
         let Some(force) = force else {
+            for (power, response) in self.response_power.iter_mut().zip(responses) {
+                add_power(power, response.as_ref());
+            }
             return;
         };
         add_power(&mut self.force_power, force);
-        for (cross, response) in self.cross.iter_mut().zip(responses) {
+        let powers = self.response_power.iter_mut();
+        for ((power, cross), response) in powers.zip(&mut self.cross).zip(responses) {
             // Nothing was in memory for it before the first force.
             cross.resize(force.len(), Complex64::ZERO);
-            for ((sum, f), x) in cross.iter_mut().zip(force).zip(response.as_ref()) {
-                *sum += f.conj() * x;
+            let values = force.iter().zip(response.as_ref());
+            // Both sums at once: each value is read once.
+            for ((power, cross), (f, x)) in power.iter_mut().zip(cross).zip(values) {
+                *power += x.norm_sqr();
+                *cross += f.conj() * x;
             }
         }
     }

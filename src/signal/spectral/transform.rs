@@ -83,9 +83,10 @@ impl Transformer {
             samples: copy,
             scratch,
         } = workspace;
+        let scale = 1.0 / self.sample_rate;
         copy.clear();
-        copy.extend_from_slice(samples);
-        self.transform_in_place(copy, scratch, values);
+        copy.extend(samples.iter().map(|x| scale * x));
+        self.transform_scaled(copy, scratch, values);
     }
 
     /// [`transform`](Self::transform) of samples that are not needed any more; what they hold afterwards means nothing.
@@ -96,10 +97,19 @@ impl Transformer {
         values: &mut Vec<Complex64>,
     ) {
         let scale = 1.0 / self.sample_rate;
+        samples.iter_mut().for_each(|x| *x *= scale);
+        self.transform_scaled(samples, scratch, values);
+    }
+
+    /// The transform of samples over the sample rate.
+    fn transform_scaled(
+        &self,
+        samples: &mut Vec<f64>,
+        scratch: &mut Vec<Complex64>,
+        values: &mut Vec<Complex64>,
+    ) {
         match &self.plan {
             Plan::Full(fft) => {
-                samples.truncate(fft.len());
-                samples.iter_mut().for_each(|x| *x *= scale);
                 // Zeros are appended.
                 samples.resize(fft.len(), 0.0);
                 values.resize(fft.complex_len(), Complex64::ZERO);
@@ -110,9 +120,8 @@ impl Transformer {
                 values.truncate(self.lines.points());
             }
             Plan::Lines(chirp) => {
-                let transformed = chirp.transform(samples.iter().map(|&x| x.into()));
                 values.clear();
-                values.extend(transformed.iter().map(|x| x * scale));
+                values.extend(chirp.transform(samples.iter().map(|&x| x.into())));
             }
             Plan::Zoom {
                 decimator,
@@ -121,7 +130,7 @@ impl Transformer {
             } => {
                 let transformed = chirp.transform(decimator.run(samples).into_iter());
                 values.clear();
-                values.extend(transformed.iter().zip(turns).map(|(x, t)| x * t * scale));
+                values.extend(transformed.iter().zip(turns).map(|(x, t)| x * t));
             }
         }
     }

@@ -188,8 +188,9 @@ impl<'a> PairSearch<'a> {
         (tasks.len(), pairs.collect())
     }
 
-    /// Returns how many pairs were tried, and those of all that explain the frequencies best. At first the
-    /// frequencies count as uncertain as the best single effect leaves them unexplained.
+    /// Returns how many pairs were tried, and those of all that explain the data best. The search is by the frequencies
+    /// alone, which at first count as uncertain as the best single effect leaves them unexplained. Many pairs explain
+    /// those equally well, so that shapes help to choose among them.
     fn by_multi_start(&self) -> (usize, Vec<Pair<'a>>) {
         let singles = &self.singles;
         let left = singles
@@ -230,7 +231,10 @@ impl<'a> PairSearch<'a> {
             .into_par_iter()
             .map(|pair| {
                 let starts = pair.starts.iter();
-                let starts = starts.filter_map(|start| finer.continued(start)).collect();
+                let starts = starts.filter_map(|start| finer.continued(start));
+                let starts = starts
+                    .filter_map(|start| start.by_all_data(self.dataset))
+                    .collect();
                 Pair {
                     starts: best_starts(starts),
                     ..pair

@@ -633,6 +633,18 @@ impl Start {
         self.effects[0].cause
     }
 
+    /// Returns this start with the objective of all data, shapes included, as the model linearised there promises it.
+    pub fn by_all_data(&self, dataset: &Dataset) -> Option<Self> {
+        let forward = Forward::new(dataset, &self.effects);
+        let priors = forward.priors();
+        let there = forward.linearise(&self.parameters, &priors)?;
+        let here = Optimum::new(&dataset.data, &priors, self.parameters.clone(), there);
+        Some(Self {
+            objective: linear_optimum(&dataset.data, &priors, &here)?.objective,
+            ..self.clone()
+        })
+    }
+
     /// Returns whether another search for the same effects ended at the same optimum.
     pub fn is_like(&self, other: &Self) -> bool {
         (self.objective - other.objective).abs() < SAME_MISFIT * other.objective.abs().max(1.0)

@@ -36,7 +36,12 @@
 //!   estimation?", Shock and Vibration 11, 395-409. Stabilisation diagrams from one factorisation.
 //! - **Cauberghe 2004**: "Applied frequency-domain system identification in the field of experimental
 //!   and operational modal analysis", thesis, Vrije Universiteit Brussel. Choice of the fixed coefficient.
+//! - **Crochiere & Rabiner 1975**: "Optimum FIR digital filter implementations for decimation, interpolation, and
+//!   narrow-band filtering", IEEE Transactions on Acoustics, Speech, and Signal Processing 23, 444-456. Decimation in stages.
 //! - **Golub & Van Loan**: "Matrix Computations". The shifted QR algorithm.
+//! - **Aberth 1973**: "Iteration methods for finding all zeros of a polynomial simultaneously", Mathematics of Computation
+//!   27, 339-344, and **Bini 1996**, Numerical Algorithms 13, 179-200. All roots at once, each repelled by the others.
+//! - **Henrici 1974**: "Applied and Computational Complex Analysis", volume 1. How many roots lie in the unit circle.
 //! - **Parlett 1998**: "The Symmetric Eigenvalue Problem", SIAM. Rayleigh quotient iteration and its third order.
 //! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
 //!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.

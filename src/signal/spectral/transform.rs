@@ -192,9 +192,10 @@ pub(crate) fn kaiser_beta(attenuation: f64) -> f64 {
 }
 
 /// By how much a band of this width (Hz) can be decimated: to the next whole divisor above the complex
-/// rate of 1.28 widths that an analyser would use.
+/// rate of 1.28 widths that an analyser would use. Large ones are multiples of four, which two stages can share.
 fn decimation_factor(sample_rate: f64, width: f64) -> usize {
-    (sample_rate / (DISPLAY_RATIO / 2.0 * width)).floor() as usize
+    let most = (sample_rate / (DISPLAY_RATIO / 2.0 * width)).floor() as usize;
+    if most < 16 { most } else { most / 4 * 4 }
 }
 
 /// Mixing, filtering and decimating as an analyser's zoom does it: what every record shares. Output m
@@ -203,8 +204,67 @@ fn decimation_factor(sample_rate: f64, width: f64) -> usize {
 pub(crate) struct Decimator {
     /// e^{-j 2 pi centre t} at every sample.
     oscillator: Vec<Complex64>,
+    stages: Vec<Stage>,
+}
+
+/// A symmetric low-pass filter, of whose outputs one in `factor` is kept.
+#[derive(Debug)]
+struct Stage {
     filter: Vec<f64>,
     factor: usize,
+}
+
+impl Stage {
+    /// Passes `width` (Hz) about 0 Hz. What it does not stop lies outside this width after decimation, too.
+    fn new(sample_rate: f64, width: f64, factor: usize) -> Self {
+        let pass = width / 2.0;
+        Stage {
+            filter: low_pass(pass, sample_rate / factor as f64 - pass, sample_rate),
+            factor,
+        }
+    }
+
+    /// Samples by which the first output lies before the first sample.
+    fn delay(&self) -> usize {
+        self.filter.len() / 2
+    }
+
+    fn outputs(&self, length: usize) -> usize {
+        (length + 2 * self.delay()).div_ceil(self.factor)
+    }
+
+    fn run(&self, samples: &[Complex64]) -> Vec<Complex64> {
+        let outputs = 0..self.outputs(samples.len());
+        let outputs = outputs.map(|m| {
+            let centre_index = (m * self.factor) as i64 - self.delay() as i64;
+            filtered(samples, &self.filter, centre_index)
+        });
+        outputs.collect()
+    }
+}
+
+/// Returns the stages that decimate by `factor` with the fewest multiplications: one, or a short filter whose wide transition
+/// leaves the narrow one to a second filter at a lower rate (Crochiere & Rabiner 1975).
+fn cheapest_stages(sample_rate: f64, width: f64, factor: usize) -> Vec<Stage> {
+    // Multiplications for each sample that comes in.
+    let cost = |rate: f64, factor: usize| {
+        let stop = rate / factor as f64 - width / 2.0;
+        half_length(width / 2.0, stop, rate) / factor as f64
+    };
+    let mut least = cost(sample_rate, factor);
+    let mut best = vec![(sample_rate, factor)];
+    for first in (2..factor).filter(|first| factor.is_multiple_of(*first)) {
+        let rate = sample_rate / first as f64;
+        let both = cost(sample_rate, first) + cost(rate, factor / first) / first as f64;
+        if both < least {
+            least = both;
+            best = vec![(sample_rate, first), (rate, factor / first)];
+        }
+    }
+    let stages = best.into_iter();
+    stages
+        .map(|(rate, factor)| Stage::new(rate, width, factor))
+        .collect()
 }
 
 impl Decimator {
@@ -217,25 +277,25 @@ impl Decimator {
         factor: usize,
         length: usize,
     ) -> Self {
-        let pass = width / 2.0;
-        let stop = sample_rate / factor as f64 - width / 2.0;
         Decimator {
             oscillator: (0..length)
                 .map(|n| Complex64::from_polar(1.0, phase(centre / sample_rate, n as f64)))
                 .collect(),
-            filter: low_pass(pass, stop, sample_rate),
-            factor,
+            stages: cheapest_stages(sample_rate, width, factor),
         }
     }
 
     /// Samples by which the first output lies before the record's start.
     pub(crate) fn delay(&self) -> usize {
-        self.filter.len() / 2
+        // A stage counts in outputs of those before it.
+        let stages = self.stages.iter().rev();
+        stages.fold(0, |delay, stage| delay * stage.factor + stage.delay())
     }
 
     /// Outputs of a record of `length` samples.
     fn outputs(&self, length: usize) -> usize {
-        (length + 2 * self.delay()).div_ceil(self.factor)
+        let stages = self.stages.iter();
+        stages.fold(length, |length, stage| stage.outputs(length))
     }
 
     /// The record decimated.
@@ -243,26 +303,26 @@ impl Decimator {
     /// It is taken as zero outside its ends and the filter's tails are kept, so that the result has
     /// exactly the spectrum of the record times the filter's pass band.
     pub(crate) fn run(&self, samples: &[f64]) -> Vec<Complex64> {
-        let mixed: Vec<Complex64> = samples
+        let mixed = samples
             .iter()
             .zip(&self.oscillator)
             .map(|(&x, turn)| turn * x)
             .collect();
-        (0..self.outputs(mixed.len()))
-            .map(|m| {
-                let centre_index = (m * self.factor) as i64 - self.delay() as i64;
-                filtered(&mixed, &self.filter, centre_index)
-            })
-            .collect()
+        let stages = self.stages.iter();
+        stages.fold(mixed, |signal: Vec<Complex64>, stage| stage.run(&signal))
     }
+}
+
+/// Returns half of Kaiser's length (A - 7.95)/(2.285 transition) of a low-pass filter (samples).
+fn half_length(pass: f64, stop: f64, sample_rate: f64) -> f64 {
+    let transition = TAU * (stop - pass) / sample_rate;
+    ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil()
 }
 
 /// A low-pass filter with Kaiser's window, which passes up to `pass` and stops from `stop` (Hz) on: of odd length,
 /// symmetric, unity at 0 Hz.
 pub(super) fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
-    let transition = TAU * (stop - pass) / sample_rate;
-    // Kaiser's length: (A - 7.95)/(2.285 transition).
-    let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
+    let half = half_length(pass, stop, sample_rate) as i64;
     let cut_off = PI * (pass + stop) / sample_rate;
     let beta = kaiser_beta(STOP_BAND_DB);
     let mut filter: Vec<f64> = (-half..=half)

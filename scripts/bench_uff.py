@@ -60,10 +60,28 @@ def best(action):
     return min(seconds)
 
 
+def seconds(count, binary):
+    """Shortest time (s) of this program and of pyuff to read one function of so many samples."""
+    samples = np.random.default_rng(1).normal(size=count)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "series.uff"
+        write(path, samples, binary)
+        theirs = best(lambda: pyuff.UFF(str(path)).read_sets())
+        return read(path, count)["read"], theirs
+
+
+def read(path, count):
+    """Shortest times (s) of this program."""
+    program = ROOT / "target/release/examples/read_uff"
+    run = subprocess.run([program, path, "time", str(PASSES)], capture_output=True, text=True, check=True)
+    ours = json.loads(run.stdout)
+    assert ours["samples"] == count, ours
+    return ours
+
+
 def main():
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     samples = np.random.default_rng(1).normal(size=count)
-    program = ROOT / "target/release/examples/read_uff"
     subprocess.run(
         ["cargo", "build", "--release", "--quiet", "--example", "read_uff"], cwd=ROOT, check=True
     )
@@ -73,14 +91,10 @@ def main():
             path = Path(folder) / f"{name}.uff"
             write(path, samples, binary)
             theirs = count / best(lambda: pyuff.UFF(str(path)).read_sets())
-            run = subprocess.run(
-                [program, path, "time", str(PASSES)], capture_output=True, text=True, check=True
-            )
-            ours = json.loads(run.stdout)
-            assert ours["samples"] == count, ours
-            read, recording = count / ours["read"], count / ours["recording"]
+            ours = read(path, count)
+            function, recording = count / ours["read"], count / ours["recording"]
             print(
-                f"{name:6} {theirs:12.3g} {read:12.3g} {read / theirs:7.1f} "
+                f"{name:6} {theirs:12.3g} {function:12.3g} {function / theirs:7.1f} "
                 f"{recording:12.3g} {recording / theirs:7.1f}"
             )
 

@@ -102,17 +102,18 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
     if marks.next().is_some() {
         return Err(CellProblem::Text);
     }
-    let text = str::from_utf8(cell).map_err(|_| CellProblem::Text)?;
     let value = match mark {
-        // A decimal comma has digits on both sides, unlike a comma that separates.
-        Some(b',') => text
-            .split_once(',')
-            .filter(|(before, after)| {
-                before.ends_with(|c: char| c.is_ascii_digit())
-                    && after.starts_with(|c: char| c.is_ascii_digit())
-            })
-            .and_then(|(before, after)| parse_plain(&format!("{before}.{after}"))),
-        _ => parse_plain(text),
+        Some(b',') => {
+            let place = memchr::memchr(b',', cell).ok_or(CellProblem::Text)?;
+            let (before, after) = (&cell[..place], &cell[place + 1..]);
+            // A decimal comma has digits on both sides, unlike a comma that separates.
+            let is_decimal = before.last().is_some_and(u8::is_ascii_digit)
+                && after.first().is_some_and(u8::is_ascii_digit);
+            is_decimal
+                .then(|| parse_plain(&[before, after].join(&b'.')))
+                .flatten()
+        }
+        _ => parse_plain(cell),
     };
     let value = value.ok_or(CellProblem::Text)?;
     if let Some(found) = mark {
@@ -128,10 +129,10 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
 }
 
 /// Reads a number with a decimal point. Fortran writes double precision exponents with D.
-pub(super) fn parse_plain(text: &str) -> Option<f64> {
-    text.parse().ok().or_else(|| {
-        let (mantissa, exponent) = text.split_once(['d', 'D'])?;
-        format!("{mantissa}e{exponent}").parse().ok()
+pub(super) fn parse_plain(text: &[u8]) -> Option<f64> {
+    fast_float2::parse(text).ok().or_else(|| {
+        let place = memchr::memchr2(b'd', b'D', text)?;
+        fast_float2::parse([&text[..place], &text[place + 1..]].join(&b'e')).ok()
     })
 }
 
@@ -246,12 +247,14 @@ fn parse_columns(line: &[u8], widths: &[usize], room: usize, into: &mut Vec<f64>
 /// Reads one number with blanks around it: exponents with E or D, or, as Fortran prints those of
 /// three digits, without a letter ("1.0-101").
 pub(super) fn parse_fortran(text: &[u8]) -> Option<f64> {
-    let text = str::from_utf8(text.trim_ascii()).ok()?;
+    let text = text.trim_ascii();
     parse_plain(text).or_else(|| {
         let (mantissa, exponent) = text.split_at_checked(text.len().checked_sub(4)?)?;
-        let digits = exponent.strip_prefix(['+', '-'])?;
-        let is_exponent = digits.bytes().all(|digit| digit.is_ascii_digit());
-        is_exponent.then(|| format!("{mantissa}e{exponent}").parse().ok())?
+        let [b'+' | b'-', digits @ ..] = exponent else {
+            return None;
+        };
+        let is_exponent = digits.iter().all(u8::is_ascii_digit);
+        is_exponent.then(|| fast_float2::parse([mantissa, exponent].join(&b'e')).ok())?
     })
 }
 

@@ -4,6 +4,7 @@
 use super::lengths::measured_modes_of;
 use super::recording_result::RecordingResult;
 use super::results::{ModeResult, measured_modes, scatter_of};
+use super::stages::Watch;
 use super::structure::{jointed, structure_details, tested_structure};
 use super::warnings::Warning;
 use super::wiring::PipelineError;
@@ -55,7 +56,7 @@ pub enum FreeTestError {
 }
 
 /// Measures the free bar of a `test` by its own description, `free`. `place` is the folder of that description and its name,
-/// for messages.
+/// for messages. The stages are announced to `watch`.
 ///
 /// # Errors
 /// [`FreeTestError`]: recordings that cannot be analysed, no modes, or modes without an uncertainty.
@@ -63,10 +64,11 @@ pub fn measure_free_test(
     test: &TestDescription,
     free: &TestDescription,
     place: (&Path, &str),
+    watch: &dyn Watch,
 ) -> Result<FreeTest, FreeTestError> {
     let structure = tested_structure(free);
     let details = structure_details(free, &structure.beam);
-    let measured = measured_modes_of(free, place, &structure, &details)?;
+    let measured = measured_modes_of(free, place, &structure, &details, watch)?;
     let modes = measured.numbered.modes;
     let file = place.1.to_owned();
     let mut used = measured_modes(&modes, scatter_of(modes.iter()), FREQUENCY_FLOOR);

@@ -5,6 +5,7 @@ use super::fits::{Candidates, Stabilisation, stabilisation};
 use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
 use super::recording_result::{Conditions, RecordingResult, Response};
+use super::stages::{Stage, Work};
 use super::warnings::Warning;
 use num_complex::Complex64;
 use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
@@ -32,11 +33,13 @@ pub struct FunctionSettings {
     pub reading: ReadBy,
 }
 
-/// Reads the resonances of frequency response functions.
+/// Reads the resonances of frequency response functions. `work` goes through the stages of spectra and fits.
 pub(super) fn measure_functions(
     functions: &FrequencyResponses,
     settings: &FunctionSettings,
+    work: &mut Work,
 ) -> Result<RecordingResult, MeasureError> {
+    work.go_on(Stage::Spectra);
     let axis = axis(functions, settings.band);
     let (first, lines) = axis.map_err(|problem| MeasureError::Spectral {
         file: functions.file.clone(),
@@ -65,7 +68,7 @@ pub(super) fn measure_functions(
     }
     let mut spectra = match is_spectrum {
         true => spectra_of_magnitudes(lines, &values, settings.reading),
-        false => spectra_of_functions(lines, values, &forms, settings.reading),
+        false => spectra_of_functions(lines, values, &forms, settings.reading, work),
     };
     spectra.fitted = explain(
         &spectra.averages,
@@ -188,11 +191,13 @@ fn spectra_of_functions(
     values: Vec<Vec<Complex64>>,
     forms: &[Option<ResponseForm>],
     wanted: ReadBy,
+    work: &mut Work,
 ) -> MeasuredSpectra {
     let columns: Vec<&[Complex64]> = values.iter().map(Vec::as_slice).collect();
     let level = level_of_functions(lines, &columns);
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
+    work.go_on(Stage::Fits);
     let peaks = BandPeaks::EveryFunction;
     let stabilisation = stabilisation(lines.low, lines.spacing, &columns, peaks);
     // The fit takes the functions without the line at 0 Hz.

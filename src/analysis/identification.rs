@@ -7,6 +7,7 @@ use super::results::{
     ModeResult, MonteCarloSection, MovedLength, PerturbationSection, Perturbations,
     ResolutionSpanSection, SensitivitySection, measured_modes, scatter_of, set_ups,
 };
+use super::stages::{Stage, Watch, Work};
 use super::structure::{
     StructureDetails, TestedStructure, estimator_of_lengths, fitted, frequencies_of, jointed,
     predicted_specimen,
@@ -84,6 +85,17 @@ pub fn identify(
     modes: &[ModeResult],
     settings: &IdentifySettings,
 ) -> (Identification, Vec<Warning>) {
+    identify_watched(structure, modes, settings, &())
+}
+
+/// Identifies as [`identify`] does, and announces the stages.
+pub(super) fn identify_watched(
+    structure: &TestedStructure,
+    modes: &[ModeResult],
+    settings: &IdentifySettings,
+    watch: &dyn Watch,
+) -> (Identification, Vec<Warning>) {
+    let mut work = Work::begin(watch, Stage::Joint);
     // One scatter for all lengths: the least repeated one must not weigh most.
     let of_lengths = settings.lengths.iter().flat_map(|length| &length.modes);
     let scatter = scatter_of(modes.iter().chain(of_lengths));
@@ -158,6 +170,11 @@ pub fn identify(
         true => (without, None),
         false => (None, without),
     };
+    if !settings.perturbed.is_empty() {
+        work.go_on(Stage::Perturbation);
+    }
+    let perturbations = perturbations(structure, estimator.as_ref(), modes, &used, settings);
+    work.go_on(Stage::Joint);
     let mut found = Identification {
         assumed: assumed(consistent.as_deref(), &settings.details),
         consistent,
@@ -169,7 +186,7 @@ pub fn identify(
         reason,
         prediction: Vec::new(),
         predicted: None,
-        perturbations: perturbations(structure, estimator.as_ref(), modes, &used, settings),
+        perturbations,
     };
     let mut warnings = of_estimate(structure, &found, modes);
     // An estimate that no joint can have has its warning already; it predicts nothing.

@@ -7,6 +7,7 @@ use super::mode_file::read_modes;
 use super::modes::{modes_of_file, modes_of_measured, modes_of_test, set_aside};
 use super::recording_result::RecordingResult;
 use super::results::{ModeResult, MovedLength};
+use super::stages::{Stage, Watch, Work};
 use super::structure::{
     StructureDetails, TestedStructure, jointed, structure_details, tested_structure,
 };
@@ -76,8 +77,10 @@ pub(super) fn measured_modes_of(
     place: (&Path, &str),
     structure: &TestedStructure,
     details: &StructureDetails,
+    watch: &dyn Watch,
 ) -> Result<MeasuredTest, PipelineError> {
-    let mut recordings = measure_test(test, place.0, place.1)?;
+    let mut recordings = measure_test(test, place.0, place.1, watch)?;
+    let _work = Work::begin(watch, Stage::Numbers);
     let doubts = test.warnings.iter();
     let mut warnings: Vec<Warning> = doubts.map(Warning::of_description).collect();
     for recording in &recordings {

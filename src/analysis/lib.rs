@@ -32,6 +32,7 @@ mod pulse_window;
 mod quiet;
 mod recording_result;
 mod results;
+mod stages;
 mod structure;
 mod warnings;
 mod wiring;
@@ -45,6 +46,7 @@ pub use free_test::{FreeTest, FreeTestError, measure_free_test};
 pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::FunctionSettings;
 use function_file::measure_functions;
+use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
 pub use measurement::{
@@ -60,14 +62,15 @@ pub use results::{
     Identification, LeftOutMode, ModeResult, MonteCarloSection, MovedLength, PerturbationSection,
     Perturbations, ResolutionSpanSection, SensitivitySection,
 };
+pub use stages::{Stage, Watch, Work};
 pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
 };
 pub use warnings::{WARNING_CODES, Warning, together};
 use warnings::{neglected_effects, of_amplitude};
-use wiring::finish;
 pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
+use wiring::{finish, measure_bare_watched};
 
 use std::path::Path;
 use std::slice::from_ref;
@@ -117,9 +120,22 @@ pub fn run_test(
     place: (&Path, &str),
     settings: &IdentifySettings,
 ) -> Result<Analysis, PipelineError> {
+    run_test_watched(test, place, settings, &())
+}
+
+/// Runs a test as [`run_test`] does, and announces the stages to `watch`.
+///
+/// # Errors
+/// Those of [`run_test`].
+pub fn run_test_watched(
+    test: &TestDescription,
+    place: (&Path, &str),
+    settings: &IdentifySettings,
+    watch: &dyn Watch,
+) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
     let mut details = structure_details(test, &structure.beam);
-    let measured = measured_modes_of(test, place, &structure, &details)?;
+    let measured = measured_modes_of(test, place, &structure, &details, watch)?;
     let (recordings, found) = (measured.recordings, measured.numbered);
     let mut warnings = measured.warnings;
     if let Some(free) = &settings.free_test {
@@ -133,7 +149,7 @@ pub fn run_test(
         details,
         ..settings.clone()
     };
-    let (identification, doubts) = identify(&structure, &found.modes, &settings);
+    let (identification, doubts) = identify_watched(&structure, &found.modes, &settings, watch);
     let method = identification.method(&structure, settings.method);
     let described = test.of_length(None);
     warnings.extend(neglected_effects(&described, &structure, method));
@@ -164,11 +180,24 @@ pub fn run_recording(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    measure_bare(recording, hammer, adjust).map(analysis_of)
+    run_recording_watched(recording, hammer, adjust, &())
+}
+
+/// Takes a bare recording as far as [`run_recording`] does, and announces the stages to `watch`.
+///
+/// # Errors
+/// Those of [`run_recording`].
+pub fn run_recording_watched(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+    adjust: impl FnOnce(&mut MeasureSettings),
+    watch: &dyn Watch,
+) -> Result<Analysis, PipelineError> {
+    measure_bare_watched(recording, hammer, adjust, watch).map(analysis_of)
 }
 
 /// Takes a bare recording with known channels as far as it goes: taps, spectra, readings. `adjust` may
-/// change the defaults of the measurement.
+/// change the defaults of the measurement. The stages are announced to `watch`.
 ///
 /// # Errors
 /// An unreadable recording, a band or block that does not fit.
@@ -176,10 +205,12 @@ pub fn run_wired(
     recording: Recording,
     wiring: &Wiring,
     adjust: impl FnOnce(&mut MeasureSettings),
+    watch: &dyn Watch,
 ) -> Result<Analysis, PipelineError> {
+    let mut work = Work::begin(watch, Stage::Taps);
     let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let mut result = finish(recording, settings, wiring)?;
+    let mut result = finish(recording, settings, wiring, &mut work)?;
     for (channel, unit) in wiring.units() {
         if let Some(info) = result.channels.get_mut(channel) {
             info.unit.clone_from(unit);
@@ -196,7 +227,21 @@ pub fn run_functions(
     functions: &FrequencyResponses,
     settings: &FunctionSettings,
 ) -> Result<Analysis, PipelineError> {
-    Ok(analysis_of(measure_functions(functions, settings)?))
+    run_functions_watched(functions, settings, &())
+}
+
+/// Takes functions as far as [`run_functions`] does, and announces the stages to `watch`.
+///
+/// # Errors
+/// Those of [`run_functions`].
+pub fn run_functions_watched(
+    functions: &FrequencyResponses,
+    settings: &FunctionSettings,
+    watch: &dyn Watch,
+) -> Result<Analysis, PipelineError> {
+    let mut work = Work::begin(watch, Stage::Spectra);
+    let result = measure_functions(functions, settings, &mut work)?;
+    Ok(analysis_of(result))
 }
 
 /// The analysis of a recording about which nothing is described.

@@ -6,6 +6,7 @@ use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation};
 use super::pulse_window::PulseWindow;
 use super::quiet::PreTriggerNoise;
+use super::stages::{Stage, Work};
 use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
 use std::ops::Range;
@@ -146,6 +147,15 @@ pub fn measure(
     recording: &Recording,
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
+    measure_watched(recording, settings, &mut Work::begin(&(), Stage::Taps))
+}
+
+/// Measures as [`measure`] does. `work` is in the stage of the taps, and goes through those of spectra and fits.
+pub(super) fn measure_watched(
+    recording: &Recording,
+    settings: &MeasureSettings,
+    work: &mut Work,
+) -> Result<Measurement, MeasureError> {
     // The band is judged before anything is read: it is the user's typing, not the data.
     let trial = lines_for(settings, recording.sample_rate(), recording.duration());
     let trial = trial.map_err(|problem| MeasureError::of(recording, problem))?;
@@ -160,7 +170,7 @@ pub fn measure(
         let available = shortest as f64 / recording.sample_rate();
         match lines_for(settings, recording.sample_rate(), available) {
             Ok(lines) => {
-                let found = Stage::new(recording, settings, &taps, lines).spectra()?;
+                let found = Inputs::new(recording, settings, &taps, lines).spectra(work)?;
                 let (file, window) = (recording.name(), found.window);
                 if let Some(decay) = found.decay
                     && decay.remaining > RUNG_DOWN
@@ -217,7 +227,7 @@ fn lines_for(
 const MOST_LOOKED_AT: usize = 32;
 
 /// Data that every step of one recording's measurement needs.
-struct Stage<'a> {
+struct Inputs<'a> {
     recording: &'a Recording,
     settings: &'a MeasureSettings,
     taps: &'a Taps,
@@ -229,7 +239,7 @@ struct Stage<'a> {
     gate: u64,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> Inputs<'a> {
     fn new(
         recording: &'a Recording,
         settings: &'a MeasureSettings,
@@ -245,7 +255,7 @@ impl<'a> Stage<'a> {
                 channels.clone_from(responses);
             }
         }
-        Stage {
+        Inputs {
             recording,
             settings,
             taps,
@@ -302,7 +312,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
+    fn spectra(&self, work: &mut Work) -> Result<MeasuredSpectra, RecordingError> {
+        work.go_on(Stage::Spectra);
         let quiet = self.quiet()?;
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
@@ -351,6 +362,7 @@ impl<'a> Stage<'a> {
         let level = self.level(&averages, &quiet, window);
         let mut readings = self.readings(&level, &averages, &transforms, &quiet, window);
         drop(transforms);
+        work.go_on(Stage::Fits);
         let taps_together = decays.as_ref().and_then(|decays| decays.taps_together);
         let decays = decays.and_then(|decays| FreeDecays::new(decays).ok());
         let stabilisation = match decays {

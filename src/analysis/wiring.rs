@@ -3,10 +3,11 @@
 use super::explained::explain;
 use super::frf::{form_of, form_of_kind};
 use super::function_file::{FunctionSettings, measure_functions};
-use super::measurement::{MeasureError, MeasureSettings, Measurement, measure};
+use super::measurement::{MeasureError, MeasureSettings, Measurement, measure_watched};
 use super::recording_result::{
     Conditions, Overview, RecordingResult, Response, close_ups, overview,
 };
+use super::stages::{Stage, Watch, Work};
 use super::warnings::{Warning, of_recording};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -39,11 +40,15 @@ pub(super) fn measure_test(
     test: &TestDescription,
     folder: &Path,
     test_file: &str,
+    watch: &dyn Watch,
 ) -> Result<Vec<RecordingResult>, PipelineError> {
     // In parallel, but collected in the description's order, so that of several errors the first is reported.
     let recordings = test.recordings.par_iter();
     let results: Vec<Result<_, _>> = recordings
-        .map(|recording| measure_described(test, recording, folder, test_file))
+        .map(|recording| {
+            let mut work = Work::begin(watch, Stage::Taps);
+            measure_described(test, recording, folder, test_file, &mut work)
+        })
         .collect();
     results.into_iter().collect()
 }
@@ -53,6 +58,7 @@ fn measure_described(
     description: &RecordingDescription,
     folder: &Path,
     test_file: &str,
+    work: &mut Work,
 ) -> Result<RecordingResult, PipelineError> {
     let path = folder.join(&description.file);
     let file = description.name();
@@ -84,7 +90,7 @@ fn measure_described(
             band: description.band,
             reading: test.analysis.reading,
         };
-        let mut result = measure_functions(&functions, &settings)?;
+        let mut result = measure_functions(&functions, &settings, work)?;
         result.conditions = conditions(test, description);
         return Ok(result);
     }
@@ -107,7 +113,7 @@ fn measure_described(
     settings.reading = test.analysis.reading;
     let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
     settings.kinds = kinds.collect();
-    let finished = finish(recording.renamed(file), settings, &wiring);
+    let finished = finish(recording.renamed(file), settings, &wiring, work);
     let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(problem @ MeasureError::Spectral { .. }) => {
             PipelineError::Description(format!("{test_file}:{}: {problem}", description.line))
@@ -202,10 +208,21 @@ pub fn measure_bare(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<RecordingResult, PipelineError> {
+    measure_bare_watched(recording, hammer, adjust, &())
+}
+
+/// Measures as [`measure_bare`] does, and announces the stages.
+pub(super) fn measure_bare_watched(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+    adjust: impl FnOnce(&mut MeasureSettings),
+    watch: &dyn Watch,
+) -> Result<RecordingResult, PipelineError> {
+    let mut work = Work::begin(watch, Stage::Taps);
     let wiring = bare_wiring(&recording, hammer)?;
     let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let mut result = finish(recording, settings, &wiring)?;
+    let mut result = finish(recording, settings, &wiring, &mut work)?;
     let mut names = result.responses.iter().map(|response| &response.name);
     let forgotten = names.find(|name| {
         let name = name.to_lowercase();
@@ -251,7 +268,9 @@ pub fn inspect_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,
     taps: &TapSettings,
+    watch: &dyn Watch,
 ) -> Result<RecordingResult, PipelineError> {
+    let mut work = Work::begin(watch, Stage::Taps);
     let wiring = bare_wiring(&recording, hammer)?;
     let source = wiring.source();
     let taps = find_taps(&recording, &source, taps)?;
@@ -262,7 +281,7 @@ pub fn inspect_bare(
         warnings,
     };
     let settings = MeasureSettings::new(source);
-    result(&recording, &settings, &wiring, measurement)
+    result(&recording, &settings, &wiring, measurement, &mut work)
 }
 
 fn channel_index(recording: &Recording, reference: &ChannelRef) -> Result<usize, RecordingError> {
@@ -291,14 +310,15 @@ fn channel(
     Ok(index)
 }
 
-/// Measures a recording whose channels are known.
+/// Measures a recording whose channels are known. `work` is in the stage of the taps, and ends there.
 pub(super) fn finish(
     recording: Recording,
     settings: MeasureSettings,
     wiring: &Wiring,
+    work: &mut Work,
 ) -> Result<RecordingResult, PipelineError> {
-    let measurement = measure(&recording, &settings)?;
-    result(&recording, &settings, wiring, measurement)
+    let measurement = measure_watched(&recording, &settings, work)?;
+    result(&recording, &settings, wiring, measurement, work)
 }
 
 fn result(
@@ -306,6 +326,7 @@ fn result(
     settings: &MeasureSettings,
     wiring: &Wiring,
     mut measurement: Measurement,
+    work: &mut Work,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
     let spectra = measurement.spectra.as_ref();
@@ -337,6 +358,8 @@ fn result(
         );
         measurement.warnings.extend(unlisted);
     }
+    // What is shown of the recording is read again.
+    work.go_on(Stage::Taps);
     Ok(RecordingResult {
         file: recording.name().to_string(),
         files: recording

@@ -6,6 +6,7 @@ use super::input::{TestFile, read_test};
 use super::overwrite::{CHECKSUMS, Expanded};
 use super::publication::{OutputFolder, files_made_in};
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings};
-use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
+use tapjoint::pipeline::{IdentifySettings, Stage, Work, diagnose_test, run_test};
 use tapjoint::report::blind_check::{render_blind_check, score_json};
 use tapjoint::study::blind_check::{
     Answer, Campaign, Case, Conduct, DrawnTest, Extent, RecordedTest, Truth, TruthFile, commitment,
@@ -89,6 +90,8 @@ pub(super) struct BlindCheckArguments {
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "blind-check")]
     pub(super) out: PathBuf,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 /// Names of the results.
@@ -162,6 +165,7 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
+    let work = Work::begin(terminal.watch(), Stage::Study);
     let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
         _ => drawn(
@@ -170,6 +174,7 @@ pub(super) fn run(
             &terminal,
         )?,
     };
+    drop(work);
     let scores = score(&cases);
     let conduct = conduct.mutated(&cases, seed);
     terminal.say(&render_rows(&rows(&scores, conduct.extent)))?;
@@ -183,10 +188,12 @@ pub(super) fn run(
             tests => format!("same answers ({tests} tests)"),
         }
     ))?;
+    let work = Work::begin(terminal.watch(), Stage::Files);
     for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
     }
     let folder = output.publish()?;
+    drop(work);
     terminal.say(&format!("Results: {}", folder.display()))?;
     terminal.write_json(&score_json(&scores, &conduct))?;
     Ok(Outcome::Answered)

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::compare::{Pair, Settings, Test, compare};
 use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{IdentifySettings, compared_items, compared_test};
+use tapjoint::pipeline::{IdentifySettings, Stage, Work, compared_items, compared_test};
 use tapjoint::report::change_check::{pair_score_json, render_change_check};
 use tapjoint::study::blind_check::{RecordedTest, commitment, render_rows};
 use tapjoint::study::change_check::{
@@ -28,6 +28,7 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
+    let work = Work::begin(terminal.watch(), Stage::Study);
     let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
         _ => {
@@ -39,6 +40,7 @@ pub(super) fn run(
             drawn(&campaign, arguments.keep.as_deref(), &terminal)?
         }
     };
+    drop(work);
     let scores = score_pairs(&cases);
     let conduct = conduct.mutated(&cases, seed);
     terminal.say(&render_rows(&pair_rows(&scores)))?;
@@ -53,12 +55,14 @@ pub(super) fn run(
             pairs => format!("same answers ({pairs} pairs)"),
         }
     ))?;
+    let work = Work::begin(terminal.watch(), Stage::Files);
     for file in render_change_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
     }
     // A check of the diagnosis may have used the folder.
     let stale = RELIABILITY.map(str::to_owned).to_vec();
     let (folder, left) = output.publish_without(stale)?;
+    drop(work);
     terminal.say(&format!("Results: {}", folder.display()))?;
     terminal.write_json(&pair_score_json(&scores, &conduct))?;
     left.map_or(Ok(Outcome::Answered), Err)
@@ -197,7 +201,7 @@ fn answer_of(before: &TestFile, after: &TestFile, repeatability: Option<f64>) ->
 fn side_of(file: &TestFile) -> anyhow::Result<Test> {
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
-    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
     compared_test(&file.test, &analysis)
         .ok_or_else(|| anyhow!("{}: describes no structure", file.name))
 }

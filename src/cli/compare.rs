@@ -8,6 +8,7 @@ use super::overwrite::Expanded;
 use super::place::is_description;
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use std::mem;
@@ -16,12 +17,12 @@ use tapjoint::compare::{
     LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
 };
 use tapjoint::pipeline::{
-    IdentifySettings, RecordingResult, TestedStructure, Warning, compared_test,
+    IdentifySettings, RecordingResult, Stage, TestedStructure, Warning, Work, compared_test,
 };
 use tapjoint::report::document::{Document, PairFiles};
 use tapjoint::report::{
-    ComparedRecordings, comparison_of, earlier_files, render_compared, render_comparison,
-    render_comparison_picture, render_series_csv, series_of,
+    ComparedRecordings, compared_files, comparison_of, draw_compared, earlier_files,
+    render_comparison, render_comparison_picture, render_series_csv, series_of,
 };
 
 /// Say what changed between two tests of one structure, or in a series of tests.
@@ -71,6 +72,8 @@ pub(super) struct CompareArguments {
     /// Write a row for each test and chart of a series into this file (CSV)
     #[arg(long, value_name = "FILE", requires = "series")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 impl CompareArguments {
@@ -175,7 +178,9 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         let sides = read(&arguments.series)?;
         let (name, structure) = (sides[0].name.clone(), sides[0].structure);
         let tests: Vec<Test> = sides.into_iter().map(|side| side.compared).collect();
+        let work = Work::begin(terminal.watch(), Stage::Comparison);
         let found = watch(&tests, &settings)?;
+        drop(work);
         let mut recordings = ComparedRecordings::default();
         if let Some((_, departure)) = found.series.departure()
             && outputs.report.is_some()
@@ -191,7 +196,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         }
         let files = names(&arguments.series);
         let document = series_of(&name, &structure, files, found, warnings);
-        return answer(&document, &recordings, outputs, terminal);
+        return answer(document, &recordings, outputs, terminal);
     }
     let (mut first, mut files, mut pairs) = (None, Vec::new(), Vec::new());
     for [before, after] in arguments.pairs() {
@@ -211,14 +216,16 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
             "there is nothing to compare; give BEFORE and AFTER, --before and --after, --pair, or --series"
         );
     };
+    let work = Work::begin(terminal.watch(), Stage::Comparison);
     let found = compare(&pairs, &settings)?;
+    drop(work);
     let document = comparison_of(&name, &structure, files, found, warnings);
     let mut shown = shown.into_iter();
     let recordings = ComparedRecordings {
         before: shown.next().unwrap_or_default(),
         after: shown.next().unwrap_or_default(),
     };
-    answer(&document, &recordings, outputs, terminal)
+    answer(document, &recordings, outputs, terminal)
 }
 
 /// Returns files as the user named them.
@@ -229,31 +236,40 @@ fn names(files: &[PathBuf]) -> Vec<String> {
 
 /// Writes everything that was asked for, and prints the answer.
 fn answer(
-    document: &Document,
+    mut document: Document,
     recordings: &ComparedRecordings,
     outputs: Outputs,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
+    let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     if let Some(file) = outputs.png
-        && let Some(bytes) = render_comparison_picture(document, file.picture_format())?
+        && let Some(bytes) = render_comparison_picture(&document, file.picture_format())?
     {
         file.write(&bytes)?;
     }
+    let report = outputs.report.map(|folder| {
+        let drawn = draw_compared(&document, recordings);
+        drawn.map(|drawn| (folder, drawn))
+    });
+    let report = report.transpose()?;
+    work.go_on(Stage::Files);
     if let Some(file) = outputs.csv {
-        file.write(render_series_csv(document)?.as_bytes())?;
+        file.write(render_series_csv(&document)?.as_bytes())?;
     }
     let mut published = None;
-    if let Some(folder) = outputs.report {
-        for file in render_compared(document, recordings)? {
+    if let Some((folder, drawn)) = report {
+        document.timings = terminal.timings();
+        for file in compared_files(&document, drawn)? {
             folder.add(&file.name, &file.bytes)?;
         }
         published = Some(folder.publish_report()?);
     }
-    terminal.say(&render_comparison(document))?;
+    drop(work);
+    terminal.say(&render_comparison(&document))?;
     if let Some((folder, _)) = &published {
         terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     }
-    terminal.write_document(document)?;
+    terminal.write_document(&document)?;
     let left = published.and_then(|(_, left)| left);
     left.map_or(Ok(Outcome::Answered), Err)
 }
@@ -277,7 +293,8 @@ fn read_side(
     };
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
-    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
+    let _work = Work::begin(terminal.watch(), Stage::Comparison);
     let compared = compared_test(&file.test, &analysis);
     let structure = analysis.structure;
     let (compared, structure) = compared

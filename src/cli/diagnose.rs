@@ -7,11 +7,12 @@ use super::identify::{FrequencyArguments, resolve};
 use super::input::{TestFile, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
-use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
+use tapjoint::pipeline::{Analysis, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::report::document::{GapSection, UpdatedModelSection};
 use tapjoint::report::{MODEL_FILE, document_of, gap_section, render_gap_text};
 use tapjoint::study::updated_model::{described_frequencies, updated_model};
@@ -35,6 +36,8 @@ pub(super) struct DiagnoseArguments {
     /// if no effect explains the readings
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 pub(super) fn run(
@@ -44,17 +47,19 @@ pub(super) fn run(
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let output = OutputFile::prepare_optional(arguments.model.as_deref())?;
-    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
     let settings = GapSettings {
         seed,
         ..GapSettings::default()
     };
+    let mut work = Work::begin(terminal.watch(), Stage::Diagnosis);
     let diagnosis = diagnose_test(&file.test, &analysis, &settings);
     let mut document = document_of(&analysis);
     let mut gap = gap_section(diagnosis.as_ref());
     let name = arguments.model.as_deref().map(file_name);
     let text = add_model(&mut gap, &file, name, &analysis, diagnosis.as_ref().ok());
     document.add_gap(gap);
+    work.go_on(Stage::Files);
     match (output, text) {
         (None, _) => {}
         (Some(output), Some(text)) => output.write(text.as_bytes())?,
@@ -73,6 +78,7 @@ pub(super) fn run(
             ));
         }
     }
+    drop(work);
     terminal.say(&render_gap_text(&document))?;
     terminal.write_document(&document)?;
     Ok(Outcome::of(diagnosis.is_ok()))

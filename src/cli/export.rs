@@ -4,6 +4,7 @@ use super::Outcome;
 use super::input::{TestFile, effect_at, read_model};
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use std::fs::File;
@@ -41,6 +42,8 @@ pub(super) struct ExportArguments {
     /// Write into this file; default: standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 /// Formats of finite-element input.
@@ -143,7 +146,7 @@ fn estimated(
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
     let progress = terminal.progress("estimating the joint");
-    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
     drop(progress);
     Ok(source_of(&file.test, &analysis).map(|source| DeckSource {
         doubts: doubts_of(&analysis),

@@ -11,12 +11,14 @@ use super::overwrite::Expanded;
 use super::place::is_description;
 use super::recording::{analyse, holds_functions, refuse_given};
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tapjoint::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
 use tapjoint::pipeline::{
-    Analysis, Frf, FrfSettings, IdentifySettings, Response, Wiring, frfs_of, run_wired, si_unit,
+    Analysis, Frf, FrfSettings, IdentifySettings, MeasureSettings, Response, Stage, Watch, Wiring,
+    Work, frfs_of, run_wired, si_unit,
 };
 use tapjoint::recording::{Recording, UffFormat};
 use tapjoint::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
@@ -78,6 +80,8 @@ pub(super) struct FrfArguments {
     /// Write functions and coherences as a universal file, datasets 58b (binary, without rounding)
     #[arg(long, value_name = "FILE")]
     uff58b: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 impl FrfArguments {
@@ -199,24 +203,27 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let analysis = match &subject {
-        Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed())?,
-        Subject::Recording(hammer) => analyse_recording(arguments, hammer)?,
+        Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?,
+        Subject::Recording(hammer) => analyse_recording(arguments, hammer, terminal.watch())?,
         Subject::Functions => analyse(
             &arguments.file,
             &arguments.recording,
             &arguments.spectrum,
             ReadBy::default(),
+            terminal.watch(),
         )?,
     };
     let settings = FrfSettings {
         estimator: arguments.estimator,
         form: arguments.form,
     };
+    let mut work = Work::begin(terminal.watch(), Stage::Spectra);
     let frfs: Vec<Vec<Frf>> = analysis
         .recordings
         .iter()
         .map(|recording| frfs_of(recording, &settings))
         .collect::<Result<_, _>>()?;
+    work.go_on(Stage::Pictures);
     let drawn = pictures.into_iter().zip(&analysis.recordings).zip(&frfs);
     for ((file, recording), frfs) in drawn {
         match render_frf_picture(recording, frfs, file.picture_format())? {
@@ -228,6 +235,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         }
     }
     let all = frfs.concat();
+    work.go_on(Stage::Files);
     for (file, format) in outputs {
         match format {
             _ if all.is_empty() => {
@@ -237,6 +245,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
             Some(format) => file.write(&render_frf_uff(&all, format)?)?,
         }
     }
+    drop(work);
     let document = frf_document(&analysis, &all);
     terminal.answer(&document)?;
     Ok(Outcome::of(!all.is_empty()))
@@ -246,7 +255,12 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
 ///
 /// # Errors
 /// Channels that do not exist or are named twice, scales that do not fit them, an impossible analysis.
-fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::Result<Analysis> {
+fn analyse_recording(
+    arguments: &FrfArguments,
+    hammer: &ChannelRef,
+    watch: &dyn Watch,
+) -> anyhow::Result<Analysis> {
+    let work = Work::begin(watch, Stage::Taps);
     let mut recording = arguments.recording.open(&arguments.file)?;
     let hammer = channel_of(&recording, "--hammer", hammer)?;
     let channels = sensor_channels(&recording, hammer, &arguments.sensor)?;
@@ -291,10 +305,12 @@ fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::R
         hammer_unit,
         responses,
     };
-    Ok(run_wired(recording, &wiring, |measure| {
+    drop(work);
+    let adjust = |measure: &mut MeasureSettings| {
         arguments.spectrum.apply(measure);
         measure.taps = arguments.recording.taps();
-    })?)
+    };
+    Ok(run_wired(recording, &wiring, adjust, watch)?)
 }
 
 /// Returns the channels of the sensors; without any, all channels but the hammer's.

@@ -7,12 +7,13 @@ use super::arguments::{
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::bail;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::description::MeasuredFrequencies;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work};
 use tapjoint::report::{document_of, render_cloud_picture, render_perturbation_csv};
 
 /// Estimate joint stiffness from natural frequencies alone.
@@ -29,6 +30,8 @@ pub(super) struct IdentifyArguments {
     /// Method of the estimate
     #[arg(long, default_value = "consistent", value_parser = method())]
     method: EstimateMethod,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 /// Frequencies on the command line.
@@ -106,10 +109,13 @@ pub(super) fn identify(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
-    let analysis = file.analyse(&IdentifySettings {
-        method: arguments.method,
-        ..IdentifySettings::unperturbed()
-    })?;
+    let analysis = file.analyse(
+        &IdentifySettings {
+            method: arguments.method,
+            ..IdentifySettings::unperturbed()
+        },
+        terminal.watch(),
+    )?;
     terminal.answer(&document_of(&analysis))?;
     Ok(Outcome::of_analysis(&analysis))
 }
@@ -147,6 +153,8 @@ pub(super) struct PerturbArguments {
     /// Write all numbers as comma separated values into this file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 pub(super) fn perturb(
@@ -162,17 +170,20 @@ pub(super) fn perturb(
         monte_carlo: Some((arguments.samples, seed)),
         ..perturbed_by(arguments.method)
     };
-    let analysis = file.analyse(&settings)?;
+    let analysis = file.analyse(&settings, terminal.watch())?;
     let document = document_of(&analysis);
+    let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     if let Some(file) = png {
         match render_cloud_picture(&document, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn("there are no estimates of Kx and Ky to draw"),
         }
     }
+    work.go_on(Stage::Files);
     if let Some(file) = csv {
         file.write(render_perturbation_csv(&document)?.as_bytes())?;
     }
+    drop(work);
     terminal.answer(&document)?;
     let perturbed = analysis
         .identification

@@ -5,7 +5,9 @@ use anyhow::{Context, anyhow, bail};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 use tapjoint::description::{FreeTestFile, TestDescription};
-use tapjoint::pipeline::{Analysis, FreeTest, IdentifySettings, measure_free_test, run_test};
+use tapjoint::pipeline::{
+    Analysis, FreeTest, IdentifySettings, Watch, measure_free_test, run_test_watched,
+};
 use tapjoint::study::updated_model::DescribedEffectError;
 
 /// No description of a free bar is larger (bytes).
@@ -80,30 +82,35 @@ pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Err
 }
 
 impl TestFile {
-    /// Runs the described test, and before it that of the free bar where the description names one.
+    /// Runs the described test, and before it that of the free bar where the description names one. The stages are announced
+    /// to `watch`.
     ///
     /// # Errors
-    /// Those of [`measure_free_test`] and [`run_test`].
-    pub(super) fn analyse(&self, settings: &IdentifySettings) -> anyhow::Result<Analysis> {
+    /// Those of [`measure_free_test`] and [`run_test_watched`].
+    pub(super) fn analyse(
+        &self,
+        settings: &IdentifySettings,
+        watch: &dyn Watch,
+    ) -> anyhow::Result<Analysis> {
         let settings = IdentifySettings {
-            free_test: self.measured_free_test()?,
+            free_test: self.measured_free_test(watch)?,
             ..settings.clone()
         };
         let place = (self.folder.as_path(), self.name.as_str());
-        Ok(run_test(&self.test, place, &settings)?)
+        Ok(run_test_watched(&self.test, place, &settings, watch)?)
     }
 
     /// Measures the free bar; `None` where the description names no test of it.
     ///
     /// # Errors
     /// Those of [`measure_free_test`], and of a description that is none of the same bar.
-    pub(super) fn measured_free_test(&self) -> anyhow::Result<Option<FreeTest>> {
+    pub(super) fn measured_free_test(&self, watch: &dyn Watch) -> anyhow::Result<Option<FreeTest>> {
         let Some(named) = &self.test.beam.free_test else {
             return Ok(None);
         };
         let free = self.free_test(named)?;
         let place = (free.folder.as_path(), free.name.as_str());
-        let measured = measure_free_test(&self.test, &free.test, place);
+        let measured = measure_free_test(&self.test, &free.test, place, watch);
         let measured = measured.map_err(|cause| named.error(&self.name, cause.to_string()))?;
         Ok(Some(measured))
     }

@@ -13,6 +13,7 @@ mod program;
 mod publication;
 mod staging;
 mod terminal;
+mod timings;
 
 mod blind_check;
 mod blind_tests;
@@ -36,10 +37,13 @@ use place::is_description;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 use tapjoint::description::TestDescription;
 use tapjoint::pipeline::Analysis;
+use tapjoint::report::render_timings;
 use terminal::Terminal;
+use timings::{Stopwatch, TimingsArguments};
 
 /// From hammer taps to joint stiffness.
 ///
@@ -125,11 +129,18 @@ pub(super) fn main() -> ExitCode {
         }
     };
     let start = Instant::now();
+    let timings = line.command.timings();
+    let stopwatch = timings
+        .is_some_and(|given| given.timings)
+        .then(|| Arc::new(Stopwatch::start()));
     if let Err(cause) = staging::watch_signals() {
         terminal::print_error(&cause.into());
         return ExitCode::from(2);
     }
-    let outcome = run_command(&line, &matches);
+    let outcome = run_command(&line, &matches, stopwatch.clone());
+    if let Some(stopwatch) = stopwatch.filter(|_| outcome.is_ok() && !line.common.quiet) {
+        let _ = write!(io::stderr(), "{}", render_timings(&stopwatch.timings()));
+    }
     if line.common.tells_more() {
         let seconds = start.elapsed().as_secs_f64();
         let threads = rayon::current_num_threads();
@@ -149,7 +160,11 @@ pub(super) fn main() -> ExitCode {
     }
 }
 
-fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
+fn run_command(
+    line: &CommandLine,
+    matches: &ArgMatches,
+    stopwatch: Option<Arc<Stopwatch>>,
+) -> anyhow::Result<Outcome> {
     // The files that the command reads and writes, from its arguments and its test description.
     let files = matches
         .subcommand()
@@ -169,7 +184,7 @@ fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outco
     }
     files.check()?;
     line.common.set_threads()?;
-    let terminal = Terminal::new(&line.common, files)?;
+    let terminal = Terminal::new(&line.common, files, stopwatch)?;
     let seed = line.common.seed;
     match &line.command {
         Command::Run(arguments) => run::run(arguments, seed, terminal),
@@ -199,6 +214,30 @@ fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outco
 }
 
 impl Command {
+    /// Returns the option `--timings`; `None` of commands that do not compute from data and do not have it.
+    fn timings(&self) -> Option<&TimingsArguments> {
+        match self {
+            Self::Run(arguments) => Some(&arguments.timings),
+            Self::Inspect(arguments) => Some(&arguments.timings),
+            Self::Spectrum(arguments) => Some(&arguments.timings),
+            Self::Frf(arguments) => Some(&arguments.timings),
+            Self::Identify(arguments) => Some(&arguments.timings),
+            Self::Perturb(arguments) => Some(&arguments.timings),
+            Self::Plan(arguments) => Some(&arguments.timings),
+            Self::Diagnose(arguments) => Some(&arguments.timings),
+            Self::Compare(arguments) => Some(&arguments.timings),
+            Self::BlindCheck(arguments) => Some(&arguments.timings),
+            Self::Resolution(arguments) => Some(&arguments.timings),
+            Self::Export(arguments) => Some(&arguments.timings),
+            Self::Simulate(arguments) => Some(&arguments.timings),
+            Self::Init(_)
+            | Self::Predict(_)
+            | Self::Reproduce(_)
+            | Self::Completions(_)
+            | Self::Man(_) => None,
+        }
+    }
+
     /// Returns the files of those options that write several files.
     fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
         match self {

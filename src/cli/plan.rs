@@ -5,11 +5,13 @@ use super::arguments::StiffnessArguments;
 use super::input::read_test;
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::description::JointModel;
+use tapjoint::pipeline::{Stage, Work};
 use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
 use tapjoint::study::blind_check::{Conduct, score};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
@@ -39,6 +41,8 @@ pub(super) struct PlanArguments {
     /// Draw the table into this file (PNG, or SVG if its name ends in .svg)
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 /// Largest standard uncertainty of a frequency (%). With a larger one no effect could be distinguished.
@@ -78,12 +82,15 @@ pub(super) fn run(
         seed,
         ..PlanSettings::default()
     };
+    let work = Work::begin(terminal.watch(), Stage::Study);
     let cases = judge_plan(&test, &settings, &|done, of| {
         terminal.count("tests diagnosed", done, of);
     })
     .with_context(|| file.name.clone())?;
+    drop(work);
     terminal.say(&tell_apart(&cases))?;
     if let Some(png) = png {
+        let _work = Work::begin(terminal.watch(), Stage::Pictures);
         let picture = render_confusion_picture(&cases, png.picture_format())?;
         png.write(&picture)?;
     }

@@ -20,7 +20,7 @@ use tapjoint::report::document::VERSION;
 use tapjoint::report::render_reproduction;
 use tapjoint::study::publication::reproduce;
 
-/// Tasks and their commands; a command that is not named here is listed under the last.
+/// Tasks and their commands. A test makes sure that every command has its task; one that had none would stand under the last.
 const TASKS: &[(&str, &[&str])] = &[
     (
         "A test from recordings to report",
@@ -32,6 +32,7 @@ const TASKS: &[(&str, &[&str])] = &[
         &["identify", "predict", "perturb", "resolution", "export"],
     ),
     ("Effects that the model lacks", &["plan", "diagnose"]),
+    ("Changes between tests", &["compare"]),
     ("Virtual tests", &["simulate", "blind-check", "reproduce"]),
     (OTHER, &["completions", "man", "help"]),
 ];

@@ -8,12 +8,14 @@ use super::arguments::{RecordingArguments, SpectrumSettings, reading};
 use super::input::{check_file, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{bail, ensure};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tapjoint::description::ReadBy;
 use tapjoint::pipeline::{
-    Analysis, FunctionSettings, inspect_bare, run_functions, run_recording, together,
+    Analysis, FunctionSettings, MeasureSettings, Stage, Watch, Work, inspect_bare,
+    run_functions_watched, run_recording_watched, together,
 };
 use tapjoint::recording::{
     RecordingError, is_universal_file, list_datasets, open_frequency_responses,
@@ -29,15 +31,19 @@ pub(super) fn analyse(
     recording: &RecordingArguments,
     spectrum: &SpectrumSettings,
     reading: ReadBy,
+    watch: &dyn Watch,
 ) -> anyhow::Result<Analysis> {
+    let work = Work::begin(watch, Stage::Taps);
     let problem = match recording.open(path) {
         Ok(opened) => {
-            let analysis = run_recording(opened, recording.hammer.as_ref(), |measure| {
+            drop(work);
+            let adjust = |measure: &mut MeasureSettings| {
                 spectrum.apply(measure);
                 measure.taps = recording.taps();
                 measure.reading = reading;
-            });
-            return Ok(analysis?);
+            };
+            let hammer = recording.hammer.as_ref();
+            return Ok(run_recording_watched(opened, hammer, adjust, watch)?);
         }
         Err(problem) => problem,
     };
@@ -63,13 +69,14 @@ pub(super) fn analyse(
         ("--window", spectrum.window.is_some()),
     ];
     refuse_given(path, &time_options)?;
+    drop(work);
     functions.file = file_name(path);
     let settings = FunctionSettings {
         band: spectrum.zoom,
         reading,
         ..FunctionSettings::default()
     };
-    Ok(run_functions(&functions, &settings)?)
+    Ok(run_functions_watched(&functions, &settings, watch)?)
 }
 
 /// Returns true if a file holds frequency response functions and no samples in time.
@@ -127,6 +134,8 @@ pub(super) struct InspectArguments {
     headers: bool,
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
@@ -167,11 +176,13 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
                 "{shown}: --headers lists the datasets of universal files, and this is none; leave --headers out"
             );
         }
+        let _work = Work::begin(terminal.watch(), Stage::Taps);
         let recording = arguments.recording.open(file)?;
         recordings.push(inspect_bare(
             recording,
             arguments.recording.hammer.as_ref(),
             &arguments.recording.taps(),
+            terminal.watch(),
         )?);
     }
     let warnings: Vec<_> = recordings
@@ -211,6 +222,8 @@ pub(super) struct SpectrumArguments {
     png: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 pub(super) fn spectrum(
@@ -224,14 +237,17 @@ pub(super) fn spectrum(
         &arguments.recording,
         &arguments.spectrum,
         arguments.reading,
+        terminal.watch(),
     )?;
     let document = document_of(&analysis);
     if let Some(file) = png {
         let recording = analysis.recordings.first();
+        let mut work = Work::begin(terminal.watch(), Stage::Pictures);
         let picture = recording
             .map(|recording| render_spectrum_picture(recording, file.picture_format()))
             .transpose()?
             .flatten();
+        work.go_on(Stage::Files);
         match picture {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn("no tap was accepted, so there is no spectrum to draw"),

@@ -5,12 +5,13 @@ use super::arguments::{StiffnessArguments, band, block_size, reading, window};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{bail, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::description::{ReadBy, WindowKind};
-use tapjoint::pipeline::{IdentifySettings, TestedStructure, tested_structure};
+use tapjoint::pipeline::{IdentifySettings, Stage, TestedStructure, Watch, Work, tested_structure};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::report::{
     prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
@@ -68,6 +69,8 @@ pub(super) struct ResolutionArguments {
     /// Write all numbers as comma-separated values into this file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 fn accuracy(text: &str) -> Result<f64, String> {
@@ -132,7 +135,11 @@ fn settings(arguments: &ResolutionArguments, seed: u64) -> ResolutionSettings {
 }
 
 /// Returns the joint that the description gives, or that is estimated from its frequencies or recordings.
-fn described_joint(file: &TestFile, structure: &TestedStructure) -> anyhow::Result<JointStiffness> {
+fn described_joint(
+    file: &TestFile,
+    structure: &TestedStructure,
+    watch: &dyn Watch,
+) -> anyhow::Result<JointStiffness> {
     if structure.assembly == Assembly::Free {
         return Ok(JointStiffness::FREE);
     }
@@ -141,7 +148,7 @@ fn described_joint(file: &TestFile, structure: &TestedStructure) -> anyhow::Resu
     }
     let mut why = String::new();
     if file.test.measured.is_some() || !file.test.recordings.is_empty() {
-        let analysis = file.analyse(&IdentifySettings::unperturbed())?;
+        let analysis = file.analyse(&IdentifySettings::unperturbed(), watch)?;
         if let Some(found) = analysis.identification {
             if let Some((_, joint)) = found.beam_and_joint(structure) {
                 return Ok(joint);
@@ -179,22 +186,26 @@ pub(super) fn run(
     let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
     let joint = match given {
         Some(given) => given,
-        None => described_joint(&file, &structure)?,
+        None => described_joint(&file, &structure, terminal.watch())?,
     };
     let mut test = StudiedTest::of_description(&file.test, &structure, joint, &arguments.bands);
-    if let Some(free) = file.measured_free_test()? {
+    if let Some(free) = file.measured_free_test(terminal.watch())? {
         test.details.free = Some(free.bar);
     }
+    let mut work = Work::begin(terminal.watch(), Stage::Study);
     let study = study_resolution(&test, &settings(arguments, seed), &|done, of| {
         terminal.count("virtual tests", done, of);
     })?;
+    work.go_on(Stage::Pictures);
     if let Some(file) = png {
         let picture = render_resolution_picture(&study, file.picture_format())?;
         file.write(&picture)?;
     }
+    work.go_on(Stage::Files);
     if let Some(file) = csv {
         file.write(render_resolution_csv(&study)?.as_bytes())?;
     }
+    drop(work);
     let warnings = study.doubts();
     for (_, text) in &warnings {
         terminal.warn(text);

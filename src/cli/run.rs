@@ -11,15 +11,16 @@ use super::place::is_description;
 use super::publication::OutputFolder;
 use super::recording::analyse;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings, diagnose_test};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::recording::ReadSettings;
 use tapjoint::report::{
-    MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
+    MODEL_FILE, document_of, draw_run, earlier_files, gap_section, render_text, run_files,
 };
 
 /// Analyse a test, from recordings to joint, and write a report.
@@ -48,6 +49,8 @@ pub(super) struct RunArguments {
     method: &'static [EstimateMethod],
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 impl RunArguments {
@@ -145,15 +148,19 @@ pub(super) fn run(
     let output = OutputFolder::prepare(&arguments.folder(&name), terminal.files())?;
     let progress = terminal.progress("measuring, fitting and estimating");
     let analysis = match &described {
-        Some(file) => file.analyse(&IdentifySettings {
-            monte_carlo: Some((SAMPLES, seed)),
-            ..perturbed_by(arguments.method)
-        })?,
+        Some(file) => file.analyse(
+            &IdentifySettings {
+                monte_carlo: Some((SAMPLES, seed)),
+                ..perturbed_by(arguments.method)
+            },
+            terminal.watch(),
+        )?,
         None => analyse(
             &arguments.file,
             &arguments.recording,
             &SpectrumSettings::default(),
             arguments.reading.unwrap_or_default(),
+            terminal.watch(),
         )?,
     };
     let mut document = document_of(&analysis);
@@ -163,6 +170,7 @@ pub(super) fn run(
             seed,
             ..GapSettings::default()
         };
+        let _work = Work::begin(terminal.watch(), Stage::Diagnosis);
         let diagnosis = diagnose_test(&file.test, &analysis, &settings);
         let mut gap = gap_section(diagnosis.as_ref());
         let name = Some(MODEL_FILE.to_owned());
@@ -170,13 +178,18 @@ pub(super) fn run(
         document.add_gap(gap);
     }
     drop(progress);
+    let mut work = Work::begin(terminal.watch(), Stage::Pictures);
+    let drawn = draw_run(&document, &analysis.recordings)?;
+    work.go_on(Stage::Files);
+    document.timings = terminal.timings();
     if let Some(model) = model {
         output.add(MODEL_FILE, model.as_bytes())?;
     }
-    for file in render_run(&document, &analysis.recordings)? {
+    for file in run_files(&document, drawn)? {
         output.add(&file.name, &file.bytes)?;
     }
     let (folder, left) = output.publish_report()?;
+    drop(work);
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;

@@ -7,6 +7,7 @@ use super::laboratory::{LaboratoryArguments, laboratory_lines};
 use super::overwrite::{CHECKSUMS, Expanded, listed_files};
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
+use super::timings::TimingsArguments;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use rand::{Rng, SeedableRng};
@@ -106,6 +107,8 @@ pub(super) struct SimulateArguments {
     stiffness: StiffnessArguments,
     #[command(flatten)]
     laboratory: LaboratoryArguments,
+    #[command(flatten)]
+    pub(super) timings: TimingsArguments,
 }
 
 /// Parses `EFFECT:key=value,...`.

@@ -4,12 +4,15 @@ use super::arguments::{CommonArguments, JsonDestination};
 use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
 use super::staging::ledger;
+use super::timings::Stopwatch;
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
-use tapjoint::report::document::Document;
+use tapjoint::pipeline::Watch;
+use tapjoint::report::document::{Document, TimingsSection};
 use tapjoint::report::{render_json, render_readings, render_stages, render_text, wrapped};
 
 /// Destinations of a command's output.
@@ -19,6 +22,7 @@ pub(super) struct Terminal {
     json: Option<Json>,
     quiet: bool,
     verbose: u8,
+    stopwatch: Option<Arc<Stopwatch>>,
 }
 
 /// Destination of the JSON document. A file is opened before any work.
@@ -29,8 +33,12 @@ enum Json {
 }
 
 impl Terminal {
-    /// Opens the file of `--json`, so that a missing permission is found before any work.
-    pub(super) fn new(common: &CommonArguments, files: Files) -> anyhow::Result<Self> {
+    /// Opens the file of `--json`, so that a missing permission is found before any work. `stopwatch` is that of `--timings`.
+    pub(super) fn new(
+        common: &CommonArguments,
+        files: Files,
+        stopwatch: Option<Arc<Stopwatch>>,
+    ) -> anyhow::Result<Self> {
         let json = match &common.json {
             None => None,
             Some(JsonDestination::StandardOutput) => Some(Json::StandardOutput),
@@ -41,12 +49,27 @@ impl Terminal {
             json,
             quiet: common.quiet,
             verbose: common.verbose,
+            stopwatch,
         })
     }
 
     /// Returns the files that the command reads and writes.
     pub(super) fn files(&self) -> &Files {
         &self.files
+    }
+
+    /// Returns the receiver of the stages of the work.
+    pub(super) fn watch(&self) -> &dyn Watch {
+        match &self.stopwatch {
+            Some(stopwatch) => stopwatch.as_ref(),
+            None => &(),
+        }
+    }
+
+    /// Returns what the stages took until now; `None` without `--timings`.
+    pub(super) fn timings(&self) -> Option<TimingsSection> {
+        let stopwatch = self.stopwatch.as_ref()?;
+        Some(stopwatch.timings())
     }
 
     /// Prints an answer, unless `--quiet` is given or JSON goes to standard output.
@@ -122,17 +145,26 @@ impl Terminal {
             return Ok(());
         }
         // The very text of report.json: reading numbers back could change their last digit.
-        self.write_text(&render_json(document)?)
+        let text = match self.timings() {
+            None => render_json(document),
+            Some(timings) => render_json(&Document {
+                timings: Some(timings),
+                ..document.clone()
+            }),
+        };
+        self.write_text(&text?)
     }
 
     /// Writes another document to the destination of `--json`, with the keys that all documents have. Call it
     /// last.
     pub(super) fn write_json(self, document: &serde_json::Value) -> anyhow::Result<()> {
         let mut whole = document.clone();
+        let timings = self.timings().map(serde_json::to_value).transpose()?;
         if let Some(keys) = whole.as_object_mut() {
             for (key, value) in [("version", json!(1)), ("warnings", json!([]))] {
                 keys.entry(key).or_insert(value);
             }
+            keys.extend(timings.map(|timings| ("timings".to_owned(), timings)));
         }
         let mut text = serde_json::to_string_pretty(&whole)?;
         text.push('\n');

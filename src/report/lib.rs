@@ -47,12 +47,13 @@ pub use document::{
 };
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
-    MODEL_FILE, earlier_files, render_cloud_picture, render_compared, render_comparison_picture,
-    render_frf_picture, render_json, render_run, render_schema, render_spectrum_picture,
+    DrawnPictures, MODEL_FILE, compared_files, draw_compared, draw_run, earlier_files,
+    render_cloud_picture, render_compared, render_comparison_picture, render_frf_picture,
+    render_json, render_run, render_schema, render_spectrum_picture, run_files,
 };
 pub use text::{
     render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,
-    render_text, wrapped,
+    render_text, render_timings, wrapped,
 };
 
 /// A finished file.

@@ -33,7 +33,29 @@ pub fn render_run(
     document: &Document,
     recordings: &[RecordingResult],
 ) -> Result<Vec<ReportFile>, ReportError> {
-    let mut files = render_page(document, &pictures(document, recordings))?;
+    run_files(document, draw_run(document, recordings)?)
+}
+
+/// Draws the pictures of [`render_run`].
+///
+/// # Errors
+/// [`ReportError::Picture`] if one cannot be drawn.
+pub fn draw_run(
+    document: &Document,
+    recordings: &[RecordingResult],
+) -> Result<DrawnPictures, ReportError> {
+    DrawnPictures::of(&pictures(document, recordings))
+}
+
+/// All files of [`render_run`], those of its `drawn` pictures included.
+///
+/// # Errors
+/// The first [`ReportError`] of any file.
+pub fn run_files(
+    document: &Document,
+    drawn: DrawnPictures,
+) -> Result<Vec<ReportFile>, ReportError> {
+    let mut files = render_page(document, drawn)?;
     files.extend([
         ReportFile::of("parameters.csv", render_parameters_csv(document)?),
         ReportFile::of("modes.csv", render_modes_csv(document)?),
@@ -58,6 +80,17 @@ pub fn render_compared(
     document: &Document,
     recordings: &ComparedRecordings,
 ) -> Result<Vec<ReportFile>, ReportError> {
+    compared_files(document, draw_compared(document, recordings)?)
+}
+
+/// Draws the pictures of [`render_compared`].
+///
+/// # Errors
+/// [`ReportError::Picture`] if one cannot be drawn.
+pub fn draw_compared(
+    document: &Document,
+    recordings: &ComparedRecordings,
+) -> Result<DrawnPictures, ReportError> {
     let charts = [
         series::control_charts(document),
         comparison::changes(document),
@@ -65,7 +98,18 @@ pub fn render_compared(
     ];
     let charts = charts.into_iter().flatten();
     let pictures: Vec<_> = charts.map(|chart| (chart.kind.to_owned(), chart)).collect();
-    let mut files = render_page(document, &pictures)?;
+    DrawnPictures::of(&pictures)
+}
+
+/// All files of [`render_compared`], those of its `drawn` pictures included.
+///
+/// # Errors
+/// The first [`ReportError`] of any file.
+pub fn compared_files(
+    document: &Document,
+    drawn: DrawnPictures,
+) -> Result<Vec<ReportFile>, ReportError> {
+    let mut files = render_page(document, drawn)?;
     if document.series.is_some() {
         files.push(ReportFile::of("series.csv", render_series_csv(document)?));
     }
@@ -75,30 +119,34 @@ pub fn render_compared(
     Ok(files)
 }
 
-/// Returns the pictures, the page with them, and `report.json`.
-fn render_page(
-    document: &Document,
-    pictures: &[(String, Chart)],
-) -> Result<Vec<ReportFile>, ReportError> {
-    type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
-    let (rendered, json) = rayon::join(
-        || {
-            let rendered = pictures.par_iter();
-            let rendered = rendered.map(|(name, chart)| render_chart(name, chart));
-            rendered.collect::<Result<Rendered, _>>()
-        },
-        || render_json(document),
-    );
-    let mut files = Vec::new();
-    let mut figures = Vec::new();
-    for (of_picture, figure) in rendered? {
-        files.extend(of_picture);
-        figures.push(figure);
+/// The pictures of a report, drawn for its files and for its page.
+pub struct DrawnPictures {
+    files: Vec<ReportFile>,
+    figures: Vec<InlineFigure>,
+}
+
+impl DrawnPictures {
+    fn of(charts: &[(String, Chart)]) -> Result<Self, ReportError> {
+        type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
+        let rendered = charts.par_iter();
+        let rendered = rendered.map(|(name, chart)| render_chart(name, chart));
+        let (mut files, mut figures) = (Vec::new(), Vec::new());
+        for (of_picture, figure) in rendered.collect::<Result<Rendered, _>>()? {
+            files.extend(of_picture);
+            figures.push(figure);
+        }
+        // Before a figure that takes a page of its own, half of a page would stay empty.
+        figures.sort_by_key(|figure| figure.tall);
+        Ok(DrawnPictures { files, figures })
     }
-    // Before a figure that takes a page of its own, half of a page would stay empty.
-    figures.sort_by_key(|figure| figure.tall);
+}
+
+/// Returns the pictures, the page with them, and `report.json`.
+fn render_page(document: &Document, drawn: DrawnPictures) -> Result<Vec<ReportFile>, ReportError> {
+    let DrawnPictures { mut files, figures } = drawn;
+    let (page, json) = rayon::join(|| render_html(document, &figures), || render_json(document));
     files.extend([
-        ReportFile::of("report.html", render_html(document, &figures)?),
+        ReportFile::of("report.html", page?),
         ReportFile::of("report.json", json?),
     ]);
     Ok(files)

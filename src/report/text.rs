@@ -2,14 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use crate::document::{Document, EstimateSection, ReadBy, method_name};
-use crate::format::{MISSING, capital, signed_percent, significant, trimmed};
+use crate::document::{Document, EstimateSection, ReadBy, Timing, TimingsSection, method_name};
+use crate::format::{MISSING, capital, or_missing, signed_percent, significant, trimmed};
 use crate::short_names::ways;
-use crate::tables::{self, Column, Place, Table, listed};
+use crate::tables::{self, Column, Place, Table, listed, number, words};
 use crate::words::comparison::answer;
 use crate::words::diagnosis::gap_story;
 use crate::words::findings::{brief, no_estimate};
 use crate::words::series;
+use tapjoint_analysis::Stage;
 use tapjoint_compare::DampingVerdict;
 use tapjoint_study::publication::{Agreement, Reproduction};
 
@@ -281,6 +282,52 @@ pub fn render_stages(document: &Document) -> String {
         lines.extend(statements.map(|words| format!("estimate: {words}")));
     }
     lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
+/// Returns what each stage of a command took, as a table.
+pub fn render_timings(timings: &TimingsSection) -> String {
+    let stages = timings.stages.iter();
+    let mut rows: Vec<(&str, &Timing)> = stages
+        .map(|row| (stage_words(row.stage), &row.timing))
+        .collect();
+    // Without stages everything is the total.
+    if !rows.is_empty() {
+        rows.push(("other", &timings.other));
+    }
+    rows.push(("total", &timings.total));
+    let rows = rows.into_iter().map(|(name, timing)| {
+        let seconds = |seconds: f64| format!("{seconds:.3}");
+        let megabytes = timing
+            .peak_bytes
+            .map(|bytes| format!("{:.1}", bytes as f64 / 1e6));
+        [
+            words("Stage", name),
+            number("Wall time (s)", seconds(timing.wall_seconds)),
+            number(
+                "Processor time (s)",
+                or_missing(timing.processor_seconds.map(seconds)),
+            ),
+            number("Peak memory so far (MB)", or_missing(megabytes)),
+        ]
+    });
+    render_table(&Table::of("Timings", rows, ""))
+}
+
+/// Returns the name of a stage in a table.
+fn stage_words(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Taps => "reading and taps",
+        Stage::Spectra => "spectra",
+        Stage::Fits => "fits of modes",
+        Stage::Numbers => "numbers of modes",
+        Stage::Joint => "joint",
+        Stage::Perturbation => "perturbation",
+        Stage::Diagnosis => "diagnosis",
+        Stage::Comparison => "comparison",
+        Stage::Study => "tests of the study",
+        Stage::Pictures => "pictures",
+        Stage::Files => "files",
+    }
 }
 
 /// Returns every tap and every peak of every recording; empty without recordings.

@@ -51,6 +51,11 @@ fn prop_help_lists_every_command_once_under_a_task() {
     for task in tasks {
         assert!(help.contains(task), "{task} is missing");
     }
+    // A command without a task would stand among those that only serve the program.
+    let (_, program) = help.split_once("The program itself:\n").unwrap();
+    let names = program.lines().take_while(|line| !line.is_empty());
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    assert_eq!(names.collect::<Vec<_>>(), ["completions", "man", "help"]);
     let list = help.split("Options:").next().unwrap_or_default();
     let longest = list.lines().skip_while(|line| !line.ends_with("report:"));
     assert!(longest.clone().count() > 10, "the list was found");

@@ -15,6 +15,7 @@ mod golden;
 mod leftovers;
 mod outputs;
 mod schema;
+mod timings;
 mod updated_model;
 
 use std::path::{Path, PathBuf};

@@ -7,6 +7,7 @@ mod gap;
 mod headline;
 mod measured;
 mod model;
+mod timings;
 
 pub use gap::{
     Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection, gap_section,
@@ -22,6 +23,7 @@ pub use model::{
     BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection, FreeTestSection, FromReadings,
     IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
 };
+pub use timings::{StageTiming, Timing, TimingsSection};
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
     AverageSection, CommonScaleSection, Conditions, EstimateMethod, FrfResonance,
@@ -112,6 +114,9 @@ pub struct Document {
     /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<QualityVerdict>>,
+    /// What each stage of the command took; only with `--timings`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub timings: Option<TimingsSection>,
     /// Everything that a reader of the results has to know.
     pub warnings: Vec<WarningSection>,
 }

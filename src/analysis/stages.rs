@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Stages of the work, in their order. The chain announces those up to [`Stage::Perturbation`], its callers the others.
+// The chain announces those up to the perturbation, its callers the others.
+/// Stages of the work, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {

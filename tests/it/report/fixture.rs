@@ -52,6 +52,7 @@ pub fn document() -> Document {
         compare: None,
         series: None,
         quality: Some(quality()),
+        timings: None,
         warnings: vec![
             WarningSection {
                 code: "closure".into(),

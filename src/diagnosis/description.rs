@@ -15,7 +15,7 @@
 use crate::modal_model::ModalModel;
 use crate::structure::ROTATION;
 use std::f64::consts::TAU;
-use tapjoint_beam::specimen::{Body, Mesh, PointInertia, PointMass, Specimen};
+use tapjoint_beam::specimen::{Body, Mesh, PlaceMotion, PointInertia, PointMass, Specimen};
 use tapjoint_beam::{Beam, WidthStiffening};
 use tapjoint_identify::consistent::Parameter;
 
@@ -90,25 +90,53 @@ struct Held {
     by_length: f64,
 }
 
+/// Derivatives of the logarithm of a frequency, but for shear and rotary inertia.
+pub struct BeamShares {
+    /// By the logarithm of the bending stiffness (1).
+    stiffness: f64,
+    /// By the logarithm of the mass per length (1).
+    inertia: f64,
+    /// By the logarithm of the length (1).
+    by_length: f64,
+}
+
+impl BeamShares {
+    /// Returns d ln f/d ln p (1) for a property p of the beam. `shear_slope` is the derivative by the relative size of shear and
+    /// rotary inertia, which is proportional to (h/L)^2.
+    pub fn property_slope(&self, property: Parameter, shear_slope: f64) -> f64 {
+        let (stiffness, inertia) = (self.stiffness, self.inertia);
+        match property {
+            Parameter::Modulus => stiffness,
+            Parameter::Density => inertia,
+            Parameter::Thickness => 3.0 * stiffness + inertia + 2.0 * shear_slope,
+            Parameter::Width => stiffness + inertia,
+            Parameter::Length => self.by_length - 2.0 * shear_slope,
+            _ => 0.0,
+        }
+    }
+}
+
 /// Distance from a joint that is surely on one of its beams, over the length (1).
 const HAIR: f64 = 1e-9;
 /// Step of the differences along the section (1).
 const STEP: f64 = 1e-3;
 
 impl ModalModel {
-    /// Returns d ln f/d ln p (1) of the mode with this index, for a property p of the beam. `shear_slope` is the
-    /// derivative by the relative size of shear and rotary inertia, which is proportional to (h/L)^2.
-    pub fn property_slope(&self, index: usize, property: Parameter, shear_slope: f64) -> f64 {
+    /// Returns what properties of the beam do to the frequency of the mode with this index.
+    pub fn beam_shares(&self, index: usize) -> BeamShares {
         let specimen = &self.seen.specimen;
         let omega_square = self.omega(index).powi(2);
         let [translation, rotation] = self.joint_shares(index);
         // Shares of what does not belong to the beam: of the strain energy, and of the kinetic energy.
         let (mut springs, mut masses) = (translation + rotation, 0.0);
         // Change with the length, all in proportion to it but the positions.
-        let mut by_length = -2.0 + 1.5 * translation + 0.5 * rotation - 2.0 * shear_slope;
+        let mut by_length = -2.0 + 1.5 * translation + 0.5 * rotation;
         for spring in &specimen.springs {
-            let phi = self.modes().displacement(index, spring.position);
-            let slope = self.modes().slope(index, spring.position);
+            let PlaceMotion {
+                displacement: phi,
+                slope,
+                ..
+            } = self.motion(index, spring.position);
             let share = spring.stiffness * phi * phi / omega_square;
             springs += share;
             by_length +=
@@ -137,25 +165,23 @@ impl ModalModel {
             inertia: share * inertia,
         }));
         for mass in specimen.masses.iter().chain(&at_joint) {
-            let phi = self.modes().displacement(index, mass.position);
-            let slope = self.modes().slope(index, mass.position);
+            let PlaceMotion {
+                displacement: phi,
+                slope,
+                ..
+            } = self.motion(index, mass.position);
             let (own, turning) = (mass.mass * phi * phi, mass.inertia * slope * slope);
             masses += own + turning;
             by_length += 0.5 * own + 1.5 * turning;
         }
         for mass in &specimen.masses {
-            let phi = self.modes().displacement(index, mass.position);
-            let slope = self.modes().slope(index, mass.position);
-            by_length += mass.mass * mass.position * phi * slope;
+            let there = self.motion(index, mass.position);
+            by_length += mass.mass * mass.position * there.displacement * there.slope;
         }
-        let (stiffness, inertia) = (0.5 * (1.0 - springs), -0.5 * (1.0 - masses));
-        match property {
-            Parameter::Modulus => stiffness,
-            Parameter::Density => inertia,
-            Parameter::Thickness => 3.0 * stiffness + inertia + 2.0 * shear_slope,
-            Parameter::Width => stiffness + inertia,
-            Parameter::Length => by_length,
-            _ => 0.0,
+        BeamShares {
+            stiffness: 0.5 * (1.0 - springs),
+            inertia: -0.5 * (1.0 - masses),
+            by_length,
         }
     }
 
@@ -169,7 +195,7 @@ impl ModalModel {
             // The work of the force P is P int phi'^2 dx, by the midpoint rule.
             let step = specimen.body.length() / POINTS as f64;
             let squares = (0..POINTS).map(|point| {
-                let slope = self.modes().slope(index, (point as f64 + 0.5) * step);
+                let slope = self.motion(index, (point as f64 + 0.5) * step).slope;
                 slope * slope * step
             });
             let share = specimen.axial_force * squares.sum::<f64>() / omega_square;

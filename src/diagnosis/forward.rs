@@ -98,14 +98,17 @@ impl<'a> Forward<'a> {
     pub fn predict_set_up(&self, parameters: &[f64], solved: &[ModalModel]) -> Option<Vec<f64>> {
         let arrangements = self.dataset.arrangements.iter();
         let models = solved.iter().zip(arrangements);
-        let models = models.map(|(model, arrangement)| ModalModel {
-            set_up: SetUp::new(
-                arrangement,
-                &self.layout,
-                &self.dataset.nuisances,
-                parameters,
-            ),
-            ..model.clone()
+        let models = models.map(|(model, arrangement)| {
+            let ModalModel {
+                seen,
+                own,
+                frequencies,
+                stiffness_changes,
+                ..
+            } = model.clone();
+            let nuisances = &self.dataset.nuisances;
+            let set_up = SetUp::new(arrangement, &self.layout, nuisances, parameters);
+            ModalModel::new(seen, set_up, own, frequencies, stiffness_changes)
         });
         Some(self.predict_with(models.collect(), parameters)?.0)
     }
@@ -278,13 +281,13 @@ impl<'a> Forward<'a> {
                 Some(other) => (other.own.clone(), other.frequencies.clone()),
                 None => modes_of(configuration, &seen.specimen)?,
             };
-            all.push(ModalModel {
+            all.push(ModalModel::new(
                 seen,
                 set_up,
                 own,
                 frequencies,
                 stiffness_changes,
-            });
+            ));
         }
         Some(all)
     }

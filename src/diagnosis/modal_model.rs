@@ -9,7 +9,7 @@ use crate::structure::{Arrangement, COUPLING, ROTATION};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tapjoint_beam::effects::Seen;
-use tapjoint_beam::specimen::{BeamModes, Joint, SpecimenModes};
+use tapjoint_beam::specimen::{BeamModes, Joint, PlaceMotion, SpecimenModes};
 use tapjoint_identify::observation::Configuration;
 use tapjoint_numerics::stats::median;
 
@@ -26,9 +26,41 @@ pub struct ModalModel {
     pub frequencies: Option<Vec<f64>>,
     /// Stiffnesses that its modes feel of a joint whose stiffness depends on the amplitude.
     pub stiffness_changes: Option<StiffnessChanges>,
+    /// Positions (m) of sensors, masses and taps, each with the motion of every mode.
+    places: Vec<(f64, Vec<PlaceMotion>)>,
 }
 
 impl ModalModel {
+    /// Returns the model with these modes.
+    pub fn new(
+        seen: Seen,
+        set_up: SetUp,
+        own: Arc<BeamModes>,
+        frequencies: Option<Vec<f64>>,
+        stiffness_changes: Option<StiffnessChanges>,
+    ) -> Self {
+        let masses = set_up.sensors.iter().chain(&set_up.fastened);
+        let positions = masses.map(|one| one.position).chain(set_up.tap);
+        let places = positions.map(|position| (position, own.modes.motions_at(position)));
+        Self {
+            places: places.collect(),
+            seen,
+            set_up,
+            own,
+            frequencies,
+            stiffness_changes,
+        }
+    }
+
+    /// Returns the motion of the mode with this index at a position (m).
+    pub fn motion(&self, index: usize, position: f64) -> PlaceMotion {
+        let known = self.places.iter().find(|one| one.0 == position);
+        known.map_or_else(
+            || self.modes().motion_at(index, position),
+            |(_, all)| all[index],
+        )
+    }
+
     /// All modes, that of a fixture among them.
     pub fn modes(&self) -> &SpecimenModes {
         &self.own.modes

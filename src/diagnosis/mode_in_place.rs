@@ -1,10 +1,11 @@
 //! A mode where sensors, masses and hammer meet it: what they show of it, and how nuisance parameters move that.
 
 use crate::dataset::{Dataset, Observable, ObservableKind};
-use crate::description::SectionSlopes;
+use crate::description::{BeamShares, SectionSlopes};
 use crate::modal_model::ModalModel;
 use crate::parameters::{Layout, NuisanceParameter};
 use crate::structure::Arrangement;
+use std::cell::OnceCell;
 use tapjoint_beam::effects::{EffectId, SensorSignal};
 use tapjoint_beam::specimen::PointMass;
 use tapjoint_identify::consistent::Parameter;
@@ -17,6 +18,7 @@ pub struct ModeInPlace<'a> {
     arrangement: &'a Arrangement,
     model: &'a ModalModel,
     index: usize,
+    shares: OnceCell<BeamShares>,
 }
 
 impl<'a> ModeInPlace<'a> {
@@ -35,6 +37,7 @@ impl<'a> ModeInPlace<'a> {
             arrangement: &dataset.arrangements[observable.configuration],
             model,
             index: model.index(observable.mode)?,
+            shares: OnceCell::new(),
         })
     }
 
@@ -55,15 +58,15 @@ impl<'a> ModeInPlace<'a> {
 
     /// Displacement on the middle line, where sensors sit and the hammer strikes.
     pub fn on_line(&self, position: f64) -> f64 {
-        self.model.modes().middle_displacement(self.index, position)
+        self.model.motion(self.index, position).middle
     }
 
     fn displacement(&self, position: f64) -> f64 {
-        self.model.modes().displacement(self.index, position)
+        self.model.motion(self.index, position).displacement
     }
 
     fn slope(&self, position: f64) -> f64 {
-        self.model.modes().slope(self.index, position)
+        self.model.motion(self.index, position).slope
     }
 
     /// Sensors with this index among the indices `keys`: with their stated masses, where they are.
@@ -85,7 +88,10 @@ impl<'a> ModeInPlace<'a> {
         match nuisance {
             NuisanceParameter::Property { property } => {
                 let shear = SectionSlopes::of(&dataset.section.shear, mode);
-                self.model.property_slope(self.index, property, shear)
+                let shares = self
+                    .shares
+                    .get_or_init(|| self.model.beam_shares(self.index));
+                shares.property_slope(property, shear)
             }
             NuisanceParameter::Shear => SectionSlopes::of(&dataset.section.shear, mode),
             NuisanceParameter::Poisson => SectionSlopes::of(&dataset.section.poisson, mode),

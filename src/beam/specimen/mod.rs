@@ -17,7 +17,7 @@ pub(crate) mod numbering;
 
 pub use crate::joint::Joint;
 use crate::{Assembly, Beam, BeamTheory, STIFFNESS_RULE, StructureError, WidthStiffening, require};
-pub use modes::{BeamModes, SpecimenModes};
+pub use modes::{BeamModes, PlaceMotion, SpecimenModes};
 use schemars::JsonSchema;
 use serde::Serialize;
 

@@ -280,9 +280,7 @@ impl Model {
         if mass == 0.0 && inertia == 0.0 {
             return;
         }
-        let mut runs = self.runs.iter();
-        let right = runs.rposition(|run| run.first_node <= place.node);
-        let section = self.runs[right.unwrap_or(0)].section_at(place.node);
+        let section = self.run_of(place.node).section_at(place.node);
         self.masses.push(AttachedMass {
             compliance: section.inner_compliance(place.within, place.within),
             place,
@@ -326,15 +324,19 @@ impl Model {
         }
     }
 
-    /// Returns a b^2/24 (model's units) at a position (m), of the curvature a across the width b; 0 where that is not followed.
-    pub(super) fn curvature_across(&self, motion: &Motion, position: f64) -> f64 {
+    /// Returns a b^2/24 (model's units) at a place, of the curvature a across the width b; 0 where that is not followed.
+    pub(super) fn curvature_across(&self, motion: &Motion, place: &Place) -> f64 {
         if !self.numbering.stiffened {
             return 0.0;
         }
-        let (run, index, within) = self.locate(position);
-        let node = self.runs[run].first_node + index;
-        let [.., a0, a1] = motion.all_ends(node);
-        self.runs[run].middle * (a0 + within * (a1 - a0))
+        let [.., a0, a1] = motion.all_ends(place.node);
+        self.run_of(place.node).middle * (a0 + place.within * (a1 - a0))
+    }
+
+    /// The beam of the element behind a node.
+    fn run_of(&self, node: usize) -> &Run {
+        let right = self.runs.iter().rposition(|run| run.first_node <= node);
+        &self.runs[right.unwrap_or(0)]
     }
 
     /// Returns whether the hinges sit in the same elements. Where one moves across a node, the slope there changes by its kink.

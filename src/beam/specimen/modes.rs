@@ -1,6 +1,6 @@
 //! The modes of a specimen, of specimens that differ little from it, and of one on a suspension.
 
-use super::model::{Energies, Model};
+use super::model::{Energies, Model, Place};
 use super::numbering::Motion;
 use super::{Mesh, Specimen};
 use crate::StructureError;
@@ -39,6 +39,18 @@ pub struct SpecimenModes {
     modes: Vec<Mode>,
 }
 
+/// Motion of a mode at one place.
+#[derive(Debug, Clone, Copy)]
+pub struct PlaceMotion {
+    /// Displacement (1/sqrt(kg)), the mean over the width.
+    pub displacement: f64,
+    /// Displacement (1/sqrt(kg)) on the middle line of the beam, where sensors sit and hammers strike: w - a b^2/24, with w
+    /// the mean over the width b and a the curvature across it.
+    pub middle: f64,
+    /// Rotation of the cross-section (rad/m per sqrt(kg)): dw/dx without shear.
+    pub slope: f64,
+}
+
 /// A mode in the model's units.
 #[derive(Debug, Clone)]
 struct Mode {
@@ -46,18 +58,22 @@ struct Mode {
     square: f64,
     /// Of unit modal mass.
     motion: Motion,
+    /// The same by the equations.
+    vector: Vec<f64>,
     energies: Energies,
 }
 
 impl Mode {
-    fn new(model: &Model, vector: &[f64]) -> Self {
-        let motion = model.numbering.motion(vector);
+    fn new(model: &Model, mut vector: Vec<f64>) -> Self {
+        let motion = model.numbering.motion(&vector);
         let energies = model.energies(&motion);
         let square = energies.quotient();
         let factor = energies.modal_mass(square).sqrt().recip();
+        vector.iter_mut().for_each(|value| *value *= factor);
         Self {
             square,
             motion: motion.scaled(factor),
+            vector,
             energies: energies.scaled(factor * factor),
         }
     }
@@ -146,10 +162,7 @@ fn modes_from<const N: usize>(
 ) -> Option<Vec<Mode>> {
     let (stiffness, mass) = model.matrices::<N>();
     let matrices = [&stiffness, &mass];
-    let modes = near.modes.iter();
-    let vectors: Vec<Vec<f64>> = modes
-        .map(|mode| near.model.numbering.vector(&mode.motion))
-        .collect();
+    let vectors: Vec<Vec<f64>> = near.modes.iter().map(|mode| mode.vector.clone()).collect();
     let found = match what {
         From::Lowest => lowest_from(matrices, vectors)?,
         From::Each => {
@@ -157,7 +170,7 @@ fn modes_from<const N: usize>(
             moved.map(|one| one.vector).collect()
         }
     };
-    let found = found.iter();
+    let found = found.into_iter();
     Some(found.map(|vector| Mode::new(model, vector)).collect())
 }
 
@@ -195,7 +208,7 @@ impl SpecimenModes {
         }
         let held = slow.iter().filter(|value| **value >= NO_STIFFNESS);
         let suspension = held.map(|square| model.frequency(*square)).collect();
-        let vectors = vectors.iter();
+        let vectors = vectors.into_iter();
         let mut loose: Vec<Mode> = vectors.map(|vector| Mode::new(&model, vector)).collect();
         let modes = loose.split_off(rigid);
         Ok(Self {
@@ -243,26 +256,42 @@ impl SpecimenModes {
 
     /// Returns the displacement (1/sqrt(kg)), the mean over the width, at a position (m).
     pub fn displacement(&self, mode: usize, position: f64) -> f64 {
-        let place = self.model.place(position);
-        let Mode { square, motion, .. } = &self.modes[mode];
-        let ends = motion.ends(place.node);
-        let inner: f64 = place.inner.iter().zip(&ends).map(|(a, b)| a * b).sum();
-        (place.displacement(&ends) + square * inner) / self.model.units.mass.sqrt()
+        self.motion_at(mode, position).displacement
     }
 
-    /// Returns the displacement (1/sqrt(kg)) on the middle line of the beam at a position (m), where sensors sit and hammers
-    /// strike: w - a b^2/24, with w the mean over the width b and a the curvature across it.
+    /// Returns the displacement (1/sqrt(kg)) on the middle line of the beam at a position (m): see [`PlaceMotion::middle`].
     pub fn middle_displacement(&self, mode: usize, position: f64) -> f64 {
-        let curvature = self
-            .model
-            .curvature_across(&self.modes[mode].motion, position);
-        self.displacement(mode, position) - curvature / self.model.units.mass.sqrt()
+        self.motion_at(mode, position).middle
     }
 
     /// Returns the rotation of the cross-section (rad/m per sqrt(kg)) at a position (m): dw/dx without shear.
     pub fn slope(&self, mode: usize, position: f64) -> f64 {
+        self.motion_at(mode, position).slope
+    }
+
+    /// Returns the motion of a mode at a position (m).
+    pub fn motion_at(&self, mode: usize, position: f64) -> PlaceMotion {
+        self.motion_in(mode, &self.model.place(position))
+    }
+
+    /// Returns the motion of every mode at a position (m).
+    pub fn motions_at(&self, position: f64) -> Vec<PlaceMotion> {
         let place = self.model.place(position);
-        place.rotation(&self.modes[mode].motion.ends(place.node)) / self.rotation_unit()
+        (0..self.len())
+            .map(|mode| self.motion_in(mode, &place))
+            .collect()
+    }
+
+    fn motion_in(&self, mode: usize, place: &Place) -> PlaceMotion {
+        let Mode { square, motion, .. } = &self.modes[mode];
+        let ends = motion.ends(place.node);
+        let unit = self.model.units.mass.sqrt();
+        let displacement = (place.displacement(&ends) + square * dot(&place.inner, &ends)) / unit;
+        PlaceMotion {
+            displacement,
+            middle: displacement - self.model.curvature_across(motion, place) / unit,
+            slope: place.rotation(&ends) / self.rotation_unit(),
+        }
     }
 
     fn rotation_unit(&self) -> f64 {
@@ -430,6 +459,7 @@ impl SpecimenModes {
             modes.push(Mode {
                 square: pairs.eigenvalues[index],
                 energies: self.model.energies(&motion),
+                vector: self.model.numbering.vector(&motion),
                 motion,
             });
         }

@@ -48,11 +48,12 @@ pub(crate) fn moved<const N: usize>(
     for some in vectors.chunks(LANES) {
         // Lanes without a vector repeat the last one.
         let lane = |index: usize| &some[index.min(some.len() - 1)];
-        let before: Vec<Lanes> = (0..mass.size())
-            .map(|row| std::array::from_fn(|index| lane(index)[row]))
-            .collect();
-        let pulled = product(mass, &before);
-        let (strain, kinetic) = (square(stiffness, &before), inner(&before, &pulled));
+        let mut before = vec![[0.0; LANES]; N - 1];
+        before.extend(
+            (0..mass.size()).map(|row| -> Lanes { std::array::from_fn(|index| lane(index)[row]) }),
+        );
+        let (pulled, strain) = product_and_square([stiffness, mass], &before);
+        let kinetic = inner(&before, &pulled);
         let shifts: Lanes = std::array::from_fn(|index| strain[index] / kinetic[index]);
         let (after, below) = solution([stiffness, mass], &shifts, &pulled);
         let (squares, along) = (square(mass, &after), inner(&after, &pulled));
@@ -65,7 +66,7 @@ pub(crate) fn moved<const N: usize>(
             let cosine = along / (size * unit);
             all.push(Moved {
                 // Along the vector before: the matrix is near to singular, and of either sign.
-                vector: after
+                vector: after[N - 1..]
                     .iter()
                     .map(|x| x[index] / size.copysign(along))
                     .collect(),
@@ -120,41 +121,47 @@ fn have_settled(steps: &[Moved]) -> Option<bool> {
         .then_some(true)
 }
 
-/// Returns A x.
-fn product<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Vec<Lanes> {
+/// Returns M x and x^T K x. Rows of zeros stand before the first of x and of M x.
+fn product_and_square<const N: usize>(
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    x: &[Lanes],
+) -> (Vec<Lanes>, Lanes) {
     let band = N - 1;
-    let mut product = vec![[0.0; LANES]; x.len()];
-    for (row, entries) in matrix.rows.iter().enumerate() {
-        let own = x[row];
-        let mut sum = own.map(|value| entries[band] * value);
-        for back in 1..=row.min(band) {
-            let entry = entries[band - back];
-            let (other, there) = (x[row - back], &mut product[row - back]);
+    let (mut product, mut square) = (vec![[0.0; LANES]; x.len()], [0.0; LANES]);
+    for (row, (k, m)) in stiffness.rows.iter().zip(&mass.rows).enumerate() {
+        let own = x[row + band];
+        let mut pulled = own.map(|value| m[band] * value);
+        let mut strained = own.map(|value| 0.5 * k[band] * value);
+        for column in 0..band {
+            let (other, there) = (x[row + column], &mut product[row + column]);
             for index in 0..LANES {
-                sum[index] += entry * other[index];
-                there[index] += entry * own[index];
+                pulled[index] += m[column] * other[index];
+                strained[index] += k[column] * other[index];
+                there[index] += m[column] * own[index];
             }
         }
         for index in 0..LANES {
-            product[row][index] += sum[index];
+            product[row + band][index] += pulled[index];
+            square[index] += 2.0 * strained[index] * own[index];
         }
     }
-    product
+    (product, square)
 }
 
-/// Returns x^T A x.
+/// Returns x^T A x. Rows of zeros stand before the first of x.
 fn square<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Lanes {
     let band = N - 1;
     let mut square = [0.0; LANES];
     for (row, entries) in matrix.rows.iter().enumerate() {
-        let mut sum = x[row].map(|value| 0.5 * entries[band] * value);
-        for back in 1..=row.min(band) {
+        let own = x[row + band];
+        let mut sum = own.map(|value| 0.5 * entries[band] * value);
+        for column in 0..band {
             for index in 0..LANES {
-                sum[index] += entries[band - back] * x[row - back][index];
+                sum[index] += entries[column] * x[row + column][index];
             }
         }
         for index in 0..LANES {
-            square[index] += 2.0 * sum[index] * x[row][index];
+            square[index] += 2.0 * sum[index] * own[index];
         }
     }
     square
@@ -172,13 +179,13 @@ fn inner(x: &[Lanes], y: &[Lanes]) -> Lanes {
 }
 
 /// Returns the solution of (K - s M) x = b for each lane, and the number of negative pivots, by L D L^T without exchange
-/// of rows.
+/// of rows. Rows of zeros stand before the first of b and of x.
 fn solution<const N: usize>(
     [stiffness, mass]: [&BandedMatrix<N>; 2],
     shifts: &Lanes,
     right: &[Lanes],
 ) -> (Vec<Lanes>, [usize; LANES]) {
-    let (band, size) = (N - 1, right.len());
+    let (band, size) = (N - 1, right.len() - (N - 1));
     // L left of the diagonal, 1/D on it. Rows of zeros before the first and behind the last spare the loops their ends.
     let mut factor = vec![[[0.0; LANES]; N]; size + 2 * band];
     let mut x = vec![[0.0; LANES]; size + 2 * band];
@@ -203,7 +210,7 @@ fn solution<const N: usize>(
                 }
             }
         }
-        let mut value = right[row];
+        let mut value = right[row + band];
         for column in 0..band {
             let (inverse, above) = (factor[row + column][band], x[row + column]);
             for index in 0..LANES {
@@ -237,7 +244,8 @@ fn solution<const N: usize>(
         }
         x[row] = value;
     }
-    (x[band..band + size].to_vec(), below)
+    x.truncate(band + size);
+    (x, below)
 }
 
 #[cfg(test)]

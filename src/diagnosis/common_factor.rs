@@ -22,7 +22,7 @@ pub fn common_factor(dataset: &Dataset) -> Option<CommonFactor> {
         is_geometry(nuisance) && !matches!(nuisance, NuisanceParameter::Discrepancy { .. })
     })?;
     let at = fit.parameters().len() - 1;
-    let std = fit.best.covariance()?[(at, at)].max(0.0).sqrt();
+    let std = fit.best.std(at)?;
     let asked = fit.parameters()[at];
     (std < 0.1 * ANY_FACTOR).then(|| CommonFactor {
         percent: 100.0 * asked,

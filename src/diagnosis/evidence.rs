@@ -3,13 +3,11 @@
 
 use crate::dataset::{Dataset, Datum};
 use crate::forward::Forward;
-use crate::optimum::{
-    LinearModel, Model, Optimum, factor_of, free_parameters, log_determinant, maximise,
-    objective_at,
-};
+use crate::optimum::{Model, Optimum, linear_optimum, maximise, objective_at, search};
 use crate::parameters::{CandidateEffect, Layout, Prior, Size};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::f64::consts::PI;
+use tapjoint_numerics::cholesky::Cholesky;
 
 /// Local optimum of a hypothesis, fitted from one start.
 #[derive(Debug, Clone)]
@@ -25,6 +23,15 @@ pub struct LocalOptimum {
 }
 
 impl LocalOptimum {
+    /// Returns the standard deviation of one parameter; 0 of a held one.
+    pub fn std(&self, parameter: usize) -> Option<f64> {
+        if self.priors[parameter].is_held() {
+            return Some(0.0);
+        }
+        let factor = Cholesky::new(&self.optimum.curvature)?;
+        Some(factor.variance(parameter).sqrt())
+    }
+
     /// Returns the covariance of the parameters.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         self.optimum.covariance(&self.priors)
@@ -93,13 +100,14 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
     let drifts = &dataset.settings.drift_stds;
     let middle = drifts[drifts.len() / 2];
     let mut priors = dataset.with_drift(layout, priors, middle);
-    let mut optimum = maximise(&dataset.data, &priors, start, forward)?;
+    let (mut optimum, mut solution) = search(&dataset.data, &priors, start, forward, None)?;
     // The search's normal prior would hold back a size far beyond its scale, which Cauchy's does not.
     for _ in 0..WIDENINGS {
         if !widen(layout, &mut priors, &optimum) {
             break;
         }
-        optimum = maximise(&dataset.data, &priors, &optimum.parameters, forward)?;
+        let known = Some((&optimum, &solution));
+        (optimum, solution) = search(&dataset.data, &priors, &optimum.parameters, forward, known)?;
     }
     let mut found = over_drifts(dataset, layout, &priors, &optimum, drifts);
     // Another drift moves the optimum by the linearised model; where the true one does not follow, it
@@ -107,7 +115,10 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
     for _ in 0..RETURNS {
         let own = found.priors.clone();
         let there = &found.optimum.parameters;
-        let (predicted, _) = forward.predict(there, None)?;
+        if *there == optimum.parameters {
+            return Some(found);
+        }
+        let (predicted, _) = forward.predict(there, Some(&solution))?;
         let truly = objective_at(&dataset.data, &own, there, &predicted);
         if (truly - found.optimum.objective).abs() < LINEAR_ENOUGH {
             return Some(found);
@@ -120,7 +131,8 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
         } else {
             there
         };
-        optimum = maximise(&dataset.data, &own, start, forward)?;
+        let known = Some((&optimum, &solution));
+        (optimum, solution) = search(&dataset.data, &own, start, forward, known)?;
         found = over_drifts(dataset, layout, &own, &optimum, drifts);
     }
     // A search that does not settle counts with the true model, without other drifts.
@@ -179,10 +191,8 @@ pub fn over_drifts(
         for (prior, value) in held[effects].iter_mut().zip(values) {
             *prior = Prior::held(*value);
         }
-        let moved = linear_optimum(&dataset.data, &held, optimum).map_or_else(
-            || optimum.clone(),
-            |moved| Optimum::new(&dataset.data, &own, moved.parameters, moved.model),
-        );
+        let moved = linear_optimum(&dataset.data, &held, optimum)
+            .map_or_else(|| optimum.clone(), |moved| moved.under(&dataset.data, &own));
         let log_evidence = log_evidence(&dataset.data, layout, &own, &moved);
         best.drifts.push((drift, log_evidence));
         if k == 0 || log_evidence > best.log_evidence {
@@ -194,16 +204,6 @@ pub fn over_drifts(
     let logs: Vec<f64> = best.drifts.iter().map(|one| one.1).collect();
     best.log_evidence = log_mean(&logs);
     best
-}
-
-/// Returns the optimum of the model as it was linearised at another one.
-pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<Optimum> {
-    let model = LinearModel {
-        origin: &at.parameters,
-        there: &at.model.predicted,
-        slopes: &at.model.slopes,
-    };
-    maximise(data, priors, &at.parameters, &model)
 }
 
 /// Returns the parameters without the last effect, and that effect with a size and a location.
@@ -258,7 +258,9 @@ pub fn log_sum(logs: &[f64]) -> f64 {
 ///
 /// Sizes are integrated separately ([`over_size`]).
 fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Optimum) -> f64 {
-    let free = free_parameters(priors);
+    let free: Vec<usize> = (0..priors.len())
+        .filter(|k| !priors[*k].is_held())
+        .collect();
     // A tiny effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
     let mut curvature = optimum.curvature.clone();
     let mut ranges = Vec::new();
@@ -273,12 +275,12 @@ fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Opt
             curvature[(at, at)] += 2.0 * PI / ((high - low) * (high - low));
         }
     }
-    let Some(factor) = factor_of(&curvature, &free) else {
+    let Some(factor) = Cholesky::new(&curvature) else {
         return f64::NEG_INFINITY;
     };
     let mut log = -optimum.objective;
     log += data.iter().map(Datum::log_density_peak).sum::<f64>();
-    log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * log_determinant(&factor);
+    log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * factor.log_determinant();
     let sizes = 0..layout.effects.len();
     let sizes: Vec<usize> = sizes.map(|effect| layout.size(effect)).collect();
     for &k in free.iter().filter(|k| !sizes.contains(k)) {
@@ -288,12 +290,10 @@ fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Opt
     }
     log -= ranges.into_iter().map(f64::ln).sum::<f64>();
     for (effect, &size) in layout.effects.iter().zip(&sizes) {
-        let Some(position) = free.iter().position(|&k| k == size) else {
+        if priors[size].is_held() {
             continue;
-        };
-        let mut unit = DVector::zeros(free.len());
-        unit[position] = 1.0;
-        let variance = factor.solve(&unit)[position];
+        }
+        let variance = factor.variance(size);
         // Laplace's factor for this parameter is taken out again.
         log -= 0.5 * (2.0 * PI * variance).ln();
         log += over_size(&effect.size, &priors[size], optimum, size, 1.0 / variance);
@@ -379,16 +379,15 @@ pub fn profile_correction(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
     let [effect] = &forward.layout.effects[..] else {
         return 0.0;
     };
-    let Some(covariance) = found.covariance().filter(|_| effect.location.is_none()) else {
+    let std = found.std(forward.layout.last_size());
+    let Some(std) = std.filter(|_| effect.location.is_none()) else {
         return 0.0;
     };
-    let at = forward.layout.last_size();
-    let variance = covariance[(at, at)];
     let share = forward.dataset.settings.thresholds.poorly_known_size;
-    if variance.sqrt() < share * effect.size.scale {
+    if std < share * effect.size.scale {
         return 0.0;
     }
-    profile_gain(forward, found, &effect.size, variance).unwrap_or(0.0)
+    profile_gain(forward, found, &effect.size, std * std).unwrap_or(0.0)
 }
 
 /// Sizes over their scale between which the profile is followed: 97 % of the prior.
@@ -413,7 +412,7 @@ fn profile_gain(
         .min(size.neutral + PROFILE_REACH * size.scale);
     let mut logs = Vec::new();
     // The regularisation of the size is no part of its likelihood; where it is held it has none.
-    let base = marginal_log(&found.priors, &found.optimum, at)? + regularisation(prior, here);
+    let base = marginal_log(&found.optimum, at)? + regularisation(prior, here);
     for node in 0..NODES {
         let t = from + (to - from) * node as f64 / (NODES - 1) as f64;
         let mut held = found.priors.clone();
@@ -421,7 +420,7 @@ fn profile_gain(
         let mut start = found.optimum.parameters.clone();
         start[at] = t;
         let optimum = maximise(&forward.dataset.data, &held, &start, forward);
-        let log = optimum.and_then(|optimum| marginal_log(&found.priors, &optimum, at));
+        let log = optimum.and_then(|optimum| marginal_log(&optimum, at));
         logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
     }
     let slope = found.optimum.gradient[at];
@@ -445,17 +444,20 @@ fn profile_gain(
 }
 
 /// Returns -objective - ln det/2 over all free parameters but the size.
-fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64> {
-    let mut free = free_parameters(priors);
-    free.retain(|&k| k != size);
-    let factor = factor_of(&optimum.curvature, &free)?;
-    Some(-optimum.objective - 0.5 * log_determinant(&factor))
+fn marginal_log(optimum: &Optimum, size: usize) -> Option<f64> {
+    let mut curvature = optimum.curvature.clone();
+    curvature.row_mut(size).fill(0.0);
+    curvature.column_mut(size).fill(0.0);
+    curvature[(size, size)] = 1.0;
+    let factor = Cholesky::new(&curvature)?;
+    Some(-optimum.objective - 0.5 * factor.log_determinant())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::parameters::{Cause, LocationKind, LocationRange, Target};
+    use std::sync::Arc;
     use tapjoint_beam::effects::EffectId;
 
     /// One stiffness and one size, with data that need not be linear in either.
@@ -472,14 +474,15 @@ mod tests {
             Some(((self.model)(parameters[0], parameters[1]), ()))
         }
 
-        fn slopes(&self, parameters: &[f64], _: &[Prior], _: &()) -> Option<DMatrix<f64>> {
+        fn slopes(&self, parameters: &[f64], _: &[Prior], _: &()) -> Option<Arc<DMatrix<f64>>> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
             let here = (self.model)(a, t);
             let columns = [(self.model)(a + STEP, t), (self.model)(a, t + STEP)];
-            Some(DMatrix::from_fn(here.len(), 2, |row, column| {
+            let slopes = DMatrix::from_fn(here.len(), 2, |row, column| {
                 (columns[column][row] - here[row]) / STEP
-            }))
+            });
+            Some(Arc::new(slopes))
         }
     }
 
@@ -614,9 +617,9 @@ mod tests {
             self.0.predict(parameters, None)
         }
 
-        fn slopes(&self, parameters: &[f64], known: &[Prior], _: &()) -> Option<DMatrix<f64>> {
+        fn slopes(&self, parameters: &[f64], known: &[Prior], _: &()) -> Option<Arc<DMatrix<f64>>> {
             let own = self.0.slopes(parameters, known, &())?;
-            Some(own.insert_column(2, 1e-5))
+            Some(Arc::new((*own).clone().insert_column(2, 1e-5)))
         }
     }
 

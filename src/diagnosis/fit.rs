@@ -4,13 +4,13 @@
 use crate::amplitude::best_law;
 use crate::dataset::{Dataset, Datum};
 use crate::evidence::{
-    BETTER, Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean,
-    log_sum, over_drifts, profile_correction, start_with,
+    BETTER, Fit, LocalOptimum, evaluate, linear_fit, log_likelihood, log_mean, log_sum,
+    over_drifts, profile_correction, start_with,
 };
 use crate::fixture::with_peaks;
 use crate::forward::Forward;
 use crate::modal_model::ModalModel;
-use crate::optimum::{Model, Optimum, maximise, objective_at};
+use crate::optimum::{Model, Optimum, linear_optimum, maximise, objective_at};
 use crate::parameters::{
     CandidateEffect, Cause, LocationKind, LocationRange, NuisanceParameter, Prior,
 };
@@ -509,12 +509,10 @@ fn descend(forward: &Forward<'_>, starts: &[Vec<f64>], found: &mut Vec<LocalOpti
         .iter()
         .filter_map(|start| evaluate(forward, &forward.priors(), start))
     {
-        let covariance = one.covariance();
         let same = found.iter_mut().find(|other| {
             which.clone().all(|k| {
-                let variance = covariance.as_ref().map_or(0.0, |c| c[(k, k)]);
                 let apart = other.optimum.parameters[k] - one.optimum.parameters[k];
-                apart.abs() < 2.0 * variance.max(0.0).sqrt()
+                apart.abs() < 2.0 * one.std(k).unwrap_or(0.0)
             })
         });
         match same {
@@ -551,19 +549,17 @@ fn best_of(found: &[LocalOptimum]) -> Option<&LocalOptimum> {
 
 /// Returns whether the data fix the location of the effect with this size within the nodes' spacing.
 fn is_narrow(found: &LocalOptimum, size: usize, spacing: f64, thresholds: &Thresholds) -> bool {
-    let covariance = found.covariance();
-    let variance = covariance.map_or(f64::INFINITY, |c| c[(size + 1, size + 1)]);
-    variance.max(0.0).sqrt() < thresholds.located * spacing
+    let std = found.std(size + 1);
+    std.is_some_and(|std| std < thresholds.located * spacing)
 }
 
 /// Returns whether the data fix an effect's location within the nodes' spacing, and its size so far from
 /// zero that size and location are Gaussian together.
 fn is_located(found: &LocalOptimum, size: usize, spacing: f64, thresholds: &Thresholds) -> bool {
-    let covariance = found.covariance();
-    let variance = covariance.map_or(f64::INFINITY, |c| c[(size, size)]);
     let away = (found.optimum.parameters[size] - found.priors[size].centre).abs();
+    let std = found.std(size);
     is_narrow(found, size, spacing, thresholds)
-        && away > thresholds.size_detected * variance.max(0.0).sqrt()
+        && std.is_some_and(|std| away > thresholds.size_detected * std)
 }
 
 /// Returns the nodes from which a search goes on: the local maxima, the best first, at most three.

@@ -130,9 +130,7 @@ impl FixtureMode {
 /// Returns the relative standard deviation of the size of the fixture whose frequency is the parameter `at`.
 fn size_std(found: &LocalOptimum, at: usize) -> f64 {
     let size = found.optimum.parameters[at - 1].abs();
-    found.covariance().map_or(f64::INFINITY, |covariance| {
-        covariance[(at - 1, at - 1)].max(0.0).sqrt() / size
-    })
+    found.std(at - 1).map_or(f64::INFINITY, |std| std / size)
 }
 
 /// Returns the probability of a strength as far from the predicted one, of the peak that states the frequency of a fit's

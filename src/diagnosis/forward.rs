@@ -54,7 +54,7 @@ impl Model for Forward<'_> {
         parameters: &[f64],
         priors: &[Prior],
         solution: &Solution,
-    ) -> Option<DMatrix<f64>> {
+    ) -> Option<Arc<DMatrix<f64>>> {
         let Solution { models, base, .. } = solution;
         let mut slopes = solution.slopes.clone();
         let near = Some(&models[..]);
@@ -85,7 +85,7 @@ impl Model for Forward<'_> {
                 slopes.set_column(column, &change.into());
             }
         }
-        Some(slopes)
+        Some(Arc::new(slopes))
     }
 }
 

@@ -9,10 +9,11 @@ use crate::dataset::Dataset;
 use crate::evidence::Fit;
 use crate::forward::Forward;
 use crate::modal_model::ModalModel;
-use crate::optimum::{LinearModel, Optimum, maximise};
+use crate::optimum::{Linearised, Optimum, linear_optimum};
 use crate::parameters::Prior;
 use crate::result::LocationMap;
 use nalgebra::DMatrix;
+use std::sync::Arc;
 use tapjoint_beam::specimen::Body;
 
 /// Pieces of the beam: twice as many as half waves of the sixth mode.
@@ -120,17 +121,19 @@ fn with_pieces(
     let optimum = &nominal.best.optimum;
     let first = optimum.parameters.len();
     let count = first + slopes.ncols();
-    let mut all = optimum.model.slopes.clone().resize_horizontally(count, 0.0);
+    let mut all = (*optimum.model.slopes)
+        .clone()
+        .resize_horizontally(count, 0.0);
     all.columns_mut(first, slopes.ncols()).copy_from(slopes);
     let mut start = optimum.parameters.clone();
     start.resize(count, 0.0);
     let mut priors = nominal.best.priors.clone();
     priors.resize(count, Prior::normal(0.0, std));
-    let model = LinearModel {
-        origin: &start,
-        there: &optimum.model.predicted,
-        slopes: &all,
+    let model = Linearised {
+        predicted: optimum.model.predicted.clone(),
+        slopes: Arc::new(all),
     };
-    let found = maximise(&dataset.data, &priors, &start, &model)?;
+    let here = Optimum::new(&dataset.data, &priors, start, model);
+    let found = linear_optimum(&dataset.data, &priors, &here)?;
     Some((priors, found))
 }

@@ -2,7 +2,9 @@
 
 use crate::dataset::Datum;
 use crate::parameters::Prior;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky as Dense, DMatrix, DVector, Dyn};
+use std::sync::Arc;
+use tapjoint_numerics::cholesky::Cholesky;
 use tapjoint_numerics::least_squares::{self, Problem, Settings, minimise};
 
 /// Predictions of all data at a point, and their slopes.
@@ -11,7 +13,7 @@ pub struct Linearised {
     /// Prediction of each datum.
     pub predicted: Vec<f64>,
     /// Derivative of each datum (row) with respect to each parameter (column).
-    pub slopes: DMatrix<f64>,
+    pub slopes: Arc<DMatrix<f64>>,
 }
 
 /// Model that predicts at many points and gives slopes, which cost more, at few of them.
@@ -31,7 +33,7 @@ pub trait Model {
         parameters: &[f64],
         priors: &[Prior],
         solution: &Self::Solution,
-    ) -> Option<DMatrix<f64>>;
+    ) -> Option<Arc<DMatrix<f64>>>;
 
     /// Returns predictions and slopes at a point.
     fn linearise(&self, parameters: &[f64], priors: &[Prior]) -> Option<Linearised> {
@@ -41,29 +43,23 @@ pub trait Model {
     }
 }
 
-/// Linear model: at `origin` it predicts `there`.
-pub struct LinearModel<'a> {
-    /// Parameters at which it was linearised.
-    pub origin: &'a [f64],
-    /// Predictions there.
-    pub there: &'a [f64],
-    /// Slopes.
-    pub slopes: &'a DMatrix<f64>,
-}
+/// The model as it was linearised at a point.
+struct LinearModel<'a>(&'a Optimum);
 
 impl Model for LinearModel<'_> {
     type Solution = ();
 
     fn predict(&self, parameters: &[f64], _: Option<&()>) -> Option<(Vec<f64>, ())> {
-        let steps = parameters.iter().zip(self.origin);
+        let Linearised { predicted, slopes } = &self.0.model;
+        let steps = parameters.iter().zip(&self.0.parameters);
         let steps = DVector::from_iterator(parameters.len(), steps.map(|(new, old)| new - old));
-        let moved = self.slopes * steps;
-        let predicted = self.there.iter().zip(moved.iter());
+        let moved = &**slopes * steps;
+        let predicted = predicted.iter().zip(moved.iter());
         Some((predicted.map(|(at, by)| at + by).collect(), ()))
     }
 
-    fn slopes(&self, _: &[f64], _: &[Prior], _: &()) -> Option<DMatrix<f64>> {
-        Some(self.slopes.clone())
+    fn slopes(&self, _: &[f64], _: &[Prior], _: &()) -> Option<Arc<DMatrix<f64>>> {
+        Some(self.0.model.slopes.clone())
     }
 }
 
@@ -80,6 +76,8 @@ pub struct Optimum {
     pub curvature: DMatrix<f64>,
     /// Slope of the objective (0 for all that are neither held nor at a bound).
     pub gradient: DVector<f64>,
+    /// Curvature and slope of the likelihood alone.
+    likelihood: Arc<(DMatrix<f64>, DVector<f64>)>,
 }
 
 /// Limits of a search. From starts within the valley five steps suffice, along bent valleys (a location and a size that
@@ -98,10 +96,12 @@ const SEARCH: Settings = Settings {
 };
 
 /// Search for the parameters that maximise likelihood times prior.
-struct Maximisation<'a, M> {
+struct Maximisation<'a, M: Model> {
     data: &'a [Datum],
     priors: &'a [Prior],
     model: &'a M,
+    /// A point that is solved and linearised already, near the start.
+    known: Option<(&'a Optimum, &'a M::Solution)>,
     bounds: Vec<[f64; 2]>,
 }
 
@@ -118,6 +118,7 @@ impl<M: Model> Problem for Maximisation<'_, M> {
 
     fn evaluate(&self, parameters: &[f64], from: Option<&Self::State>) -> Option<Self::State> {
         let near = from.map(|from| &from.solution);
+        let near = near.or(self.known.map(|known| known.1));
         let (predicted, solution) = self.model.predict(parameters, near)?;
         Some(Point {
             objective: objective_at(self.data, self.priors, parameters, &predicted),
@@ -136,12 +137,17 @@ impl<M: Model> Problem for Maximisation<'_, M> {
         parameters: &[f64],
         point: &mut Self::State,
     ) -> Option<least_squares::Linearised> {
-        let slopes = self
-            .model
-            .slopes(parameters, self.priors, &point.solution)?;
-        let predicted = std::mem::take(&mut point.predicted);
-        let model = Linearised { predicted, slopes };
-        let optimum = Optimum::new(self.data, self.priors, parameters.to_vec(), model);
+        let optimum = match self.known.filter(|known| known.0.parameters == parameters) {
+            Some((known, _)) => known.under(self.data, self.priors),
+            None => {
+                let slopes = self
+                    .model
+                    .slopes(parameters, self.priors, &point.solution)?;
+                let predicted = std::mem::take(&mut point.predicted);
+                let model = Linearised { predicted, slopes };
+                Optimum::new(self.data, self.priors, parameters.to_vec(), model)
+            }
+        };
         let linearised = least_squares::Linearised::Normal {
             curvature: optimum.curvature.clone(),
             gradient: optimum.gradient.clone(),
@@ -162,13 +168,41 @@ pub fn maximise(
     start: &[f64],
     model: &impl Model,
 ) -> Option<Optimum> {
+    Some(search(data, priors, start, model, None)?.0)
+}
+
+/// Returns the optimum of the model as it was linearised at a point, from there.
+pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<Optimum> {
+    Some(
+        search(
+            data,
+            priors,
+            &at.parameters,
+            &LinearModel(at),
+            Some((at, &())),
+        )?
+        .0,
+    )
+}
+
+/// Returns the optimum that [`maximise`] returns, and the solution there. A `known` point near the start, under priors that hold
+/// the same parameters, shortens the way.
+pub fn search<M: Model>(
+    data: &[Datum],
+    priors: &[Prior],
+    start: &[f64],
+    model: &M,
+    known: Option<(&Optimum, &M::Solution)>,
+) -> Option<(Optimum, M::Solution)> {
     let problem = Maximisation {
         data,
         priors,
         model,
+        known,
         bounds: priors.iter().map(|prior| [prior.low, prior.high]).collect(),
     };
-    minimise(&problem, start, &SEARCH)?.state.optimum
+    let found = minimise(&problem, start, &SEARCH)?.state;
+    Some((found.optimum?, found.solution))
 }
 
 /// Returns -ln(likelihood x prior) at a point from the predictions there, without constants of the data.
@@ -194,7 +228,6 @@ pub fn objective_at(
 impl Optimum {
     /// Returns objective, curvature and gradient at a point.
     pub fn new(data: &[Datum], priors: &[Prior], parameters: Vec<f64>, model: Linearised) -> Self {
-        let objective = objective_at(data, priors, &parameters, &model.predicted);
         let count = parameters.len();
         let mut curvature = DMatrix::zeros(count, count);
         let mut gradient = DVector::zeros(count);
@@ -221,6 +254,21 @@ impl Optimum {
             }
         }
         curvature.fill_upper_triangle_with_lower_triangle();
+        let here = Optimum {
+            objective: 0.0,
+            curvature: DMatrix::zeros(0, 0),
+            gradient: DVector::zeros(0),
+            parameters,
+            model,
+            likelihood: Arc::new((curvature, gradient)),
+        };
+        here.under(data, priors)
+    }
+
+    /// Returns objective, curvature and gradient at the same point under other priors.
+    pub fn under(&self, data: &[Datum], priors: &[Prior]) -> Self {
+        let objective = objective_at(data, priors, &self.parameters, &self.model.predicted);
+        let (mut curvature, mut gradient) = (*self.likelihood).clone();
         for (k, prior) in priors.iter().enumerate() {
             if prior.is_held() {
                 curvature.row_mut(k).fill(0.0);
@@ -228,48 +276,33 @@ impl Optimum {
                 curvature[(k, k)] = 1.0;
                 gradient[k] = 0.0;
             } else if prior.std.is_finite() {
-                let away = (parameters[k] - prior.centre) / prior.std;
+                let away = (self.parameters[k] - prior.centre) / prior.std;
                 curvature[(k, k)] += prior.std.powi(-2);
                 gradient[k] += away / prior.std;
             }
         }
         Optimum {
-            parameters,
-            model,
             objective,
             curvature,
             gradient,
+            parameters: self.parameters.clone(),
+            model: self.model.clone(),
+            likelihood: self.likelihood.clone(),
         }
     }
 
     /// Returns the covariance of the parameters; held ones have none.
     pub fn covariance(&self, priors: &[Prior]) -> Option<DMatrix<f64>> {
-        let free = free_parameters(priors);
-        let inverse = factor_of(&self.curvature, &free)?.inverse();
-        let mut full = DMatrix::zeros(priors.len(), priors.len());
-        for (i, &a) in free.iter().enumerate() {
-            for (j, &b) in free.iter().enumerate() {
-                full[(a, b)] = inverse[(i, j)];
-            }
+        let mut covariance = Cholesky::new(&self.curvature)?.inverse();
+        for (k, _) in priors.iter().enumerate().filter(|one| one.1.is_held()) {
+            covariance[(k, k)] = 0.0;
         }
-        Some(full)
+        Some(covariance)
     }
 }
 
 /// Returns ln det A of A = L L'.
-pub fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+pub fn log_determinant(factor: &Dense<f64, Dyn>) -> f64 {
     let diagonal = factor.l_dirty().diagonal();
     2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
-}
-
-/// Returns the Cholesky factor of the rows and columns `kept` of a matrix.
-pub fn factor_of(matrix: &DMatrix<f64>, kept: &[usize]) -> Option<Cholesky<f64, Dyn>> {
-    Cholesky::new(matrix.select_rows(kept).select_columns(kept))
-}
-
-/// Returns the indices of the parameters that are not held.
-pub fn free_parameters(priors: &[Prior]) -> Vec<usize> {
-    (0..priors.len())
-        .filter(|&k| !priors[k].is_held())
-        .collect()
 }

@@ -32,6 +32,7 @@ use crate::optimum::{Linearised, Optimum};
 use crate::parameters::{NuisanceParameter, Prior};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
+use std::sync::Arc;
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Spreads of a mode's own discrepancy (1): 0.05 to 3 %, equally spaced in their logarithm.
@@ -196,11 +197,8 @@ fn log_evidence(dataset: &Dataset, nominal: &Fit, way: &Way, spread: f64, share:
     let loose = loosened(dataset, share * way.loosened * spread, of_frequencies);
     let optimum = &nominal.best.optimum;
     let (first, added) = (optimum.parameters.len(), way.slopes.ncols());
-    let mut slopes = optimum
-        .model
-        .slopes
-        .clone()
-        .resize_horizontally(first + added, 0.0);
+    let slopes = (*optimum.model.slopes).clone();
+    let mut slopes = slopes.resize_horizontally(first + added, 0.0);
     slopes.columns_mut(first, added).copy_from(&way.slopes);
     let mut parameters = optimum.parameters.clone();
     parameters.resize(first + added, 0.0);
@@ -208,7 +206,7 @@ fn log_evidence(dataset: &Dataset, nominal: &Fit, way: &Way, spread: f64, share:
     priors.resize(first + added, Prior::normal(0.0, spread));
     let model = Linearised {
         predicted: optimum.model.predicted.clone(),
-        slopes,
+        slopes: Arc::new(slopes),
     };
     let here = Optimum::new(&loose.data, &priors, parameters, model);
     let layout = loose.layout(&[]);

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use tapjoint_numerics::cholesky::Cholesky;
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Residuals of a fit, with their covariance.
@@ -43,13 +44,15 @@ impl Residuals {
         let mut raw = DVector::zeros(count);
         let mut unit = DVector::zeros(count);
         let mut weighted_stds = DVector::zeros(count);
-        let mut influence = optimum.model.slopes.clone();
+        let mut influence = optimum.model.slopes.transpose();
         for (row, datum) in dataset.data.iter().enumerate() {
             raw[row] = datum.value - optimum.model.predicted[row];
             let own = raw[row] / datum.std;
             unit[row] = datum.gaussian_square(own).sqrt().copysign(own);
             weighted_stds[row] = datum.std / datum.weight(own).sqrt();
-            influence.row_mut(row).scale_mut(1.0 / weighted_stds[row]);
+            influence
+                .column_mut(row)
+                .scale_mut(1.0 / weighted_stds[row]);
         }
         let mut of_model = raw.clone();
         let first = fit.best.priors.len() - dataset.nuisances.len();
@@ -59,9 +62,21 @@ impl Residuals {
                 of_model += optimum.parameters[first + k] * slopes;
             }
         }
-        let posterior = fit.best.covariance()?;
-        let spread =
-            DMatrix::identity(count, count) - &influence * posterior * influence.transpose();
+        for (k, _) in fit
+            .best
+            .priors
+            .iter()
+            .enumerate()
+            .filter(|one| one.1.is_held())
+        {
+            influence.row_mut(k).fill(0.0);
+        }
+        let factor = Cholesky::new(&optimum.curvature)?;
+        let mut solved = influence.clone();
+        for mut column in solved.column_iter_mut() {
+            factor.solve(column.as_mut_slice());
+        }
+        let spread = DMatrix::identity(count, count) - influence.transpose() * solved;
         let (own, nuisances) = fit.best.priors.split_at(first);
         let deviates = nuisances.iter().zip(&optimum.parameters[first..]);
         let deviates = deviates.map(|(prior, value)| ((value - prior.centre) / prior.std).powi(2));
@@ -118,7 +133,8 @@ impl Residuals {
         let mut blocks = Vec::new();
         for (name, rows) in named {
             let spread = self.spread.select_rows(&rows).select_columns(&rows);
-            let (mean, square) = (spread.trace(), (&spread * &spread).trace());
+            // tr B^2 of a symmetric matrix.
+            let (mean, square) = (spread.trace(), spread.norm_squared());
             if mean < dataset.settings.thresholds.least_block_freedom {
                 continue;
             }
@@ -291,7 +307,7 @@ impl HoldoutErrors {
         };
         let model = forward.linearise(fit.parameters(), &fit.best.priors)?;
         let posterior = fit.best.covariance()?;
-        let mut spread = 1e4 * &model.slopes * posterior * model.slopes.transpose();
+        let mut spread = 1e4 * &*model.slopes * posterior * model.slopes.transpose();
         let mut errors = DVector::zeros(data.len());
         let stds = data.iter().map(|datum| 100.0 * datum.std);
         let stds = DVector::from_iterator(data.len(), stds);

@@ -175,15 +175,12 @@ fn is_sized(dataset: &Dataset, fit: &Fit) -> bool {
         dataset.layout(&fit.effects),
         dataset.settings.thresholds.sized,
     );
-    let Some(covariance) = fit.best.covariance() else {
-        return false;
-    };
     fit.effects.iter().enumerate().all(|(k, effect)| {
         let at = layout.size(k);
         let away = (fit.parameters()[at] - effect.size.neutral).abs();
         effect.size.is_fixed()
             || effect.is(EffectId::JointCompliance) && effect.location.is_some()
-            || away >= sized * covariance[(at, at)].max(0.0).sqrt()
+            || fit.best.std(at).is_some_and(|std| away >= sized * std)
     })
 }
 

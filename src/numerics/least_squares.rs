@@ -9,7 +9,8 @@
 //! the damping (Levenberg 1944, Marquardt 1963), and the damping follows how much of its promise each step
 //! keeps.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use crate::cholesky::Cholesky;
+use nalgebra::{DMatrix, DVector};
 
 /// A fit: a cost of some parameters and its derivatives.
 pub trait Problem {
@@ -387,7 +388,7 @@ impl Linearised {
                         solution[k] = 0.0;
                     }
                 }
-                Cholesky::new(matrix)?.solve_mut(&mut solution);
+                Cholesky::new(&matrix)?.solve(solution.as_mut_slice());
                 solution
             }
             Self::Triangle(triangle) if damping == 0.0 && !held.contains(&true) => {

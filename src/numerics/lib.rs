@@ -1,5 +1,6 @@
 //! Numbers: quantities read with their units, statistics and the least-squares solver that several stages share.
 
+pub mod cholesky;
 pub mod least_squares;
 pub mod quantity;
 pub mod stats;

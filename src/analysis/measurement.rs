@@ -18,8 +18,8 @@ use tapjoint_signal::modal::{
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
-    AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, RUNG_DOWN,
-    SpectralError, Window, band_limited, choose_window, exponential_to, largest_smooth_block,
+    AveragedSpectra, BandLimiter, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK,
+    RUNG_DOWN, SpectralError, Window, choose_window, exponential_to, largest_smooth_block,
     measure_decay,
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
@@ -317,10 +317,11 @@ impl<'a> Inputs<'a> {
         let quiet = self.quiet()?;
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
+        let limiter = BandLimiter::new(rate, band, self.gate as usize);
         let noise: Vec<f64> = quiet
             .responses
             .iter()
-            .map(|x| root_mean_square(&band_limited(x, rate, band)))
+            .map(|x| root_mean_square(&limiter.magnitude(x)))
             .collect();
         // The decay of each response inside the band, the largest over the accepted taps.
         let mut checks = vec![DecayCheck::NOTHING; noise.len()];
@@ -334,7 +335,7 @@ impl<'a> Inputs<'a> {
             )?;
             let responses = &record[usize::from(self.has_force)..];
             for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
-                let found = measure_decay(&band_limited(samples, rate, band), noise);
+                let found = measure_decay(&limiter.magnitude(samples), noise);
                 if found.remaining >= check.remaining {
                     *check = found;
                 }

@@ -46,34 +46,32 @@ impl PreTriggerNoise {
     ) -> Option<Vec<Vec<f64>>> {
         let (_, energy) = self.window_sums(window);
         let lines = &averages.lines;
-        let force_noise = match &self.force {
-            Some(force) => Some(noise_power(force.clone(), self.sample_rate, lines)?),
-            None => None,
-        };
+        let channels = self.force.iter().chain(&self.responses);
+        let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
+        let mut noise = noise_power(&channels, self.sample_rate, lines)?;
+        let of_responses = noise.split_off(usize::from(self.force.is_some()));
+        let force_noise = noise.pop();
         let taps = averages.taps as f64;
-        self.responses
-            .iter()
-            .enumerate()
-            .map(|(response, samples)| {
-                let noise = noise_power(samples.clone(), self.sample_rate, lines)?;
-                let power = noise.iter().enumerate().map(|(line, noise)| {
-                    let (Some(force), Some(h1)) = (&averages.force, &averages.h1) else {
-                        return noise * energy;
-                    };
-                    let gain = h1[response].get(line).map_or(0.0, Complex64::norm_sqr);
-                    let of_force = force_noise.as_ref().map_or(0.0, |noise| noise[line]);
-                    let force_power = (force[line] * force[line]).max(f64::MIN_POSITIVE);
-                    (noise * energy / taps + gain * of_force * self.force_window) / force_power
-                });
-                Some(power.collect())
-            })
-            .collect()
+        let powers = of_responses.iter().enumerate().map(|(response, noise)| {
+            let power = noise.iter().enumerate().map(|(line, noise)| {
+                let (Some(force), Some(h1)) = (&averages.force, &averages.h1) else {
+                    return noise * energy;
+                };
+                let gain = h1[response].get(line).map_or(0.0, Complex64::norm_sqr);
+                let of_force = force_noise.as_ref().map_or(0.0, |noise| noise[line]);
+                let force_power = (force[line] * force[line]).max(f64::MIN_POSITIVE);
+                (noise * energy / taps + gain * of_force * self.force_window) / force_power
+            });
+            power.collect()
+        });
+        Some(powers.collect())
     }
 
     /// Noise of the force channel in the transforms of its windowed pulses (N s), on
     /// each line; `None` without a hammer, or where the stretch is too short to tell.
     pub(super) fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
-        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        let channel = self.force.as_deref()?;
+        let mut noise = noise_power(&[channel], self.sample_rate, lines)?.pop()?;
         for value in &mut noise {
             *value = (*value * self.force_window).sqrt();
         }

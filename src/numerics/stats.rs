@@ -14,6 +14,37 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
+/// Values in ascending order, of which one comes and one goes from place to place.
+#[derive(Debug, Clone, Default)]
+pub struct Sorted(Vec<f64>);
+
+impl Sorted {
+    /// Takes these values.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_unstable_by(f64::total_cmp);
+        Sorted(values)
+    }
+
+    /// Adds a value.
+    pub fn insert(&mut self, value: f64) {
+        self.0.insert(self.place(value), value);
+    }
+
+    /// Takes a value out that is there.
+    pub fn remove(&mut self, value: f64) {
+        self.0.remove(self.place(value));
+    }
+
+    /// The same as [`median`].
+    pub fn median(&self) -> f64 {
+        self.0.get(self.0.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    fn place(&self, value: f64) -> usize {
+        self.0.partition_point(|own| own.total_cmp(&value).is_lt())
+    }
+}
+
 /// Root of the mean square, sqrt(sum x^2/n), in the unit of the values; 0 of nothing.
 pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
@@ -128,6 +159,10 @@ mod tests {
             (-3.0, 3.0)
         );
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
+        let mut sorted = Sorted::of(vec![4.0, 3.0, 2.0, 5.0]);
+        sorted.remove(5.0);
+        sorted.insert(1.0);
+        assert_eq!((sorted.median(), Sorted::default().median()), (3.0, 0.0));
         assert_eq!(root_mean_square(&[1.0, 7.0]), 5.0);
     }
 

@@ -8,6 +8,7 @@
 //! embedded font, and so needs none.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::io::Write;
 
 use ab_glyph::{Font, OutlineCurve};
@@ -174,12 +175,11 @@ impl Canvas<'_> {
         for pair in points.windows(2) {
             mask.segment(pair[0], pair[1], stroke.width / 2.0);
         }
-        for y in 0..mask.height {
-            for x in 0..mask.width {
-                let coverage = mask.coverage[(y * mask.width + x) as usize];
+        for (y, line) in (mask.top..).zip(mask.coverage.chunks_exact(width as usize)) {
+            for (x, &coverage) in (mask.left..).zip(line) {
                 if coverage > 0 {
                     let alpha = f64::from(coverage) / FULL * stroke.opacity;
-                    self.blend(mask.left + x, mask.top + y, stroke.color, alpha)?;
+                    self.blend(x, y, stroke.color, alpha)?;
                 }
             }
         }
@@ -231,11 +231,12 @@ impl Mask {
                     0.0
                 };
                 let distance = length(px - share * dx, py - share * dy);
-                let coverage = (half_width + 0.5 - distance).clamp(0.0, 1.0);
+                let coverage = (half_width + 0.5 - distance).min(1.0);
                 let (x, y) = (x - self.left, y - self.top);
-                if (0..self.width).contains(&x) && (0..self.height).contains(&y) {
+                if coverage > 0.0 && (0..self.width).contains(&x) && (0..self.height).contains(&y) {
                     let cell = &mut self.coverage[(y * self.width + x) as usize];
-                    *cell = (*cell).max((FULL * coverage).round() as u8);
+                    // To the nearest step: without SSE 4.1 `round` is a call.
+                    *cell = (*cell).max((FULL * coverage + 0.5) as u8);
                 }
             }
         }
@@ -311,9 +312,8 @@ pub fn render_svg_file(drawing: &Drawing) -> Result<String, ReportError> {
 fn elements(drawing: &Drawing, mut outlines: Option<&mut BTreeMap<String, String>>) -> String {
     let mut all = String::new();
     // Neighbours only are merged, so that what covers what stays.
-    let groups = drawing.shapes.chunk_by(|one, other| {
-        !matches!(one, Shape::Text(_)) && path_element("", one) == path_element("", other)
-    });
+    let groups = (drawing.shapes)
+        .chunk_by(|one, other| look(one).is_some_and(|own| look(other) == Some(own)));
     for group in groups {
         match (group, outlines.as_mut()) {
             ([Shape::Text(text)], Some(outlines)) => all.push_str(&outlined(text, outlines)),
@@ -329,6 +329,19 @@ fn elements(drawing: &Drawing, mut outlines: Option<&mut BTreeMap<String, String
         }
     }
     all
+}
+
+/// Kind, colour, size and opacity of what may share a path with its like; `None` for text.
+fn look(shape: &Shape) -> Option<(&'static str, Rgb, f64, f64)> {
+    Some(match shape {
+        Shape::Line { stroke, .. } => ("line", stroke.color, stroke.width, stroke.opacity),
+        Shape::Rectangle { color, opacity, .. } | Shape::Area { color, opacity, .. } => {
+            ("area", *color, 0.0, *opacity)
+        }
+        Shape::Dot { color, radius, .. } => ("dot", *color, *radius, 1.0),
+        Shape::Ring { color, radius, .. } => ("ring", *color, *radius, 1.0),
+        Shape::Text(_) => return None,
+    })
 }
 
 /// A path in the style of a shape; empty for text.
@@ -400,7 +413,8 @@ fn polyline(path: &mut String, points: &[Point]) {
             Some((x0, y0)) => (if x < x0 { "" } else { " " }, x - x0, y - y0),
         };
         let between = if dy < 0 { "" } else { " " };
-        path.push_str(&format!("{before}{dx}{between}{dy}"));
+        // A string takes everything.
+        let _ = write!(path, "{before}{dx}{between}{dy}");
         last = Some((x, y));
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use num_complex::Complex64;
 
 use crate::spectral::Lines;
-use tapjoint_numerics::stats::median;
+use tapjoint_numerics::stats::{Sorted, median};
 
 /// Level of a spectrum over all sensors, and of its noise, line by line.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,10 +59,16 @@ pub fn noise_of_function(values: &[Complex64]) -> Vec<f64> {
         })
         .collect();
     let mut noise = Vec::with_capacity(values.len());
+    let (mut about, mut taken) = (Sorted::default(), 0..0);
     for line in 0..values.len() {
         let end = (line + NOISE_REACH).min(rough.len());
         let first = line.saturating_sub(NOISE_REACH).min(end.saturating_sub(1));
-        noise.push(median(&mut rough[first..end].to_vec()) / (20.0 * LN_2));
+        rough[taken.end..end].iter().for_each(|x| about.insert(*x));
+        rough[taken.start..first]
+            .iter()
+            .for_each(|x| about.remove(*x));
+        taken = first..end;
+        noise.push(about.median() / (20.0 * LN_2));
     }
     noise
 }

@@ -291,18 +291,23 @@ impl WavCursor<'_> {
                 into.extend(samples.map(|x| (f64::from(x[0]) - 128.0) / 128.0));
             }
             Coding::Integer { bits, full, .. } => {
-                let full_scale = 2_f64.powi(i32::from(full) - 1);
-                let width = usize::from(bits / 8);
-                into.extend(samples.map(|x| {
-                    // Filled from the high end and shifted down again, so that the sign extends itself.
-                    let mut padded = [0_u8; 4];
-                    padded[4 - width..].copy_from_slice(&x[..width]);
-                    let value = i32::from_le_bytes(padded) >> (32 - bits);
-                    f64::from(value) / full_scale
-                }));
+                // Filled from the high end, so that the sign extends itself.
+                let scale = 2_f64.powi(i32::from(bits) - i32::from(full) - 31);
+                match bits {
+                    16 => into.extend(samples.map(|x| from_high_end::<2>(x) * scale)),
+                    24 => into.extend(samples.map(|x| from_high_end::<3>(x) * scale)),
+                    _ => into.extend(samples.map(|x| from_high_end::<4>(x) * scale)),
+                }
             }
         }
     }
+}
+
+/// Returns the integer of which these are the highest bytes, little end first.
+fn from_high_end<const BYTES: usize>(bytes: &[u8]) -> f64 {
+    let mut padded = [0_u8; 4];
+    padded[4 - BYTES..].copy_from_slice(&bytes[..BYTES]);
+    f64::from(i32::from_le_bytes(padded))
 }
 
 /// A file whose chunks are read.

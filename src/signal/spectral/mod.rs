@@ -15,7 +15,7 @@ pub use average::{
 };
 pub use thinning::Thinning;
 pub(crate) use transform::kaiser_beta;
-pub use transform::{Transformer, Workspace, band_limited, transform_block};
+pub use transform::{BandLimiter, Transformer, Workspace, transform_block};
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,
     line_amplitude, measure_decay, noise_beside, noise_power,

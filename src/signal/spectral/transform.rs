@@ -341,27 +341,37 @@ pub(super) fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
     filter
 }
 
-/// Magnitude over time of what `samples` have between `low` and `high` (Hz): mixed down, filtered and
-/// decimated, the filter's tails cut off; the samples themselves where the band is most of what
-/// there is.
-pub fn band_limited(samples: &[f64], sample_rate: f64, band: (f64, f64)) -> Vec<f64> {
-    let (low, high) = band;
-    let factor = decimation_factor(sample_rate, high - low);
-    if factor < 3 {
-        return samples.to_vec();
+/// Takes a band out of records: mixed down, filtered and decimated.
+#[derive(Debug)]
+pub struct BandLimiter {
+    /// `None` where the band is most of what there is.
+    decimator: Option<Decimator>,
+}
+
+impl BandLimiter {
+    /// For the band (Hz) of records of at most `length` samples.
+    pub fn new(sample_rate: f64, band: (f64, f64), length: usize) -> Self {
+        let (low, high) = band;
+        let (centre, width) = (0.5 * (low + high), high - low);
+        let factor = decimation_factor(sample_rate, width);
+        BandLimiter {
+            decimator: (factor >= 3)
+                .then(|| Decimator::new(sample_rate, centre, width, factor, length)),
+        }
     }
-    let (centre, width) = (0.5 * (low + high), high - low);
-    let decimator = Decimator::new(sample_rate, centre, width, factor, samples.len());
-    let skip = decimator.delay() / factor;
-    let keep = samples.len() / factor;
-    // A real oscillation of amplitude a leaves a magnitude of a/2.
-    decimator
-        .run(samples)
-        .iter()
-        .skip(skip)
-        .take(keep)
-        .map(|z| 2.0 * z.norm())
-        .collect()
+
+    /// Magnitude over time of what the samples have in the band, the filter's tails cut off; the samples themselves where
+    /// the band is most of what there is.
+    pub fn magnitude(&self, samples: &[f64]) -> Vec<f64> {
+        let Some(decimator) = &self.decimator else {
+            return samples.to_vec();
+        };
+        let skip = decimator.delay() / decimator.factor;
+        let keep = samples.len() / decimator.factor;
+        let decimated = decimator.run(samples).into_iter().skip(skip).take(keep);
+        // A real oscillation of amplitude a leaves a magnitude of a/2.
+        decimated.map(|z| 2.0 * z.norm()).collect()
+    }
 }
 
 /// One output of the symmetric filter, centred on `index`.

@@ -4,10 +4,10 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use tapjoint_numerics::stats::median;
+use tapjoint_numerics::stats::{Sorted, median};
 
 use super::Lines;
-use super::transform::transform_block;
+use super::transform::Transformer;
 
 /// A window as applied.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,35 +162,47 @@ const LEAST_QUIET: usize = 64;
 /// Power |X|^2 that noise alone would leave on each line of a record, divided by the window's energy
 /// (the sum of its squared values).
 ///
-/// `quiet` is a stretch without taps, its mean taken out. The median over neighbouring lines keeps
+/// `quiet` is a stretch without taps of each channel, equally long, its mean taken out. The median over neighbouring lines keeps
 /// mains lines from counting as noise; a median of exponentially distributed powers is ln 2 of their
 /// mean. `None` when the stretch is shorter than 64 samples.
-pub fn noise_power(mut quiet: Vec<f64>, sample_rate: f64, lines: &Lines) -> Option<Vec<f64>> {
-    if quiet.len() < LEAST_QUIET {
+pub fn noise_power(quiet: &[&[f64]], sample_rate: f64, lines: &Lines) -> Option<Vec<Vec<f64>>> {
+    let length = quiet.first()?.len();
+    if length < LEAST_QUIET {
         return None;
     }
-    Window::Hann.apply(&mut quiet, sample_rate);
+    let transformer = Transformer::new(sample_rate, *lines, length);
     // The Hann window scaled to mean 1 has the energy 3/2 per sample.
-    let energy = 1.5 * quiet.len() as f64;
-    let powers: Vec<f64> = transform_block(&quiet, sample_rate, lines)
-        .iter()
-        .map(|x| x.norm_sqr() / energy)
-        .collect();
+    let energy = 1.5 * length as f64;
     // A short stretch is interpolated onto dense lines: neighbours within its resolution are one.
-    let width = (sample_rate / quiet.len() as f64 / lines.spacing).ceil() as usize;
-    Some(smooth(&powers, REACH * width.max(1)))
+    let width = (sample_rate / length as f64 / lines.spacing).ceil() as usize;
+    let noise = quiet.iter().map(|samples| {
+        let mut samples = samples.to_vec();
+        Window::Hann.apply(&mut samples, sample_rate);
+        let transformed = transformer.transform(&samples).into_iter();
+        let powers: Vec<f64> = transformed.map(|x| x.norm_sqr() / energy).collect();
+        smooth(&powers, REACH * width.max(1))
+    });
+    Some(noise.collect())
 }
 
 /// Median over `reach` lines to either side, taken on at most 17 of them.
 fn smooth(powers: &[f64], reach: usize) -> Vec<f64> {
     let stride = (reach / REACH).max(1);
+    // Every line shares all but one or two values with the one a stride before it.
+    let mut windows = vec![Sorted::default(); stride];
     (0..powers.len())
         .map(|index| {
-            let first = index.saturating_sub(reach);
-            let last = (index + reach).min(powers.len() - 1);
-            let mut around: Vec<f64> = (first..=last).step_by(stride).map(|i| powers[i]).collect();
-            let half = around.len() / 2;
-            *around.select_nth_unstable_by(half, f64::total_cmp).1 / std::f64::consts::LN_2
+            let window = &mut windows[index % stride];
+            if index < reach + stride {
+                let around = &powers[index.saturating_sub(reach)..];
+                let around = &around[..around.len().min(index.min(reach) + reach + 1)];
+                *window = Sorted::of(around.iter().step_by(stride).copied().collect());
+            } else {
+                window.remove(powers[index - reach - stride]);
+                let next = powers.get(index + reach);
+                next.into_iter().for_each(|next| window.insert(*next));
+            }
+            window.median() / std::f64::consts::LN_2
         })
         .collect()
 }
@@ -202,12 +214,22 @@ pub fn line_amplitude(samples: &[f64], sample_rate: f64, frequency: f64) -> Opti
         return None;
     }
     let step = Complex64::from_polar(1.0, -TAU * frequency / sample_rate);
+    // Eight sums side by side: one would wait for each addition and turn before the next.
+    let (eights, rest) = samples.as_chunks::<8>();
+    let mut sums = [Complex64::ZERO; 8];
     let mut turn = Complex64::ONE;
-    let mut sum = Complex64::ZERO;
-    for &x in samples {
-        sum += turn * x;
-        turn *= step;
+    let eight_steps = step.powu(8);
+    for eight in eights {
+        for (sum, x) in sums.iter_mut().zip(eight) {
+            *sum += turn * x;
+        }
+        turn *= eight_steps;
     }
+    for (sum, x) in sums.iter_mut().zip(rest) {
+        *sum += turn * x;
+    }
+    let by_horner = |sum, own: &Complex64| sum * step + own;
+    let sum = sums.iter().rev().fold(Complex64::ZERO, by_horner);
     Some(2.0 * sum.norm() / samples.len() as f64)
 }
 

@@ -154,14 +154,10 @@ fn band_limited_value(samples: &[f64], place: f64) -> f64 {
     }
     // sin(pi (place - n)) changes its sign from sample to sample only.
     let mut sum = 0.0;
+    let mut sign = 1.0 - 2.0 * nearest.rem_euclid(2.0);
     for (n, x) in samples.iter().enumerate() {
-        let distance = n as f64 - nearest;
-        let sign = if distance.rem_euclid(2.0) < 0.5 {
-            1.0
-        } else {
-            -1.0
-        };
-        sum += sign * x / (fraction - distance);
+        sum += sign * x / (fraction - (n as f64 - nearest));
+        sign = -sign;
     }
     (PI * fraction).sin() / PI * sum
 }

@@ -8,7 +8,7 @@ use tapjoint_analysis::jointed_structure;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::spectral::{
-    DecayCheck, Lines, Window, band_limited, choose_window, exponential_to, measure_decay,
+    BandLimiter, DecayCheck, Lines, Window, choose_window, exponential_to, measure_decay,
 };
 use tapjoint_simulate::{
     SimulatedMode, TapTestSettings, add_noise, below, observed_modes, simulate_tap_test,
@@ -209,12 +209,12 @@ impl VirtualRecord {
         let band = (lines.low, lines.high);
         // White noise keeps its density: in the band it has this share of its rms.
         let share = (2.0 * (band.1 - band.0) / self.sample_rate).min(1.0).sqrt();
+        let limiter = BandLimiter::new(self.sample_rate, band, gate);
         let sensors = self.responses.iter().zip(&self.noise);
         sensors
             .map(|(samples, noise)| {
                 let samples = &samples[..gate.min(samples.len())];
-                let limited = band_limited(samples, self.sample_rate, band);
-                measure_decay(&limited, share * noise)
+                measure_decay(&limiter.magnitude(samples), share * noise)
             })
             .collect()
     }

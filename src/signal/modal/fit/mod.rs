@@ -28,7 +28,8 @@ pub use mode_fit::{
 pub use tapjoint_numerics::least_squares::StopReason;
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
+use std::sync::Arc;
 use variable_projection::STEADY;
 
 /// Start of the search for a mode.
@@ -345,10 +346,11 @@ fn line_spacing(basis: Basis, frequencies: &[f64]) -> Result<f64, FitError> {
 /// A decay begins after the force pulse has ended (without a hammer: where the response no longer
 /// shows the pulse) and must not be windowed. All decays have the same number of samples, at best one from
 /// [`largest_smooth_block`](crate::spectral::largest_smooth_block).
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct FreeDecayCollector {
     sample_rate: f64,
     samples: usize,
+    transform: Arc<dyn RealToComplex<f64>>,
     lines: Vec<usize>,
     columns: Vec<Column>,
     taps: usize,
@@ -380,6 +382,7 @@ impl FreeDecayCollector {
         Ok(FreeDecayCollector {
             sample_rate,
             samples,
+            transform: RealFftPlanner::new().plan_fft_forward(samples),
             lines,
             columns: Vec::new(),
             taps: 0,
@@ -391,9 +394,8 @@ impl FreeDecayCollector {
     /// # Errors
     /// [`FitError::Short`] where a response has fewer.
     pub fn add_tap(&mut self, responses: &[Vec<f64>]) -> Result<(), FitError> {
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(self.samples);
-        let mut spectrum = transform.make_output_vec();
-        let mut input = transform.make_input_vec();
+        let mut spectrum = self.transform.make_output_vec();
+        let mut input = self.transform.make_input_vec();
         for (sensor, response) in responses.iter().enumerate() {
             let short = FitError::Short {
                 tap: self.taps,
@@ -403,7 +405,7 @@ impl FreeDecayCollector {
             };
             let decay = response.get(..self.samples).ok_or(short.clone())?;
             input.copy_from_slice(decay);
-            transform
+            self.transform
                 .process(&mut input, &mut spectrum)
                 .map_err(|_| short)?;
             self.columns.push(Column {

@@ -123,7 +123,7 @@ impl Lines {
     /// With b = b1 + j b2 the model is b1 (phi + image) + b2 j (phi - image), where `image` is phi of the
     /// conjugate pole. Rows are the real parts of all lines, then the imaginary parts.
     pub fn model(&self, poles: &[Complex64]) -> DMatrix<f64> {
-        self.columns(poles, 0)
+        self.columns::<0>(poles)
     }
 
     /// Returns the columns u = phi' + image' and v = j (phi' - image') of each pole, phi' = d phi/dq.
@@ -132,16 +132,16 @@ impl Lines {
     /// d model/d position = b1 v - b2 u,     d model/d decay = -(b1 u + b2 v)
     /// ```
     pub fn slopes(&self, poles: &[Complex64]) -> DMatrix<f64> {
-        self.columns(poles, 1)
+        self.columns::<1>(poles)
     }
 
-    /// Returns sum and turned difference of each pole's function and its image; `derivative` is 0 or 1.
-    fn columns(&self, poles: &[Complex64], derivative: usize) -> DMatrix<f64> {
+    /// Returns sum and turned difference of each pole's function and its image, or of their derivatives.
+    fn columns<const DERIVATIVE: usize>(&self, poles: &[Complex64]) -> DMatrix<f64> {
         let count = self.count();
         let mut columns = DMatrix::zeros(2 * count, 2 * poles.len());
         for (place, &pole) in poles.iter().enumerate() {
             for (line, [own, image]) in self.values(pole).enumerate() {
-                let (own, image) = (own[derivative], image[derivative]);
+                let (own, image) = (own[DERIVATIVE], image[DERIVATIVE]);
                 let sum = own + image;
                 let turned = Complex64::i() * (own - image);
                 columns[(line, 2 * place)] = sum.re;

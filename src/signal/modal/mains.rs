@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 use super::ModeReading;
 use super::fit::{ModeFit, SteadyLine};
-use crate::spectral::{line_amplitude, noise_beside};
+use crate::spectral::{line_amplitudes, noise_beside};
 
 /// Frequencies of the grids of the world (Hz).
 pub const GRIDS: [f64; 2] = [50.0, 60.0];
@@ -183,11 +183,9 @@ fn strongest(
         let step = STEP * sample_rate / samples.len().max(1) as f64;
         // One place more on either side, so that a line at the end of the reach has neighbours.
         let places = (reach / step).ceil() as i32 + 1;
-        let mut levels = Vec::new();
-        for place in -places..=places {
-            let frequency = centre + f64::from(place) * step;
-            levels.push(line_amplitude(samples, sample_rate, frequency)?);
-        }
+        let levels = (-places..=places).map(|place| centre + f64::from(place) * step);
+        let levels = line_amplitudes(samples, sample_rate, &levels.collect::<Vec<_>>());
+        let levels: Vec<f64> = levels.into_iter().collect::<Option<_>>()?;
         // A line outside of the reach rises towards an end.
         let inner = 1..levels.len() - 1;
         let highest = inner.max_by(|a, b| levels[*a].total_cmp(&levels[*b]))?;

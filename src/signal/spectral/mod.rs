@@ -16,6 +16,7 @@ pub use average::{
 pub use thinning::Thinning;
 pub(crate) use transform::kaiser_beta;
 pub use transform::{BandLimiter, Transformer, Workspace, transform_block};
+pub(crate) use window::line_amplitudes;
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,
     line_amplitude, measure_decay, noise_beside, noise_power,

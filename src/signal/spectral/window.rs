@@ -210,27 +210,45 @@ fn smooth(powers: &[f64], reach: usize) -> Vec<f64> {
 /// Amplitude of a steady line at `frequency` (Hz) in `samples`, 2 |sum x e^{-j omega t}|/n; `None`
 /// when they hold fewer than three periods.
 pub fn line_amplitude(samples: &[f64], sample_rate: f64, frequency: f64) -> Option<f64> {
-    if (samples.len() as f64) < 3.0 * sample_rate / frequency {
-        return None;
-    }
-    let step = Complex64::from_polar(1.0, -TAU * frequency / sample_rate);
-    // Eight sums side by side: one would wait for each addition and turn before the next.
-    let (eights, rest) = samples.as_chunks::<8>();
-    let mut sums = [Complex64::ZERO; 8];
-    let mut turn = Complex64::ONE;
-    let eight_steps = step.powu(8);
-    for eight in eights {
-        for (sum, x) in sums.iter_mut().zip(eight) {
-            *sum += turn * x;
+    let amplitudes = line_amplitudes(samples, sample_rate, &[frequency]);
+    amplitudes.into_iter().flatten().next()
+}
+
+/// Frequencies whose sums go side by side: one would wait for each addition before the next.
+const LANES: usize = 4;
+
+/// As [`line_amplitude`], at several frequencies.
+pub(crate) fn line_amplitudes(
+    samples: &[f64],
+    sample_rate: f64,
+    frequencies: &[f64],
+) -> Vec<Option<f64>> {
+    let count = samples.len() as f64;
+    let mut all = Vec::with_capacity(frequencies.len());
+    for some in frequencies.chunks(LANES) {
+        let (mut step_re, mut step_im) = ([1.0; LANES], [0.0; LANES]);
+        for (lane, frequency) in some.iter().enumerate() {
+            let step = Complex64::from_polar(1.0, -TAU * frequency / sample_rate);
+            (step_re[lane], step_im[lane]) = (step.re, step.im);
         }
-        turn *= eight_steps;
+        let (mut re, mut im) = ([1.0; LANES], [0.0; LANES]);
+        let (mut sum_re, mut sum_im) = ([0.0; LANES], [0.0; LANES]);
+        for x in samples {
+            for lane in 0..LANES {
+                sum_re[lane] += re[lane] * x;
+                sum_im[lane] += im[lane] * x;
+                let turned = re[lane] * step_re[lane] - im[lane] * step_im[lane];
+                im[lane] = re[lane] * step_im[lane] + im[lane] * step_re[lane];
+                re[lane] = turned;
+            }
+        }
+        let sums = sum_re.into_iter().zip(sum_im);
+        all.extend(some.iter().zip(sums).map(|(frequency, (re, im))| {
+            let holds_three = count >= 3.0 * sample_rate / frequency;
+            holds_three.then(|| 2.0 * Complex64::new(re, im).norm() / count)
+        }));
     }
-    for (sum, x) in sums.iter_mut().zip(rest) {
-        *sum += turn * x;
-    }
-    let by_horner = |sum, own: &Complex64| sum * step + own;
-    let sum = sums.iter().rev().fold(Complex64::ZERO, by_horner);
-    Some(2.0 * sum.norm() / samples.len() as f64)
+    all
 }
 
 /// Root mean square of the amplitudes that noise has beside `frequency` (Hz), as [`line_amplitude`] gives
@@ -242,11 +260,12 @@ pub fn line_amplitude(samples: &[f64], sample_rate: f64, frequency: f64) -> Opti
 pub fn noise_beside(samples: &[f64], sample_rate: f64, frequency: f64) -> Option<f64> {
     let resolution = sample_rate / samples.len() as f64;
     let places = (3..=8).flat_map(|k| [-1.0, 1.0].map(|side| side * f64::from(k) * resolution));
-    let mut amplitudes: Vec<f64> = places
+    let places: Vec<f64> = places
         .map(|offset| frequency + offset)
         .filter(|place| *place > 0.0)
-        .filter_map(|place| line_amplitude(samples, sample_rate, place))
         .collect();
+    let amplitudes = line_amplitudes(samples, sample_rate, &places);
+    let mut amplitudes: Vec<f64> = amplitudes.into_iter().flatten().collect();
     let half_power = std::f64::consts::LN_2.sqrt();
     (!amplitudes.is_empty()).then(|| median(&mut amplitudes) / half_power)
 }

@@ -202,7 +202,7 @@ fn conditions(test: &TestDescription, description: &RecordingDescription) -> Con
 /// responses.
 ///
 /// # Errors
-/// An unknown hammer channel; what [`measure`] meets.
+/// An unknown hammer channel; what [`measure`](crate::measure) meets.
 pub fn measure_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,

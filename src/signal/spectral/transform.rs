@@ -285,6 +285,11 @@ impl Decimator {
         }
     }
 
+    /// Samples from one output to the next.
+    fn factor(&self) -> usize {
+        self.stages.iter().map(|stage| stage.factor).product()
+    }
+
     /// Samples by which the first output lies before the record's start.
     pub(crate) fn delay(&self) -> usize {
         // A stage counts in outputs of those before it.
@@ -366,8 +371,8 @@ impl BandLimiter {
         let Some(decimator) = &self.decimator else {
             return samples.to_vec();
         };
-        let skip = decimator.delay() / decimator.factor;
-        let keep = samples.len() / decimator.factor;
+        let factor = decimator.factor();
+        let (skip, keep) = (decimator.delay() / factor, samples.len() / factor);
         let decimated = decimator.run(samples).into_iter().skip(skip).take(keep);
         // A real oscillation of amplitude a leaves a magnitude of a/2.
         decimated.map(|z| 2.0 * z.norm()).collect()

@@ -1,4 +1,4 @@
-//! The Fourier transform of tap records on given lines: a real FFT over the full band; into a band an analyser's zoom
+//! The Fourier transform of tap records on given lines: a real FFT where they are lines of one; else an analyser's zoom
 //! (mix, low-pass, decimate) and a chirp z-transform (Bluestein) on lines of any start and spacing.
 
 use std::f64::consts::{PI, TAU};
@@ -15,9 +15,9 @@ use super::{DISPLAY_RATIO, Lines, smallest_smooth_block};
 /// The Fourier transform X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate} of windowed records (unit of
 /// the samples times s) on given lines; time zero is a record's first sample.
 ///
-/// Over the full band of a block that is one FFT; over a zoom band a record is mixed down, low-pass
-/// filtered, decimated and transformed on the band's own lines, as an analyser does. Everything
-/// that does not depend on the samples is computed once, here.
+/// Over the full band of a block that is one FFT, and so are lines that an FFT of no more samples has. Into another band
+/// a record is mixed down, low-pass filtered, decimated and transformed on the band's own lines, as an analyser does.
+/// Everything that does not depend on the samples is computed once, here.
 #[derive(Debug)]
 pub struct Transformer {
     /// The lines on which it transforms.
@@ -27,8 +27,9 @@ pub struct Transformer {
 }
 
 enum Plan {
-    /// The whole band of a block: a real FFT.
-    Full(Arc<dyn RealToComplex<f64>>),
+    /// A real FFT, of whose lines these begin with this one. On lines 1/(n samples) apart, samples n apart turn by the same
+    /// angle: a longer record is wrapped to n samples by addition.
+    Real(Arc<dyn RealToComplex<f64>>, usize),
     /// Lines anywhere, without decimation.
     Lines(Chirp),
     /// A zoom band.
@@ -50,11 +51,14 @@ pub struct Workspace {
 impl Transformer {
     /// Plans the transform of records of at most `length` samples at `sample_rate` (Hz) on `lines`.
     pub fn new(sample_rate: f64, lines: Lines, length: usize) -> Self {
-        let rate_of_block = lines.spacing * lines.block as f64;
-        let full_band =
-            lines.low == 0.0 && (rate_of_block - sample_rate).abs() < 1e-9 * sample_rate;
-        let plan = if full_band && length <= lines.block {
-            Plan::Full(RealFftPlanner::new().plan_fft_forward(lines.block))
+        // Numbers of samples and of lines before the first; both are whole where the lines are those of an FFT.
+        let samples = sample_rate / lines.spacing;
+        let before = lines.low / lines.spacing;
+        let are_whole = (samples - samples.round()).abs() < 1e-9 * samples
+            && (before - before.round()).abs() < 1e-9 * samples;
+        let (samples, before) = (samples.round() as usize, before.round() as usize);
+        let plan = if are_whole {
+            Plan::Real(RealFftPlanner::new().plan_fft_forward(samples), before)
         } else {
             Plan::zoomed(sample_rate, lines, length.max(1))
         };
@@ -109,14 +113,20 @@ impl Transformer {
         values: &mut Vec<Complex64>,
     ) {
         match &self.plan {
-            Plan::Full(fft) => {
-                // Zeros are appended.
+            Plan::Real(fft, before) => {
+                // A shorter record is padded with zeros.
+                let length = fft.len().min(samples.len());
+                let (kept, wrapped) = samples.split_at_mut(length);
+                for part in wrapped.chunks(fft.len()) {
+                    kept.iter_mut().zip(part).for_each(|(sum, x)| *sum += x);
+                }
                 samples.resize(fft.len(), 0.0);
                 values.resize(fft.complex_len(), Complex64::ZERO);
                 scratch.resize(fft.get_scratch_len(), Complex64::ZERO);
                 // It refuses buffers of a wrong length alone, and these have just been given theirs.
                 let done = fft.process_with_scratch(samples, values, scratch);
                 debug_assert!(done.is_ok(), "{done:?}");
+                values.drain(..before);
                 values.truncate(self.lines.points());
             }
             Plan::Lines(chirp) => {
@@ -168,7 +178,7 @@ impl Plan {
 impl fmt::Debug for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Plan::Full(fft) => write!(f, "Full({})", fft.len()),
+            Plan::Real(fft, before) => write!(f, "Real({}, {before})", fft.len()),
             Plan::Lines(chirp) => f.debug_tuple("Lines").field(chirp).finish(),
             Plan::Zoom { chirp, .. } => f.debug_tuple("Zoom").field(chirp).finish(),
         }

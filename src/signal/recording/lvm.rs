@@ -375,7 +375,7 @@ fn read_segments(path: &Path, file: &str) -> Result<Vec<Segment>, RecordingError
             return Err(RecordingError::at_line(file, number, problem));
         }
         let mut places = Vec::new();
-        split_cells(&line, marks.separator, &mut places);
+        split_cells(&line, marks.separator, usize::MAX, &mut places);
         let cells: Vec<&[u8]> = places.iter().map(|cell| &line[cell.clone()]).collect();
         let first = cells.first().copied().unwrap_or_default();
         let blank = cells.iter().all(|cell| cell.is_empty());

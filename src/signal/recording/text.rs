@@ -25,12 +25,13 @@ impl Separator {
     /// In order of preference where several fit equally well.
     pub(super) const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
 
-    fn bytes(self) -> &'static [u8] {
+    /// The bytes that separate; twice the same where there is one.
+    fn bytes(self) -> [u8; 2] {
         match self {
-            Self::Tab => b"\t",
-            Self::Semicolon => b";",
-            Self::Comma => b",",
-            Self::Blanks => b" \t",
+            Self::Tab => [b'\t'; 2],
+            Self::Semicolon => [b';'; 2],
+            Self::Comma => [b','; 2],
+            Self::Blanks => [b' ', b'\t'],
         }
     }
 }
@@ -38,19 +39,28 @@ impl Separator {
 /// Place of a cell in its line (bytes).
 pub(super) type Cell = Range<usize>;
 
-/// Splits a line into cells, quotes and surrounding blanks removed. `cells` is reused.
-pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cell>) {
+/// Splits a line into its cells, or the first `most` of them, quotes and surrounding blanks removed. `cells` is reused.
+pub(super) fn split_cells(
+    line: &[u8],
+    separator: Separator,
+    most: usize,
+    cells: &mut Vec<Cell>,
+) {
     cells.clear();
     // Tabs at the end stay: they may be separators before an empty last cell.
     let last = line
         .iter()
         .rposition(|byte| !matches!(byte, b'\r' | b'\n' | b' ' | 0x1a | 0x0c));
     let line = &line[..last.map_or(0, |last| last + 1)];
-    let bytes = separator.bytes();
+    let [first, second] = separator.bytes();
     let (mut start, mut quoted) = (0, false);
-    for (at, byte) in line.iter().enumerate() {
-        quoted ^= *byte == b'"';
-        if !quoted && bytes.contains(byte) {
+    for at in memchr::memchr3_iter(first, second, b'"', line) {
+        if cells.len() >= most {
+            return;
+        }
+        if line[at] == b'"' {
+            quoted = !quoted;
+        } else if !quoted {
             // One or more blanks separate, so that there is no cell between two of them.
             if at > start || separator != Separator::Blanks {
                 cells.push(trimmed(line, start..at));
@@ -58,13 +68,17 @@ pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cel
             start = at + 1;
         }
     }
-    if line.len() > start || separator != Separator::Blanks {
+    if cells.len() < most && (line.len() > start || separator != Separator::Blanks) {
         cells.push(trimmed(line, start..line.len()));
     }
 }
 
 /// Returns the cell without surrounding blanks and without one pair of quotes.
 fn trimmed(line: &[u8], cell: Cell) -> Cell {
+    // Most cells of a long file.
+    if let [b'+'..=b'9', .., b'0'..=b'9'] = line[cell.clone()] {
+        return cell;
+    }
     let cell = without_blanks(line, cell);
     match &line[cell.clone()] {
         [b'"', .., b'"'] => without_blanks(line, cell.start + 1..cell.end - 1),
@@ -96,6 +110,11 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
     if cell.is_empty() {
         return Err(CellProblem::Missing);
     }
+    // Without a comma or a second point, as most numbers of a long file.
+    let plain = parse_plain(cell).filter(|_| *decimal == Some(b'.'));
+    if let Some(value) = plain {
+        return within_limit(value);
+    }
     let mut marks = cell.iter().copied().filter(|byte| b",.".contains(byte));
     let mark = marks.next();
     // A second mark: thousands separators, a date, an address.
@@ -122,6 +141,10 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
             return Err(CellProblem::MixedDecimal(settled));
         }
     }
+    within_limit(value)
+}
+
+fn within_limit(value: f64) -> Result<f64, CellProblem> {
     match value.abs() <= LARGEST {
         true => Ok(value),
         false => Err(CellProblem::NotFinite),

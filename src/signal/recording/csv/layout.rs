@@ -237,7 +237,7 @@ impl<'a> Head<'a> {
         let mut numbers = Vec::new();
         for at in lines {
             let line = self.lines[at].1;
-            split_cells(line, separator, &mut cells);
+            split_cells(line, separator, usize::MAX, &mut cells);
             if let Some(text) = cells.get(column).and_then(|cell| line.get(cell.clone()))
                 && let Ok(value) = parse_number(text, &mut None)
             {
@@ -339,7 +339,7 @@ impl LineKind {
         if is_comment(text) {
             return Self::Comment;
         }
-        split_cells(text, separator, cells);
+        split_cells(text, separator, usize::MAX, cells);
         let (mut numbers, mut others, mut number_first) = (0, 0, false);
         for (at, cell) in cells.iter().enumerate() {
             // Each cell may use either mark here; mixtures are found when the rows are read.
@@ -444,7 +444,7 @@ impl<'a> Candidate<'a> {
         let mut cells = Vec::new();
         let rows = (0..self.kinds.len()).filter(|at| self.kinds[*at] == LineKind::Row(self.cells));
         for at in rows.clone() {
-            split_cells(self.head.lines[at].1, self.separator, &mut cells);
+            split_cells(self.head.lines[at].1, self.separator, usize::MAX, &mut cells);
             last = last.max(cells.iter().rposition(|cell| !cell.is_empty()));
         }
         columns.truncate(last.map_or(0, |last| last + 1));
@@ -548,7 +548,7 @@ impl<'a> Candidate<'a> {
 /// Splits a line into the texts of its cells.
 pub(in crate::recording) fn split_texts(line: &[u8], separator: Separator) -> Vec<String> {
     let mut cells = Vec::new();
-    split_cells(line, separator, &mut cells);
+    split_cells(line, separator, usize::MAX, &mut cells);
     let cells = cells.into_iter().filter_map(|cell| line.get(cell));
     cells.map(decode_text).collect()
 }

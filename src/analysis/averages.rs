@@ -160,12 +160,7 @@ impl TapSums {
 
     /// Takes the change by the force window from the taps so far.
     fn compare_with_ungated(&mut self) {
-        let whole = self.ungated.take().and_then(SpectralAverager::finish);
-        let gated = self.averager.clone().finish();
-        let functions = whole
-            .and_then(|whole| whole.h1)
-            .zip(gated.and_then(|gated| gated.h1));
-        let Some((whole, gated)) = functions else {
+        let Some(ungated) = self.ungated.take() else {
             return;
         };
         let points = self.lines.points();
@@ -173,10 +168,12 @@ impl TapSums {
             changed: vec![0.0; points],
             whole: vec![0.0; points],
         };
-        for (with, without) in gated.iter().zip(&whole) {
+        for response in 0..self.averager.responses() {
             for line in 0..points {
-                change.changed[line] += (with[line] - without[line]).norm_sqr();
-                change.whole[line] += without[line].norm_sqr();
+                let without = ungated.h1(response, line);
+                let with = self.averager.h1(response, line);
+                change.changed[line] += (with - without).norm_sqr();
+                change.whole[line] += without.norm_sqr();
             }
         }
         self.window_change = Some(change);
@@ -189,9 +186,7 @@ impl TapSums {
 
     /// The averages over all taps.
     pub fn finish(mut self) -> Averages {
-        if self.ungated.is_some() {
-            self.compare_with_ungated();
-        }
+        self.compare_with_ungated();
         // At least one tap was accepted, or there would be no axis.
         let averages = self.averager.finish();
         Averages {

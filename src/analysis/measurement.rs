@@ -353,7 +353,7 @@ impl<'a> Inputs<'a> {
             Some(WindowKind::Hann) => Window::Hann,
             Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
         };
-        drop(record);
+        drop((limiter, record));
         let (sums, decays) = self.sums(window, &quiet)?;
         let Averages {
             averages,
@@ -428,6 +428,8 @@ impl<'a> Inputs<'a> {
                 sums.add(tap, &mut record);
             }
             if let Some(decays) = decays.as_mut().filter(|decays| decays.needs_highest_peak()) {
+                // The level needs about the room that a long record takes.
+                record.fill_with(Vec::new);
                 let averages = sums.responses_so_far();
                 let level = self.level(&averages, quiet, window);
                 let peaks = find_peaks(&level, &self.settings.peaks);

@@ -40,12 +40,7 @@ impl Separator {
 pub(super) type Cell = Range<usize>;
 
 /// Splits a line into its cells, or the first `most` of them, quotes and surrounding blanks removed. `cells` is reused.
-pub(super) fn split_cells(
-    line: &[u8],
-    separator: Separator,
-    most: usize,
-    cells: &mut Vec<Cell>,
-) {
+pub(super) fn split_cells(line: &[u8], separator: Separator, most: usize, cells: &mut Vec<Cell>) {
     cells.clear();
     // Tabs at the end stay: they may be separators before an empty last cell.
     let last = line

@@ -63,6 +63,19 @@ impl SpectralAverager {
         self.taps
     }
 
+    /// Number of responses.
+    pub fn responses(&self) -> usize {
+        self.response_power.len()
+    }
+
+    /// H1 = Gfx/Gff of a response on a line so far (unit of the response per N); 0 where the force has no power.
+    pub fn h1(&self, response: usize, line: usize) -> Complex64 {
+        match self.cross[response].get(line) {
+            Some(cross) if self.force_power[line] > 0.0 => cross / self.force_power[line],
+            _ => Complex64::ZERO,
+        }
+    }
+
     /// Adds one tap: the force's transform (if there is a hammer) and each response's.
     pub fn add(&mut self, force: Option<&[Complex64]>, responses: &[impl AsRef<[Complex64]>]) {
         self.taps += 1;
@@ -127,21 +140,18 @@ impl SpectralAverager {
         powers.flatten().for_each(|power| *power *= share);
         self.cross.iter_mut().flatten().for_each(|x| *x *= share);
         let has_force = self.force_power.iter().any(|&power| power > 0.0);
-        let mut h1 = self.cross.clone();
-        for values in &mut h1 {
-            for (value, &power) in values.iter_mut().zip(&self.force_power) {
-                *value = match power > 0.0 {
-                    true => *value / power,
-                    false => Complex64::ZERO,
-                };
-            }
-        }
+        let points = self.force_power.len();
+        let h1 = (0..self.responses()).map(|response| {
+            let values = (0..points).map(|line| self.h1(response, line));
+            values.collect()
+        });
+        let h1 = has_force.then(|| h1.collect());
         Some(AveragedSpectra {
             lines: self.lines,
             taps: self.taps,
             force: has_force.then(|| roots(&self.force_power)),
             responses: self.response_power.iter().map(|g| roots(g)).collect(),
-            h1: has_force.then_some(h1),
+            h1,
             response_power: self.response_power,
             cross: has_force.then_some(self.cross),
             force_power: has_force.then_some(self.force_power),

@@ -444,7 +444,12 @@ impl<'a> Candidate<'a> {
         let mut cells = Vec::new();
         let rows = (0..self.kinds.len()).filter(|at| self.kinds[*at] == LineKind::Row(self.cells));
         for at in rows.clone() {
-            split_cells(self.head.lines[at].1, self.separator, usize::MAX, &mut cells);
+            split_cells(
+                self.head.lines[at].1,
+                self.separator,
+                usize::MAX,
+                &mut cells,
+            );
             last = last.max(cells.iter().rposition(|cell| !cell.is_empty()));
         }
         columns.truncate(last.map_or(0, |last| last + 1));

@@ -1,4 +1,4 @@
-//! `tapjoint compare`: what changed between two tests of one structure.
+//! `tapjoint compare`: what changed between two tests, or in a series of tests.
 
 use super::Outcome;
 use super::arguments::repeatability;
@@ -25,7 +25,7 @@ use tapjoint::report::{
     render_comparison, render_comparison_picture, render_series_csv, series_of,
 };
 
-/// Say what changed between two tests of one structure, or in a series of tests.
+/// Say what changed between two tests, or in a series of tests.
 ///
 /// BEFORE and AFTER are test descriptions. With --test they may also be recordings or files of functions, each read
 /// in the place of the first recording that TEST describes. Errors of the model that both tests share cancel:

@@ -67,7 +67,7 @@ pub use structure::{
     KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
     predict_described, structure_details, tested_structure,
 };
-pub use warnings::{WARNING_CODES, Warning, together};
+pub use warnings::{WARNING_CODES, Warning, meaning_of, severity_of, together};
 use warnings::{neglected_effects, of_amplitude};
 pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
 use wiring::{finish, measure_bare_watched};

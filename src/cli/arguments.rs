@@ -19,6 +19,14 @@ use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
 use tapjoint::taps::TapSettings;
 
+/// Choice of how much is printed.
+#[derive(Debug, Args)]
+pub(super) struct FullAnswer {
+    /// Print all tables below the answer
+    #[arg(long)]
+    pub(super) full: bool,
+}
+
 /// Most threads: no machine has more processors, and each thread takes memory.
 const MOST_THREADS: u64 = 1024;
 

@@ -1,7 +1,7 @@
 //! `tapjoint compare`: what changed between two tests, or in a series of tests.
 
 use super::Outcome;
-use super::arguments::repeatability;
+use super::arguments::{FullAnswer, repeatability};
 use super::input::{TestFile, check_file, read_test};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
@@ -22,7 +22,7 @@ use tapjoint::pipeline::{
 use tapjoint::report::document::{Document, PairFiles};
 use tapjoint::report::{
     ComparedRecordings, compared_files, comparison_of, draw_compared, earlier_files,
-    render_comparison, render_comparison_picture, render_series_csv, series_of,
+    render_comparison_picture, render_series_csv, series_of,
 };
 
 /// Say what changed between two tests, or in a series of tests.
@@ -72,6 +72,8 @@ pub(super) struct CompareArguments {
     /// Write a row for each test and chart of a series into this file (CSV)
     #[arg(long, value_name = "FILE", requires = "series")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
@@ -196,7 +198,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         }
         let files = names(&arguments.series);
         let document = series_of(&name, &structure, files, found, warnings);
-        return answer(document, &recordings, outputs, terminal);
+        return answer(document, &recordings, outputs, &arguments.full, terminal);
     }
     let (mut first, mut files, mut pairs) = (None, Vec::new(), Vec::new());
     for [before, after] in arguments.pairs() {
@@ -225,7 +227,7 @@ pub(super) fn run(arguments: &CompareArguments, terminal: Terminal) -> anyhow::R
         before: shown.next().unwrap_or_default(),
         after: shown.next().unwrap_or_default(),
     };
-    answer(document, &recordings, outputs, terminal)
+    answer(document, &recordings, outputs, &arguments.full, terminal)
 }
 
 /// Returns files as the user named them.
@@ -239,6 +241,7 @@ fn answer(
     mut document: Document,
     recordings: &ComparedRecordings,
     outputs: Outputs,
+    full: &FullAnswer,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let mut work = Work::begin(terminal.watch(), Stage::Pictures);
@@ -265,10 +268,10 @@ fn answer(
         published = Some(folder.publish_report()?);
     }
     drop(work);
-    terminal.say(&render_comparison(&document))?;
-    if let Some((folder, _)) = &published {
-        terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
-    }
+    let page = published
+        .as_ref()
+        .map(|(folder, _)| folder.join("report.html"));
+    terminal.answer(&document, page.as_deref(), full)?;
     terminal.write_document(&document)?;
     let left = published.and_then(|(_, left)| left);
     left.map_or(Ok(Outcome::Answered), Err)

@@ -3,6 +3,7 @@
 //! The model with the diagnosed effects goes into report.json and into a file, here and in `run`.
 
 use super::Outcome;
+use super::arguments::FullAnswer;
 use super::identify::{FrequencyArguments, resolve};
 use super::input::{TestFile, file_name};
 use super::output::OutputFile;
@@ -14,7 +15,7 @@ use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
 use tapjoint::pipeline::{Analysis, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::report::document::{GapSection, UpdatedModelSection};
-use tapjoint::report::{MODEL_FILE, document_of, gap_section, render_gap_text};
+use tapjoint::report::{MODEL_FILE, document_of, gap_section};
 use tapjoint::study::updated_model::{described_frequencies, updated_model};
 
 /// Find the cause of the gap between model and measurement.
@@ -36,6 +37,8 @@ pub(super) struct DiagnoseArguments {
     /// if no effect explains the readings
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    #[command(flatten)]
+    full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
@@ -79,7 +82,7 @@ pub(super) fn run(
         }
     }
     drop(work);
-    terminal.say(&render_gap_text(&document))?;
+    terminal.answer(&document, None, &arguments.full)?;
     terminal.write_document(&document)?;
     Ok(Outcome::of(diagnosis.is_ok()))
 }

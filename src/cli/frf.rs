@@ -247,7 +247,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
     }
     drop(work);
     let document = frf_document(&analysis, &all);
-    terminal.answer(&document)?;
+    terminal.tables(&document)?;
     Ok(Outcome::of(!all.is_empty()))
 }
 

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{
-    Numbers, frequencies, half_lines, method, percents, perturbed_by, perturbed_methods,
+    FullAnswer, Numbers, frequencies, half_lines, method, percents, perturbed_by, perturbed_methods,
 };
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
@@ -30,6 +30,8 @@ pub(super) struct IdentifyArguments {
     /// Method of the estimate
     #[arg(long, default_value = "consistent", value_parser = method())]
     method: EstimateMethod,
+    #[command(flatten)]
+    full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
@@ -116,7 +118,9 @@ pub(super) fn identify(
         },
         terminal.watch(),
     )?;
-    terminal.answer(&document_of(&analysis))?;
+    let document = document_of(&analysis);
+    terminal.answer(&document, None, &arguments.full)?;
+    terminal.write_document(&document)?;
     Ok(Outcome::of_analysis(&analysis))
 }
 
@@ -184,7 +188,7 @@ pub(super) fn perturb(
         file.write(render_perturbation_csv(&document)?.as_bytes())?;
     }
     drop(work);
-    terminal.answer(&document)?;
+    terminal.tables(&document)?;
     let perturbed = analysis
         .identification
         .is_some_and(|found| !found.perturbations.is_empty());

@@ -139,7 +139,11 @@ pub(super) fn main() -> ExitCode {
     }
     let outcome = run_command(&line, &matches, stopwatch.clone());
     if let Some(stopwatch) = stopwatch.filter(|_| outcome.is_ok() && !line.common.quiet) {
-        let _ = write!(io::stderr(), "{}", render_timings(&stopwatch.timings()));
+        let _ = write!(
+            io::stderr(),
+            "{}",
+            render_timings(&stopwatch.timings(), terminal::screen())
+        );
     }
     if line.common.tells_more() {
         let seconds = start.elapsed().as_secs_f64();

@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
         }
         (None, None) => bail!("nothing to predict; give a test description, or --joint"),
     };
-    terminal.answer(&document)?;
+    terminal.tables(&document)?;
     Ok(Outcome::Answered)
 }
 

@@ -162,7 +162,7 @@ pub(super) struct ReproduceArguments {}
 
 pub(super) fn print_reproduction(terminal: Terminal) -> anyhow::Result<Outcome> {
     let reproduction = reproduce()?;
-    terminal.say(&render_reproduction(&reproduction))?;
+    terminal.say(&render_reproduction(&reproduction, terminal.screen()))?;
     terminal.write_json(&json!({
         "version": VERSION,
         "reproduction": reproduction,

@@ -4,7 +4,7 @@
 //! and its peaks. `run` and `frf` analyse bare files from here, too.
 
 use super::Outcome;
-use super::arguments::{RecordingArguments, SpectrumSettings, reading};
+use super::arguments::{FullAnswer, RecordingArguments, SpectrumSettings, reading};
 use super::input::{check_file, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
@@ -195,7 +195,7 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
     let listed_only = recordings.is_empty() && !datasets.is_empty();
     let mut document = inspection_of(&recordings, &together(warnings));
     document.datasets = (!datasets.is_empty()).then_some(datasets);
-    terminal.answer(&document)?;
+    terminal.tables(&document)?;
     Ok(Outcome::of(found || listed_only))
 }
 
@@ -222,6 +222,8 @@ pub(super) struct SpectrumArguments {
     png: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
@@ -253,6 +255,7 @@ pub(super) fn spectrum(
             None => terminal.warn("no tap was accepted, so there is no spectrum to draw"),
         }
     }
-    terminal.answer(&document)?;
+    terminal.answer(&document, None, &arguments.full)?;
+    terminal.write_document(&document)?;
     Ok(Outcome::of_analysis(&analysis))
 }

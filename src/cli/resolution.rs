@@ -210,7 +210,7 @@ pub(super) fn run(
     for (_, text) in &warnings {
         terminal.warn(text);
     }
-    terminal.say(&render_resolution(&study))?;
+    terminal.say(&render_resolution(&study, terminal.screen()))?;
     let head = prediction_of(&file.test.name, &structure, &[]);
     let warnings: Vec<_> = warnings
         .iter()

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{
-    RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
+    FullAnswer, RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
@@ -19,9 +19,7 @@ use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::recording::ReadSettings;
-use tapjoint::report::{
-    MODEL_FILE, document_of, draw_run, earlier_files, gap_section, render_text, run_files,
-};
+use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_section, run_files};
 
 /// Analyse a test, from recordings to joint, and write a report.
 ///
@@ -49,6 +47,8 @@ pub(super) struct RunArguments {
     method: &'static [EstimateMethod],
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
@@ -112,13 +112,13 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     Ok(file)
 }
 
-/// Returns the folder name for a test's name. Characters that file systems refuse become hyphens.
+/// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens.
 fn report_folder(name: &str) -> String {
     let name: String = name
         .chars()
         .map(|c| match c {
             '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' => '-',
-            c if c.is_control() => '-',
+            c if c.is_control() || c.is_whitespace() => '-',
             c => c,
         })
         .take(100)
@@ -190,8 +190,8 @@ pub(super) fn run(
     }
     let (folder, left) = output.publish_report()?;
     drop(work);
-    terminal.say(&render_text(&document))?;
-    terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
+    let page = folder.join("report.html");
+    terminal.answer(&document, Some(&page), &arguments.full)?;
     terminal.write_document(&document)?;
     left.map_or_else(|| Ok(Outcome::of_analysis(&analysis)), Err)
 }
@@ -206,7 +206,7 @@ mod tests {
         let cases = [
             (
                 "Cantilever, one-bolt clamp",
-                "Cantilever, one-bolt clamp-report",
+                "Cantilever,-one-bolt-clamp-report",
             ),
             ("../a/b", "-a-b-report"),
             (" ... ", "test-report"),

@@ -6,7 +6,7 @@ use super::input::{effect_at, read_model};
 use super::laboratory::{LaboratoryArguments, laboratory_lines};
 use super::overwrite::{CHECKSUMS, Expanded, listed_files};
 use super::publication::OutputFolder;
-use super::terminal::Terminal;
+use super::terminal::{Terminal, screen};
 use super::timings::TimingsArguments;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
@@ -23,7 +23,6 @@ use tapjoint::effects::{Effect, EffectDimension, EffectId};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
-use tapjoint::report::wrapped;
 use tapjoint::simulate::{
     Change, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest, nominal_description,
     plan_test, truth_of, wav_name,
@@ -387,7 +386,7 @@ fn run_pair(
         });
         let values: Vec<String> = change.item.iter().cloned().chain(sizes).collect();
         let line = format!("Changed: {} ({})", change.cause, values.join(", "));
-        text.push_str(&with_minus_signs(&wrapped(&line, 2)));
+        text.push_str(&with_minus_signs(&screen().wrapped(&line, 2)));
     }
     let scatter = percent(plan.repeatability);
     let _ = writeln!(text, "Repeatability: {scatter} %");
@@ -604,7 +603,7 @@ fn recording_lines(truth: &Truth, test: &VirtualTest) -> String {
             1e3 * made.plan.taps.pulse_length,
             modes.join(" ")
         );
-        text.push_str(&wrapped(&line, 2));
+        text.push_str(&screen().wrapped(&line, 2));
     }
     text
 }
@@ -629,7 +628,7 @@ fn summary(made: &Made, folder: &Path, nothing: &str) -> String {
         if let Some(ktr) = joint.ktr {
             let _ = write!(line, ", Ktr {ktr:.6e} N/rad");
         }
-        let _ = write!(text, "\n{}", wrapped(&line, 2));
+        let _ = write!(text, "\n{}", screen().wrapped(&line, 2));
     }
     if truth.effects.is_empty() {
         let _ = writeln!(text, "{nothing}");
@@ -643,7 +642,7 @@ fn summary(made: &Made, folder: &Path, nothing: &str) -> String {
             values.push(format!("{name} {value} {unit}").trim_end().to_owned());
         }
         let line = format!("Planted: {} ({})", effect.effect, values.join(", "));
-        text.push_str(&with_minus_signs(&wrapped(&line, 2)));
+        text.push_str(&with_minus_signs(&screen().wrapped(&line, 2)));
     }
     text.push_str("\nLaboratory\n");
     for (name, value) in laboratory_lines(&truth.laboratory) {

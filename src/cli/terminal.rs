@@ -1,19 +1,22 @@
 //! Output to standard output, standard error and `--json`.
 
-use super::arguments::{CommonArguments, JsonDestination};
+use super::arguments::{CommonArguments, FullAnswer, JsonDestination};
 use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
 use super::staging::ledger;
 use super::timings::Stopwatch;
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
 use tapjoint::pipeline::Watch;
 use tapjoint::report::document::{Document, TimingsSection};
-use tapjoint::report::{render_json, render_readings, render_stages, render_text, wrapped};
+use tapjoint::report::{
+    Screen, render_answer, render_json, render_readings, render_stages, render_text,
+};
 
 /// Destinations of a command's output.
 #[derive(Debug)]
@@ -106,7 +109,7 @@ impl Terminal {
         let mut error = io::stderr();
         // A file of messages keeps each on its line.
         let shown = if error.is_terminal() {
-            wrapped(&whole, 2)
+            self.screen().wrapped(&whole, 2)
         } else {
             whole
         };
@@ -124,10 +127,31 @@ impl Terminal {
         let _ = write!(error, "\r{done} of {of} {doing}{end}");
     }
 
-    /// Prints a report's document, and writes it to the destination of `--json`. Call it last.
-    pub(super) fn answer(self, document: &Document) -> anyhow::Result<()> {
-        self.say(&render_text(document))?;
+    /// Returns the screen that texts are laid out for.
+    pub(super) fn screen(&self) -> Screen {
+        screen()
+    }
+
+    /// Prints the tables of a report's document, and writes it to the destination of `--json`. Call it last.
+    pub(super) fn tables(self, document: &Document) -> anyhow::Result<()> {
+        self.say(&render_text(document, self.screen()))?;
         self.write_document(document)
+    }
+
+    /// Prints the answer that a report's document holds, with the path of its report, and all tables where they were
+    /// asked for.
+    pub(super) fn answer(
+        &self,
+        document: &Document,
+        report: Option<&Path>,
+        full: &FullAnswer,
+    ) -> anyhow::Result<()> {
+        let (screen, report) = (self.screen(), report.map(|path| path.display().to_string()));
+        let mut text = render_answer(document, report.as_deref(), screen);
+        if full.full {
+            text = format!("{text}\n{}", render_text(document, screen));
+        }
+        Ok(self.say(&text)?)
     }
 
     /// Writes a report's document to the destination of `--json`. With `--verbose`, first prints on standard
@@ -178,6 +202,17 @@ impl Terminal {
             Some(Json::File(file)) => Ok(file.write(text.as_bytes())?),
         }
     }
+}
+
+/// Returns the screen that texts are laid out for.
+///
+/// Its width is what COLUMNS says, else that of the terminal, else 80.
+pub(super) fn screen() -> Screen {
+    let stated = std::env::var("COLUMNS").ok();
+    let stated = stated.and_then(|columns| columns.parse().ok());
+    let own = terminal_size::terminal_size_of(io::stdout());
+    let own = own.map(|(width, _)| usize::from(width.0));
+    stated.or(own).map_or_else(Screen::default, Screen::of)
 }
 
 /// Returns the text with bold headings and yellow warnings.

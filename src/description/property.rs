@@ -17,8 +17,8 @@ pub(super) struct Property {
     question: &'static str,
 }
 
-// The limits are physical (no solid is denser than 1e5 kg/m3 or stiffer than 1e13 Pa) or beyond the reach
-// of a hammer. Within them no frequency leaves the range of numbers. The usual ranges are those of beams that
+// The limits are physical (no solid is denser than 1e5 kg/m3 or stiffer than 1e13 Pa), beyond the reach of a hammer, or
+// below any beam: foams have 20 kg/m3 and 1 MPa. A number in GPa or g/cm3 without its unit lies outside. Within them no frequency leaves the range of numbers. The usual ranges are those of beams that
 // people tap.
 pub(super) const LENGTH: Property = Property {
     key: "length",
@@ -65,7 +65,7 @@ pub(super) const MODULUS: Property = Property {
     example: "modulus = \"207 GPa\"",
     dimension: Dimension::Pressure,
     limits: Limits::between(
-        1.0,
+        1e5,
         1e13,
         "give Young's modulus in Pa, or with its unit: \"207 GPa\"",
     ),
@@ -78,11 +78,11 @@ pub(super) const DENSITY: Property = Property {
     example: "density = 7850",
     dimension: Dimension::Density,
     limits: Limits::between(
-        1e-3,
+        10.0,
         1e5,
         "give the density in kg/m3, or with its unit: \"7.85 g/cm3\"",
     ),
-    usual: [10.0, 25e3],
+    usual: [20.0, 25e3],
     question: "did you mean g/cm3? Write \"7.85 g/cm3\"",
 };
 /// An isotropic solid is stable only within these limits.

@@ -3,6 +3,7 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
+mod brief;
 pub mod change_check;
 mod data_files;
 pub mod deck;
@@ -12,6 +13,7 @@ mod html;
 pub mod picture;
 mod resolution;
 mod run;
+mod screen;
 mod short_names;
 pub mod tables;
 mod text;
@@ -29,6 +31,7 @@ pub mod charts {
 
 /// Every sentence about a result, once.
 pub mod words {
+    pub mod answer;
     pub mod comparison;
     pub mod diagnosis;
     pub mod findings;
@@ -36,6 +39,7 @@ pub mod words {
     pub(crate) mod sizes;
 }
 
+pub use brief::render_answer;
 pub use charts::comparison_spectra::ComparedRecordings;
 pub use data_files::{
     render_changes_csv, render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
@@ -51,10 +55,8 @@ pub use run::{
     render_cloud_picture, render_compared, render_comparison_picture, render_frf_picture,
     render_json, render_run, render_schema, render_spectrum_picture, run_files,
 };
-pub use text::{
-    render_comparison, render_gap_text, render_readings, render_reproduction, render_stages,
-    render_text, render_timings, wrapped,
-};
+pub use screen::Screen;
+pub use text::{render_readings, render_reproduction, render_stages, render_text, render_timings};
 
 /// A finished file.
 #[derive(Debug, Clone, PartialEq, Eq)]

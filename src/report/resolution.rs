@@ -4,8 +4,8 @@ use crate::ReportError;
 use crate::data_files::{number, write};
 use crate::format::{MISSING, capital, optional, significant, trimmed};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, PictureFormat, Series, Tick, extent};
+use crate::screen::Screen;
 use crate::tables::{Table, number as cell};
-use crate::text::{render_table, wrapped};
 use tapjoint_study::resolution::{
     EstimateMethod, ReadBy, ResolutionStudy, StudiedMode, StudiedStiffness, WindowName,
 };
@@ -17,7 +17,7 @@ const HEADS: &str = "quantity,name,method,unit,block,lines,window,reading,band_l
 const MOST_BLOCKS: usize = 5;
 
 /// The study for a terminal of 80 columns.
-pub fn render_resolution(study: &ResolutionStudy) -> String {
+pub fn render_resolution(study: &ResolutionStudy, screen: Screen) -> String {
     let conditions = format!(
         "{} virtual tests of one tap for each block size ({} of them fitted), frequencies spread over the \
          lines, {:.0} samples/s, damping {} %, noise {} dB below the peak, seed {}. Columns of readings are \
@@ -29,8 +29,8 @@ pub fn render_resolution(study: &ResolutionStudy) -> String {
         study.noise_db,
         study.seed
     );
-    let lines = render_table(&lines_table(study));
-    let mut parts = vec![wrapped(&conditions, 0), lines];
+    let lines = screen.table(&lines_table(study));
+    let mut parts = vec![screen.wrapped(&conditions, 0), lines];
     let mut windows: Vec<WindowName> = Vec::new();
     for answer in &study.answers {
         if !windows.contains(&answer.window) {
@@ -42,16 +42,16 @@ pub fn render_resolution(study: &ResolutionStudy) -> String {
             parts.push(format!("WINDOW {}\n", window.name()));
         }
         for mode in &study.modes {
-            parts.push(render_table(&frequencies_table(study, window, mode)));
+            parts.push(screen.table(&frequencies_table(study, window, mode)));
         }
         for stiffness in &study.stiffnesses {
             for method in EstimateMethod::ALL {
                 let table = stiffnesses_table(study, window, method, stiffness);
-                parts.push(render_table(&table));
+                parts.push(screen.table(&table));
             }
         }
     }
-    parts.push(wrapped(&study.sentence, 0));
+    parts.push(screen.wrapped(&study.sentence, 0));
     parts.join("\n")
 }
 

@@ -15,7 +15,7 @@ use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::html::{InlineFigure, render_html};
-use crate::picture::{Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
+use crate::picture::{Block, Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
     ReportError, ReportFile, render_changes_csv, render_modes_csv, render_parameters_csv,
@@ -44,8 +44,35 @@ pub fn draw_run(
     document: &Document,
     recordings: &[RecordingResult],
 ) -> Result<DrawnPictures, ReportError> {
-    DrawnPictures::of(&pictures(document, recordings))
+    let mut drawn = DrawnPictures::of(&pictures(document, recordings))?;
+    if let Some(chart) = leading(recordings) {
+        drawn.figures.push(inline_figure(&chart, &chart.draw())?);
+    }
+    Ok(drawn)
 }
+
+/// The picture of the page's first screen: one function, or spectrum, of the recording with most modes.
+fn leading(recordings: &[RecordingResult]) -> Option<Chart> {
+    let modes = |one: &&RecordingResult| one.mode_numbers.iter().flatten().count();
+    let recording = recordings.iter().rev().max_by_key(modes)?;
+    let chart = frf(recording, &recording.file, &given_frfs(recording), &[]);
+    let mut chart = chart.or_else(|| spectrum(recording, &recording.file))?;
+    chart.kind = "answer";
+    chart.caption = match chart.caption.contains("fitted") {
+        true => format!(
+            "{}: measured, and the fitted modes as thin lines.",
+            recording.file
+        ),
+        false => format!("{}: averaged spectra.", recording.file),
+    };
+    chart.width = LEADING_WIDTH;
+    let first = chart.blocks.swap_remove(0);
+    chart.blocks = vec![Block::new(1, first.panels.into_iter().take(1).collect())];
+    Some(chart)
+}
+
+/// Width of the first screen's picture (pixels).
+const LEADING_WIDTH: u32 = 720;
 
 /// All files of [`render_run`], those of its `drawn` pictures included.
 ///
@@ -229,8 +256,15 @@ pub(crate) fn picture_files(name: &str, drawing: &Drawing) -> Result<[ReportFile
 /// Returns a picture as files, and for the page.
 fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
     let drawing = chart.draw();
-    let figure = InlineFigure {
+    let files = picture_files(name, &drawing)?;
+    Ok((files, inline_figure(chart, &drawing)?))
+}
+
+/// Returns a picture for the page.
+fn inline_figure(chart: &Chart, drawing: &Drawing) -> Result<InlineFigure, ReportError> {
+    Ok(InlineFigure {
         section: match chart.kind {
+            "answer" => "answer",
             "taps" => "recordings",
             "frequencies" | "mode-shapes" => "joint",
             "gap" | "gap-place" => "gap",
@@ -240,11 +274,10 @@ fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFig
             _ => "modes",
         },
         caption: chart.caption.clone(),
-        svg: render_svg(&drawing),
+        svg: render_svg(drawing),
         tall: drawing.height > drawing.width,
         live: chart.page().as_ref().map(packed).transpose()?,
-    };
-    Ok((picture_files(name, &drawing)?, figure))
+    })
 }
 
 /// Returns all pictures that there are data for, with the names of their files without ending.

@@ -276,12 +276,12 @@ fn regress_forgotten_units_are_asked_about() {
         ),
         (
             "modulus = \"207 GPa\"",
-            "modulus = 207",
+            "modulus = 207e3",
             "did you mean GPa?",
         ),
         (
             "density = \"7.85 g/cm3\"",
-            "density = 7.85",
+            "density = 15",
             "did you mean g/cm3?",
         ),
         ("modulus = \"2 %\"", "modulus = 2", "did you mean percent?"),

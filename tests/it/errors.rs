@@ -144,6 +144,8 @@ fn regress_impossible_beams() {
             ("length = \"423 mm\"", "length = 1e-300"),
             ("width = 0.05", "width = 1e-300"),
             ("thickness = 0.005", "thickness = 1e-300"),
+            ("modulus = \"207 GPa\"", "modulus = 192"),
+            ("density = 7850", "density = 7.861"),
             ("modulus = \"207 GPa\"", "modulus = 1e-300"),
             ("density = 7850", "density = 1e-300"),
             ("poisson = 0.29", "poisson = 0.6"),

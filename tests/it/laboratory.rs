@@ -166,7 +166,7 @@ fn val_a_clamped_beam_from_a_spectrum_alone() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("test.toml"), clamped(joint, fit)).unwrap();
         let done = tapjoint(folder.path())
-            .args(["run", "test.toml", "--json", "report.json"])
+            .args(["run", "test.toml", "--json", "report.json", "--full"])
             .assert()
             .code(0);
         let text = String::from_utf8_lossy(&done.get_output().stdout).into_owned();

@@ -11,7 +11,7 @@ mod words;
 
 use tapjoint::pipeline::{MeasuredSpectra, RecordingResult};
 use tapjoint::report::document::Document;
-use tapjoint::report::{ReportFile, render_run};
+use tapjoint::report::{ReportFile, Screen, render_run};
 
 /// Renders a whole report; a report that cannot be rendered fails the test with its error.
 fn rendered(document: &Document, recordings: &[RecordingResult]) -> Vec<ReportFile> {
@@ -158,7 +158,7 @@ fn limit_incomplete_analyses_are_reported() {
         for word in ["NaN", ">inf<", "Infinity", "null"] {
             assert!(!html.contains(word), "{case}: the page says {word}");
         }
-        let text = tapjoint::report::render_text(&document);
+        let text = tapjoint::report::render_text(&document, Screen::default());
         assert!(!text.contains("NaN"), "{case}: the terminal says NaN");
     }
 }

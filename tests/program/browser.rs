@@ -70,7 +70,12 @@ const VISITOR: &str = r#"
     // The page unpacks its curves before they are drawn.
     for (var turn = 0; turn < 100 && !document.querySelector("figure.live"); turn++) await wait(50);
     await wait(200);
-    var figures = document.querySelectorAll("figure.curves");
+    var figures = document.querySelectorAll("figure.curves:not(.card)");
+    seen.screen = {};
+    [".state", ".card.value", ".card.cause", ".action", ".card.modes", ".card.chart"].forEach(function (part) {
+      var found = document.querySelector(part);
+      seen.screen[part] = found && found.getBoundingClientRect().bottom;
+    });
     seen.figures = figures.length;
     seen.pictures = document.querySelectorAll("figure svg").length;
     seen.titles = Array.from(document.querySelectorAll("figure svg rect title")).map(function (title) { return title.textContent; });
@@ -302,6 +307,14 @@ fn regress_the_page_works_in_a_browser() {
         );
         if width >= 1280 {
             assert_eq!(seen["wide"], 0, "{case}: tables scroll sideways");
+            // State, joint, cause, action, modes and figure stand on a screen 800 pixels high.
+            let first = seen["screen"].as_object().unwrap();
+            assert!(first.len() == 6, "{case}: {first:?}");
+            let ends = first.values().map(|end| end.as_f64().unwrap());
+            assert!(
+                ends.into_iter().all(|end| end > 0.0 && end < 800.0),
+                "{case}: {first:?}"
+            );
         }
         let light = seen["background"] == "rgb(255, 255, 255)";
         assert_eq!(light, !dark, "{case}: {}", seen["background"]);

@@ -24,7 +24,11 @@ fn val_published_frequencies_with_a_sensor_that_sat_nobody_knows_where() {
          frequencies = [17, 118, 335.625, 628.75, 994.5]\nhalf_line = 0.125\nscatter = \"0.3 %\"\n"
     );
     fs::write(folder.path().join("test.toml"), text).unwrap();
-    let said = flowing(&tapjoint(folder.path(), &["diagnose", "test.toml"], 0));
+    let said = flowing(&tapjoint(
+        folder.path(),
+        &["diagnose", "test.toml", "--full"],
+        0,
+    ));
     for part in [
         "There is a gap: without A (24 g), whose position is not given",
         "cannot say what causes it",

@@ -39,10 +39,15 @@ fn copy_recordings(name: &str, to: &Path) {
 ///
 /// The width of the terminal is fixed, and nothing of the environment decides about the output.
 fn put_out(folder: &Path, arguments: &[&str]) -> String {
+    put_out_at(100, folder, arguments)
+}
+
+/// The same on a terminal of so many columns.
+fn put_out_at(columns: usize, folder: &Path, arguments: &[&str]) -> String {
     let output = Command::new(program())
         .current_dir(folder)
         .args(arguments)
-        .env("COLUMNS", "100")
+        .env("COLUMNS", columns.to_string())
         .env("NO_COLOR", "1")
         .stdin(Stdio::null())
         .output()
@@ -262,9 +267,43 @@ fn without_inner_rows(lines: &[String]) -> String {
     text
 }
 
+/// Most lines of a default output.
+const MOST_LINES: usize = 25;
+
+/// Returns the default output on terminals of several widths; checks that it is short, and fits.
+fn answers(folder: &Path, arguments: &[&str]) -> String {
+    let mut text = String::new();
+    for columns in [80, 120, 200] {
+        let answer = put_out_at(columns, folder, arguments);
+        let shown = answer.split("--- standard error").next().unwrap();
+        assert!(shown.lines().count() <= MOST_LINES, "{columns}:\n{answer}");
+        let widest = shown.lines().map(|line| line.chars().count()).max();
+        assert!(widest <= Some(columns), "{columns}:\n{answer}");
+        writeln!(text, "=== {columns} columns\n{answer}").unwrap();
+    }
+    text
+}
+
 /// Runs a test and compares everything with its snapshots; each that differs is shown.
 fn assert_frozen(name: &str, folder: &Path, test: &str) {
-    let terminal = put_out(folder, &["run", test, "--out", "report"]);
+    let mut terminal = answers(folder, &["run", test, "--out", "report", "--force"]);
+    for command in ["identify", "diagnose"] {
+        writeln!(
+            terminal,
+            "##### {command}\n{}",
+            answers(folder, &[command, test])
+        )
+        .unwrap();
+    }
+    writeln!(
+        terminal,
+        "##### full\n{}",
+        put_out(
+            folder,
+            &["run", test, "--out", "report", "--force", "--full"]
+        )
+    )
+    .unwrap();
     let read = |file: &str| fs::read_to_string(folder.join("report").join(file)).unwrap();
     let parts = [
         ("terminal", terminal),
@@ -380,7 +419,11 @@ fn frozen_compare() {
     let mut text = String::new();
     for after in [tests[1], tests[0]] {
         let compare = ["compare", tests[0], after, "--repeatability", "0.1 %"];
-        text.push_str(&put_out(folder.path(), &compare));
+        text.push_str(&answers(folder.path(), &compare));
+        text.push_str(&put_out(
+            folder.path(),
+            &[&compare[..], &["--full"]].concat(),
+        ));
         text.push('\n');
     }
     let json = [
@@ -405,10 +448,14 @@ fn frozen_compare() {
         "--repeatability",
         "0.1 %",
     ];
-    let mut text = put_out(folder.path(), &series);
+    let mut text = answers(folder.path(), &series);
+    text.push_str(&put_out(
+        folder.path(),
+        &[&series[..], &["--full"]].concat(),
+    ));
     text.push('\n');
     let agreeing = [&series[..5], &series[7..]].concat();
-    text.push_str(&put_out(folder.path(), &agreeing));
+    text.push_str(&answers(folder.path(), &agreeing));
     assert_snapshot("compare_series", &text);
     for (arguments, page) in [
         (&json[..5], "compare_page"),
@@ -418,6 +465,20 @@ fn frozen_compare() {
         assert_eq!(text, "");
         assert_snapshot(page, &report_text(&folder.path().join(page)));
     }
+}
+
+#[test]
+fn frozen_spectrum() {
+    let folder = tempfile::tempdir().unwrap();
+    copy_recordings("cantilever", folder.path());
+    let mut text = String::new();
+    for arguments in [
+        &["spectrum", "low.wav", "--hammer", "1"][..],
+        &["spectrum", "high.wav"],
+    ] {
+        text.push_str(&answers(folder.path(), arguments));
+    }
+    assert_snapshot("spectrum", &text);
 }
 
 #[test]

@@ -171,7 +171,7 @@ fn val_five_published_frequencies_show_a_gap_that_they_cannot_assign() {
         "{BEAM}{WELL_KNOWN}[joint]\nkind = \"cantilever\"\n[measured]\nfrequencies = [17, 118, 335.625, 628.75, 994.5]\nhalf_line = 0.125\nscatter = \"0.3 %\"\n"
     );
     fs::write(folder.path().join("test.toml"), text).unwrap();
-    let (out, _) = told(folder.path(), &["diagnose", "test.toml"], 0);
+    let (out, _) = told(folder.path(), &["diagnose", "test.toml", "--full"], 0);
     let said = out.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
         "There is a gap",
@@ -209,7 +209,8 @@ fn regress_what_the_diagnosis_refuses_is_no_model() {
     );
     fs::write(folder.path().join("test.toml"), text).unwrap();
     let arguments = ["diagnose", "test.toml", "--model", "model.toml"];
-    let (out, error) = told(folder.path(), &arguments, 0);
+    let full = [&arguments[..], &["--full"]].concat();
+    let (out, error) = told(folder.path(), &full, 0);
     assert!(out.contains("nothing in the catalogue explains"), "{out}");
     assert!(!out.contains("How far:"), "{out}");
     assert!(

@@ -6,7 +6,7 @@
 use tapjoint::identify::{
     ModeLambda, PairsEstimate, PairsModel, estimate_pairs, single_mode_stiffness,
 };
-use tapjoint::report::render_reproduction;
+use tapjoint::report::{Screen, render_reproduction};
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies, natural_lambdas,
     natural_lambdas_of_any_joint,
@@ -343,7 +343,7 @@ fn val_table_9_changes_lambdas_where_it_says_frequencies() {
 
 #[test]
 fn val_reproduction_fits_a_terminal_of_80_columns() {
-    let text = render_reproduction(&reproduce().unwrap());
+    let text = render_reproduction(&reproduce().unwrap(), Screen::default());
     for line in text.lines() {
         assert!(line.chars().count() <= 80, "{line}");
     }

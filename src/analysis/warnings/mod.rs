@@ -222,6 +222,43 @@ pub const WARNING_CODES: [(&str, &str); 76] = [
     ("prediction-error", "the prediction misses a mode notably"),
 ];
 
+/// Codes of the warnings that concern the answer itself, the worst first. All others concern how it was measured.
+const OF_THE_ANSWER: [&str; 20] = [
+    "unphysical",
+    "not-converged",
+    "no-prediction",
+    "taps-too-short",
+    "misfit",
+    "other-numbers",
+    "outlying-mode",
+    "ambiguous-pairing",
+    "moved-mode",
+    "inverted-sensor",
+    "doubtful-scale",
+    "units-disagree",
+    "unknown-unit",
+    "flat-direction",
+    "at-limit",
+    "other-minimum",
+    "fallback",
+    "numbered-in-order",
+    "missing-mode",
+    "prediction-error",
+];
+
+/// Returns the place of a code among those that concern the answer itself, the worst first; `None` for any other.
+pub fn severity_of(code: &str) -> Option<usize> {
+    OF_THE_ANSWER.iter().position(|known| *known == code)
+}
+
+/// Returns when a warning of this code is given, in half a sentence; `None` for an unknown code.
+pub fn meaning_of(code: &str) -> Option<&'static str> {
+    let mut known = WARNING_CODES.iter();
+    known
+        .find(|(known, _)| *known == code)
+        .map(|(_, when)| *when)
+}
+
 /// A warning that travels with the result. Displays as event, likely cause and remedy.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Warning {

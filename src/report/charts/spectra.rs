@@ -12,7 +12,7 @@ use crate::picture::{
 };
 use tapjoint_analysis::{CloseUp, Frf, MeasuredSpectra, RecordingResult};
 use tapjoint_description::SensorKind;
-use tapjoint_signal::modal::PeakLabel;
+use tapjoint_signal::modal::{ModeReading, PeakLabel};
 use tapjoint_signal::spectral::{FrfEstimator, Lines};
 use tapjoint_signal::taps::Tap;
 
@@ -369,8 +369,8 @@ pub(super) fn frequency_axis(spectra: &MeasuredSpectra) -> Axis {
 /// noise cannot be read.
 fn shown_to(spectra: &MeasuredSpectra) -> f64 {
     let (low, high) = (spectra.averages.lines.low, spectra.averages.lines.high);
-    let peaks = spectra.readings.iter().map(|reading| reading.frequency);
-    let Some((_, highest)) = extent(peaks) else {
+    let peaks = spectra.readings.iter().filter(|reading| is_marked(reading));
+    let Some((_, highest)) = extent(peaks.map(|reading| reading.frequency)) else {
         return high;
     };
     let wanted = PAST_HIGHEST * (highest - low);
@@ -415,18 +415,20 @@ pub(super) fn decibels(ratio: f64) -> f64 {
     20.0 * ratio.max(1e-6).log10()
 }
 
+/// True for a peak that is marked. The tables leave out the same peaks.
+fn is_marked(reading: &ModeReading) -> bool {
+    let is_noise = match reading.label {
+        Some(PeakLabel::Weak) => true,
+        Some(PeakLabel::NoResonance) => !is_strong(reading.above_noise_db),
+        _ => false,
+    };
+    reading.frequency.is_finite() && !is_noise
+}
+
 /// Returns the resonances as marks on the frequency axis.
 pub(super) fn rules(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<Rule> {
     let read = spectra.readings.iter().zip(&recording.mode_numbers);
-    // The tables leave out the same peaks.
-    let known = read.filter(|(reading, _)| {
-        let is_noise = match reading.label {
-            Some(PeakLabel::Weak) => true,
-            Some(PeakLabel::NoResonance) => !is_strong(reading.above_noise_db),
-            _ => false,
-        };
-        reading.frequency.is_finite() && !is_noise
-    });
+    let known = read.filter(|(reading, _)| is_marked(reading));
     let rules = known.map(|(reading, mode)| {
         // One digit more than the half-line bound.
         let bound = reading.half_line / 5.0;

@@ -6,7 +6,7 @@
 mod formats;
 mod reported;
 
-use crate::text::lines_of;
+use crate::screen::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Hinge, Joint, Mesh, Specimen};

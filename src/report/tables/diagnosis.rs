@@ -78,7 +78,7 @@ fn note(document: &Document, gap: &GapSection) -> String {
          described. Every hypothesis, also none, lets {drift}the beam's properties, masses and the inertia of sensors move within \
          their uncertainty. So it usually leaves less. The fit weighs each reading by its uncertainty and lets the model miss \
          each mode by 0.05 %, so a plain rms may also be larger. The errors are those of the diagnosis{part}. The estimate uses all modes and can leave other errors. Size \
-         \u{b1} one standard deviation."
+         \u{b1} half the 95 % interval."
     );
     if let Some(scale) = gap.baselines.iter().find(|one| one.name == Baseline::Scale) {
         let withheld = scale.holdout_after.map_or_else(String::new, |after| {

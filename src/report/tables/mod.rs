@@ -1,5 +1,6 @@
 //! The report's tables as words, for the page and for the terminal.
 
+mod answer;
 mod comparison;
 mod diagnosis;
 mod joint;
@@ -7,6 +8,9 @@ mod modes;
 mod recordings;
 mod series;
 
+pub use answer::{
+    AnsweredValue, answered_changes, answered_joint, answered_modes, answered_values,
+};
 pub use comparison::{changed_dampings, changed_joint, changed_modes, changes, compared_tests};
 pub use diagnosis::{hypotheses, next_tests};
 pub(crate) use joint::patterns_in_words;

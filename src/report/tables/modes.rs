@@ -1,5 +1,6 @@
 //! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
+use super::answer::damping;
 use super::{
     Cell, Place, Table, bound_of, coherence, mode_name, mode_of, number, page_number, page_words,
     words,
@@ -7,15 +8,12 @@ use super::{
 use crate::document::{Document, ModeSection, PredictionSection, ReadBy, is_strong, method_name};
 use crate::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
-    or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
-    with_decimals_of,
+    or_missing, rounded_to, signed_percent, significant, trimmed, unit_words, with_decimals_of,
 };
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
 const LAMBDA_DIGITS: i32 = 6;
-/// Most significant digits of a damping ratio.
-const DAMPING_DIGITS: i32 = 4;
 
 /// Returns true for what tables show: resonances, and strong peaks that are none.
 fn is_shown(mode: &&ModeSection) -> bool {
@@ -268,7 +266,7 @@ fn note(document: &Document, modes: &[&ModeSection], described: bool) -> String 
     }
     parts.push(LINE_NOTE);
     if modes.iter().any(|mode| mode.damping_std.is_some()) {
-        parts.push("Damping: \u{b1} one standard deviation.");
+        parts.push("Damping: \u{b1} half the 95 % interval.");
     }
     if described {
         parts.push("\u{3bb}: non-dimensional frequency of the Euler beam.");
@@ -338,11 +336,6 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         UncertaintySource::TwoPoles => "two poles",
         UncertaintySource::Decays => "decays",
     });
-    // The damping ratio (%) with its standard deviation.
-    let std = mode.damping_std.map(|std| 100.0 * std);
-    let damping = mode
-        .damping
-        .map(|ratio| rounded_digits(100.0 * ratio, std, DAMPING_DIGITS).joined());
     // Lambda with the digits that the frequency supports: it grows with the frequency's square root.
     let lambda = mode.lambda.map(|lambda| match bound_of(mode) {
         Some(bound) if mode.frequency > 0.0 && lambda > 0.0 => {
@@ -366,7 +359,7 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         page_words("Method", method_name(mode.method)),
         page_words("Interval from", interval),
         number("Line (Hz)", or_missing(line)),
-        number("Damping (%)", or_missing(damping)),
+        number("Damping (%)", or_missing(damping(mode))),
         page_number("Tap deviation (Hz)", optional(tap_deviation(mode), 2)),
         page_number("p", optional(scatter, 2)),
         lambda,

@@ -231,6 +231,8 @@ function build(figure) {
     fingers(u, { x: [figure.x[0], figure.x[figure.x.length - 1]] }, function (x) { zoom(figure, x[0], x[1]); });
     return u;
   });
+  // Like the picture the curves first end where the modes do.
+  if (figure.plot.kind !== "taps") zoom(figure, figure.curves[0].x.low, figure.curves[0].x.high);
 }
 
 function chosen(figure, index) {

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::sizes::{left, percent, sizes, stiffness_with_limits};
+use super::sizes::{NORMAL, left, percent, sizes, stiffness_with_limits};
 use crate::document::{Document, GapSection};
-use crate::format::{probability, rounded, signed_percent, significant, trimmed};
+use crate::format::{capital, probability, rounded, signed_percent, significant, trimmed};
 use tapjoint_beam::effects::{EffectId, Group, Place};
 use tapjoint_diagnosis::{
     Closure, CommonFactor, Hypothesis, HypothesisResult, NextTest, Proposal, Residual, Thresholds,
@@ -253,7 +253,7 @@ fn along_decays(gap: &GapSection) -> Option<String> {
         format!(
             "its rotational stiffness changes by {} \u{b1} {:.1} % at the largest amplitude",
             change(100.0 * found.ratio, 1),
-            100.0 * found.ratio_std
+            100.0 * NORMAL * found.ratio_std
         )
     } else {
         "modes that hardly rotate the joint change too, so the size stays open".to_owned()
@@ -319,6 +319,48 @@ pub fn gap_in_short(document: &Document) -> Vec<String> {
     shrink.into_iter().chain(next_test(gap)).collect()
 }
 
+/// The verdict in two sentences at most, in the words of an engineer.
+pub(crate) fn brief_verdict(gap: &GapSection, has_joint: bool) -> String {
+    let Some(found) = cause(gap) else {
+        return match &gap.verdict {
+            Verdict::NoGap => {
+                "Nothing is missing: the described model explains the frequencies.".to_owned()
+            }
+            Verdict::NotEnoughData(reason) => match shows_gap(gap) {
+                true => format!("These data cannot say what causes it: {reason}."),
+                false => format!("No answer: {reason}."),
+            },
+            Verdict::Unknown => format!(
+                "Do not use {} before the cause is found: check the description and the mode numbers first.",
+                if has_joint {
+                    "the joint's stiffness"
+                } else {
+                    "what is estimated"
+                }
+            ),
+            _ => verdict(gap, has_joint),
+        };
+    };
+    let effects = match &found.hypothesis {
+        Hypothesis::Effects(effects) => effects.as_slice(),
+        _ => &[],
+    };
+    let meanings: Vec<&str> = effects.iter().map(|effect| effect.meaning()).collect();
+    let size = sizes(found);
+    let size = if size.is_empty() {
+        size
+    } else {
+        format!(": {size}")
+    };
+    format!(
+        "{} ({}, {}){size}. With it the model misses the frequencies by {} % (rms).",
+        capital(&meanings.join(", and ")),
+        names(effects),
+        probability(found.probability),
+        left(found.gap_after, gap.noise_floor)
+    )
+}
+
 /// The joint with its 95 % intervals.
 fn joint(found: &HypothesisResult) -> Option<String> {
     let [kt, kr] = found.joint?;
@@ -381,9 +423,9 @@ fn scale_of(effects: &[EffectId], gap: &GapSection) -> String {
     }
 }
 
-/// "+1.02 \u{b1} 0.10": a common factor and its standard uncertainty.
+/// "+1.02 \u{b1} 0.20": a common factor and half its 95 % interval.
 fn asked(factor: &CommonFactor) -> String {
-    let text = rounded(factor.percent, Some(factor.std_percent)).joined();
+    let text = rounded(factor.percent, Some(NORMAL * factor.std_percent)).joined();
     match text.starts_with('-') || text.starts_with('\u{2212}') {
         true => text,
         false => format!("+{text}"),
@@ -556,42 +598,6 @@ fn odds(gap: &GapSection) -> Option<f64> {
     singles.or(all)
 }
 
-/// Returns the answer of the diagnosis in a few words; `there` where the readings show a gap, be its cause known or not.
-pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
-    let hypotheses = match verdict {
-        Verdict::Named(effects) => {
-            let effects = effects.iter().map(|effect| vec![*effect]);
-            effects.map(Hypothesis::Effects).collect()
-        }
-        other => other.hypotheses(),
-    };
-    let mut names: Vec<String> = Vec::new();
-    for hypothesis in hypotheses {
-        let name = match hypothesis {
-            Hypothesis::None => "nothing".to_owned(),
-            Hypothesis::Unknown => "something unknown".to_owned(),
-            effects => together(&effects),
-        };
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    match verdict {
-        Verdict::NoGap => "no gap found".to_owned(),
-        Verdict::Named(_) => format!("missing in it: {}", listed(&names, "and")),
-        Verdict::Group(_) => format!("missing in it: one of {}", listed(&names, "or")),
-        Verdict::Set(_) => format!(
-            "these data do not decide what is missing in it: {}",
-            listed(&names, "or")
-        ),
-        Verdict::Unknown => {
-            "missing in it: something unknown, so do not use the estimate".to_owned()
-        }
-        _ if there => "something is missing in it, and these data cannot say what".to_owned(),
-        _ => "not enough data to tell whether something is missing in it".to_owned(),
-    }
-}
-
 /// Returns "modulus, length or timebase".
 pub(super) fn listed(names: &[String], conjunction: &str) -> String {
     match names.split_last() {
@@ -671,39 +677,4 @@ pub(crate) fn together(hypothesis: &Hypothesis) -> String {
 pub(crate) fn names(effects: &[EffectId]) -> String {
     let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
     names.join(", ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn regress_every_verdict_has_its_words() {
-        use EffectId::{Length, LocalCrack, Modulus, SensorMass};
-        let words = |verdict: Verdict| [false, true].map(|there| missing(&verdict, there));
-        let [pair, _] = words(Verdict::Named(vec![LocalCrack, SensorMass]));
-        assert_eq!(pair, "missing in it: local-crack and sensor-mass");
-        // A group of pairs repeats what they share.
-        let [group, _] = words(Verdict::Group(vec![Modulus, Length, Modulus]));
-        assert_eq!(group, "missing in it: one of modulus or length");
-        let modulus = Hypothesis::Effects(vec![Modulus]);
-        let [set, _] = words(Verdict::Set(vec![
-            modulus,
-            Hypothesis::None,
-            Hypothesis::Unknown,
-        ]));
-        let said =
-            "these data do not decide what is missing in it: modulus, nothing or something unknown";
-        assert_eq!(set, said);
-        // That there is a gap and what causes it are two questions.
-        let [open, there] = words(Verdict::NotEnoughData(String::new()));
-        assert!(
-            open.starts_with("not enough data to tell whether"),
-            "{open}"
-        );
-        assert!(
-            there.starts_with("something is missing in it, and"),
-            "{there}"
-        );
-    }
 }

@@ -1,6 +1,6 @@
-//! The findings: in five lines for a terminal, and in a few plain sentences for the page.
+//! The findings in a few plain sentences, for the page.
 
-use super::diagnosis::{gap_in_short, gap_story, listed, missing, shows_gap};
+use super::diagnosis::{gap_in_short, gap_story, listed};
 use super::sizes::stiffness_with_limits;
 use super::{comparison, series};
 use crate::document::{
@@ -11,57 +11,8 @@ use crate::picture::extent;
 use crate::tables::{Parameter, estimated, quality_count, reading_bound};
 use tapjoint_identify::observation::UNPAIRED;
 
-/// At most five lines, each with what it is about; what was not computed has none.
-pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
-    // Without a hammer it matters on which channels taps were looked for.
-    let taps_and_channels = taps(document).map(|taps| match channels(document) {
-        Some(channels) => format!("{taps}. {channels}"),
-        None => taps,
-    });
-    let model = most_missed(document).and_then(|worst| {
-        let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
-            format!("; {}", missing(&gap.verdict, shows_gap(gap)))
-        });
-        Some(format!(
-            "largest frequency error of the model {} % (mode {}){gap}",
-            signed_or_below(worst.error_percent?),
-            worst.mode
-        ))
-    });
-    let warnings = match document.main_warnings().count() {
-        0 if document.modes.is_none() => {
-            "no warnings about the files; the spectra are not checked here".to_owned()
-        }
-        0 => "no warnings".to_owned(),
-        1 => "1 warning, see above".to_owned(),
-        count => format!("{count} warnings, see above"),
-    };
-    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
-    // Where nothing was computed there is nothing to doubt.
-    let computed = document.modes.is_some() || document.recordings.is_some();
-    let sought = match document.has_joint() {
-        true => "Joint",
-        false => "Beam",
-    };
-    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
-    let assumed = estimate.and_then(|estimate| estimate.assumed.clone());
-    let lines = [
-        ("Taps", taps_and_channels),
-        ("Modes", modes_in_short(document)),
-        (sought, joint(document)),
-        ("Assumed", assumed),
-        ("Model", model),
-        ("Doubts", computed.then_some(warnings + &checks)),
-        ("Next", described(document)),
-    ];
-    lines
-        .into_iter()
-        .filter_map(|(about, words)| Some((about, words?)))
-        .collect()
-}
-
 /// Returns "12 of 14 taps used, in 2 recordings".
-fn taps(document: &Document) -> Option<String> {
+pub(super) fn taps(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
     let files = match recordings.len() {
         1 => "1 recording".to_owned(),
@@ -110,31 +61,6 @@ pub fn no_estimate(document: &Document) -> Option<String> {
     missing.then(|| format!("no estimate: {}", document.no_estimate()))
 }
 
-fn joint(document: &Document) -> Option<String> {
-    let Some(estimate) = document.estimate.as_ref()? else {
-        return no_estimate(document);
-    };
-    let physical = physical(estimate, with_bounds);
-    let untested = estimate.misfit.as_ref();
-    let untested = match untested.is_some_and(|misfit| misfit.degrees_of_freedom == 0) {
-        true => "; untested: as many unknowns as frequencies",
-        false => "",
-    };
-    let described = (!physical.is_empty()).then(|| physical.join(", ") + untested)?;
-    // The joint that belongs to a named cause comes first.
-    let headline = document.headline.as_ref();
-    let with = headline.and_then(|headline| Some((headline, joint_with(headline)?)));
-    Some(match with {
-        Some((headline, joint)) => {
-            format!(
-                "{joint} {}, if confirmed; as described {described}",
-                headline.model
-            )
-        }
-        None => described,
-    })
-}
-
 /// "Kt = 168.2 kN/m (95 %: 167 to 169), Kr = 205.4 N m/rad": the joint that is found together with the cause, or with each of
 /// several; `None` where the headline is the described model's.
 fn joint_with(headline: &HeadlineSection) -> Option<String> {
@@ -166,21 +92,6 @@ fn behind(parameter: &Parameter<'_>, unit: &str) -> String {
         true => String::new(),
         false => format!("\u{a0}{unit}"),
     }
-}
-
-/// "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
-fn with_bounds(parameter: &Parameter<'_>) -> String {
-    let [value, _, low, high, unit] = parameter.written();
-    let own = format!("{} = {value}{}", parameter.symbol, behind(parameter, &unit));
-    let limits = match (parameter.value.low, parameter.value.high) {
-        (Some(_), Some(_)) => format!("(95 %: {low} to {high})"),
-        (Some(_), None) => format!("(95 %: above {low})"),
-        (None, Some(_)) => format!("(95 %: below {high})"),
-        (None, None) => String::new(),
-    };
-    // A number stays on the line of its unit.
-    let parts = [own, limits].map(|part| part.replace(' ', "\u{a0}"));
-    parts.join(" ").trim_end().to_owned()
 }
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -235,8 +146,8 @@ fn described(document: &Document) -> Option<String> {
     })
 }
 
-/// On what taps were looked for where there is no hammer.
-fn channels(document: &Document) -> Option<String> {
+/// "channel 1 and channel 2", on which taps were looked for where there is no hammer.
+pub(super) fn tapped_channels(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let mut names: Vec<&str> = Vec::new();
     // A spectrum from a file has no taps.
@@ -254,7 +165,12 @@ fn channels(document: &Document) -> Option<String> {
         return None;
     }
     let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
-    let names = listed(&names, "and");
+    Some(listed(&names, "and"))
+}
+
+/// On what taps were looked for where there is no hammer.
+fn channels(document: &Document) -> Option<String> {
+    let names = tapped_channels(document)?;
     Some(format!(
         "There is no hammer channel: taps were looked for on {names}, and without the force there is \
          no frequency response function."

@@ -4,10 +4,12 @@ use crate::format::{RIGID, or_missing, prefix, rounded, significant};
 use tapjoint_beam::effects::Group;
 use tapjoint_diagnosis::{HypothesisResult, ParameterValue};
 
+/// Standard deviations on either side that hold 95 % of a normal distribution.
+pub(crate) const NORMAL: f64 = 1.96;
 /// A size below this is zero but for rounding, in the unit that it is written in.
 const NOTHING: f64 = 1e-9;
 
-/// "mass 24.10 ± 0.30 g"; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
+/// "mass 24.10 ± 0.59 g", with half the 95 % interval; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
 pub(crate) fn sizes(found: &HypothesisResult) -> String {
     let mut sorted: Vec<&ParameterValue> = found.parameters.iter().collect();
     sorted.sort_by_key(|one| (one.effect.name(), one.name));
@@ -46,9 +48,9 @@ fn size(parameter: &ParameterValue) -> String {
     }
     let (unit, factor) = unit_of(parameter);
     let value = factor * parameter.value;
-    let known = parameter.std.map(|std| factor * std);
-    let size = match known.filter(|std| std.is_finite() && *std > 0.0) {
-        Some(std) => rounded(value, Some(std)).joined(),
+    let half = parameter.std.map(|std| factor * NORMAL * std);
+    let size = match half.filter(|half| half.is_finite() && *half > 0.0) {
+        Some(half) => rounded(value, Some(half)).joined(),
         None if value.abs() < NOTHING => "0".to_owned(),
         None => significant(value, 3),
     };
@@ -142,18 +144,18 @@ mod tests {
             ])
         };
         // Next to nothing of it may be anywhere.
-        assert_eq!(known(0.004, None), "mass 0.0 \u{b1} 1.0 g");
+        assert_eq!(known(0.004, None), "mass 0.0 \u{b1} 2.0 g");
         let somewhere = known(0.004, Some(0.001));
         assert_eq!(
             somewhere,
-            "mass 0.0 \u{b1} 1.0 g, position 4.0 \u{b1} 1.0 mm"
+            "mass 0.0 \u{b1} 2.0 g, position 4.0 \u{b1} 2.0 mm"
         );
         let mass = parameter(EffectId::SensorMass, "mass", 0.024, None);
         assert_eq!(of(vec![mass.clone()]), "mass 24.0 g");
         let whole = |name, value| parameter(EffectId::SensorScale, name, value, None);
         let scale = parameter(EffectId::SensorScale, "relative", 0.1, Some(0.01));
         let of_all = of(vec![scale, whole("sensor", 0.0), whole("recording", 0.0)]);
-        assert_eq!(of_all, "relative 10.0 \u{b1} 1.0 %, all sensors");
+        assert_eq!(of_all, "relative 10.0 \u{b1} 2.0 %, all sensors");
         let of_one = of(vec![whole("sensor", 2.0), whole("recording", 1.0)]);
         assert_eq!(of_one, "recording 1, sensor 2");
         let crack = parameter(EffectId::LocalCrack, "compliance", 0.01, None);

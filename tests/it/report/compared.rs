@@ -331,7 +331,7 @@ fn prop_a_report_on_a_comparison_has_its_files_alone() {
         "monday.toml",
         "friday.toml",
         "Something changed that no cause here explains.",
-        "5 warnings",
+        "5 doubts",
         "1 more of the same kinds: report.json has all.",
     ] {
         assert!(words.contains(wanted), "{wanted}");

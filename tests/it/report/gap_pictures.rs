@@ -159,5 +159,5 @@ fn regress_local_changes_have_the_digits_of_their_uncertainty() {
     let is_curve = |set: &&Series| matches!(set.mark, Mark::Curve(_));
     let series = &live.blocks[0].panels[1].series;
     let set = series.iter().find(is_curve).unwrap();
-    assert_eq!(set.said, ["3 \u{b1} 12 %", "12.34500 \u{b1} 0.00050 %"]);
+    assert_eq!(set.said, ["3 \u{b1} 24 %", "12.34500 \u{b1} 0.00098 %"]);
 }

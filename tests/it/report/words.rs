@@ -9,7 +9,7 @@ use tapjoint::report::document::{
 use tapjoint::report::tables::parameters;
 use tapjoint::report::words::findings as summary;
 use tapjoint::report::{
-    render_json, render_modes_csv, render_parameters_csv, render_taps_csv, render_text,
+    Screen, render_json, render_modes_csv, render_parameters_csv, render_taps_csv, render_text,
 };
 use tapjoint::structure::Assembly;
 use tapjoint::taps::Pulse;
@@ -28,11 +28,12 @@ fn prop_page_holds_every_section_and_picture() {
         assert!(html.contains(&format!("id=\"{id}\"")), "no section {id}");
     }
     let svgs = html.split("<script>").next().unwrap_or_default();
-    assert_eq!(svgs.matches("<svg").count(), 10, "pictures in the page");
+    // With the sign of the state and the picture of the first screen.
+    assert_eq!(svgs.matches("<svg").count(), 12, "pictures in the page");
     let place = |part: &str| html.find(part).unwrap_or(usize::MAX);
     assert!(
-        place("id=\"warnings\"") < place("id=\"summary\""),
-        "warnings come first"
+        place("id=\"answer\"") < place("id=\"warnings\""),
+        "the answer comes first"
     );
 }
 
@@ -225,12 +226,14 @@ fn regress_without_stated_uncertainties_the_misfit_gives_the_limits() {
 fn regress_doubts_about_the_regression_stand_with_it() {
     let mut document = fixture::document();
     document.warnings[0].beside = true;
-    let text = render_text(&document);
+    let text = render_text(&document, Screen::default());
     assert!(text.contains("note (closure)"), "{text}");
     assert!(!text.contains("warning (closure)"), "{text}");
-    assert!(text.contains("1 warning, see above"), "{text}");
     let html = page(&document);
-    assert!(html.contains("<h2>1 warning</h2>"), "the page counts it");
+    assert!(
+        html.contains("<summary>1 doubt</summary>"),
+        "the page counts it"
+    );
     let own = html.split("<h3>Pair regression</h3>").nth(1).unwrap();
     let own = own.split("</div>\n</div>").next().unwrap_or(own);
     assert!(own.contains("The pair regression does not close"), "{own}");
@@ -292,7 +295,7 @@ fn prop_terminal_lines_fit_80_columns() {
         ..WarningSection::default()
     });
     for (case, document) in [("whole", fixture::document()), ("long", document)] {
-        for line in render_text(&document).lines() {
+        for line in render_text(&document, Screen::default()).lines() {
             let length = line.chars().count();
             assert!(length <= 80, "{case}: {length} characters in {line:?}");
         }
@@ -387,7 +390,10 @@ fn inspected() -> Document {
 
 /// Adds what a terminal shows of a document to a text.
 fn show(text: &mut String, title: &str, document: &Document) {
-    text.push_str(&format!("######## {title}\n{}\n", render_text(document)));
+    text.push_str(&format!(
+        "######## {title}\n{}\n",
+        render_text(document, Screen::default())
+    ));
 }
 
 #[test]
@@ -545,7 +551,7 @@ fn prop_terminal_cuts_nothing_off() {
         ("inspected", inspected()),
     ];
     for (case, document) in cases {
-        let text = render_text(&document);
+        let text = render_text(&document, Screen::default());
         // Names of files alone give way, in their middle.
         let cut = text
             .lines()
@@ -592,7 +598,7 @@ fn regress_recordings_stay_apart_in_a_crowded_table_of_modes() {
         ],
     ];
     for files in cases {
-        let text = render_text(&crowded(files));
+        let text = render_text(&crowded(files), Screen::default());
         let mut parts = text.split("\n\n");
         let table =
             parts.find(|part| part.starts_with("Modes\n") || part.starts_with("Resonances\n"));
@@ -629,7 +635,7 @@ fn regress_modes_show_no_absurd_digits() {
         mode.damping_std = Some(2.3e-7);
     }
     for (place, text) in [
-        ("terminal", render_text(&document)),
+        ("terminal", render_text(&document, Screen::default())),
         ("page", page(&document)),
     ] {
         for wanted in ["7.4867 ± 0.0001", "1.63051", "0.5081 ± 0.0001"] {

@@ -71,7 +71,7 @@ def zoom():
 
     for (low, high), own, other, _ in compare_zoom.measure(21):
         name = f"zoom {low:g} to {high:g} Hz at 51.2 kHz, 10 x 2 s"
-        yield name, "scipy.signal.zoom_fft", own, other, 3, "flops of the filters"
+        yield name, "scipy.signal.zoom_fft", own, other, 3, "flops of a real transform, or of the filters"
 
 
 def tap_file(path):

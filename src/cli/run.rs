@@ -2,7 +2,8 @@
 
 use super::Outcome;
 use super::arguments::{
-    FullAnswer, RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
+    FullAnswer, RecordingArguments, SpectrumSettings, file_or_folder, perturbed_by,
+    perturbed_methods, reading,
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
@@ -32,9 +33,9 @@ use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_sec
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response functions (UFF58,
-    /// text, LabVIEW, MATLAB)
-    #[arg(value_name = "FILE")]
+    /// Test description (.toml), folder with one, recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response
+    /// functions (UFF58, text, LabVIEW, MATLAB)
+    #[arg(value_name = "FILE", value_parser = file_or_folder())]
     file: PathBuf,
     /// Folder of the report; default: NAME-report beside FILE
     #[arg(long, value_name = "DIR")]
@@ -114,6 +115,7 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
 
 /// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens.
 fn report_folder(name: &str) -> String {
+    let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
     let name: String = name
         .chars()
         .map(|c| match c {
@@ -123,7 +125,7 @@ fn report_folder(name: &str) -> String {
         })
         .take(100)
         .collect();
-    match name.trim_matches(|c: char| c == '.' || c.is_whitespace()) {
+    match name.as_str() {
         "" => "test-report".to_owned(),
         name => format!("{name}-report"),
     }

@@ -26,6 +26,7 @@ pub(super) struct Terminal {
     quiet: bool,
     verbose: u8,
     stopwatch: Option<Arc<Stopwatch>>,
+    start: Instant,
 }
 
 /// Destination of the JSON document. A file is opened before any work.
@@ -53,6 +54,7 @@ impl Terminal {
             quiet: common.quiet,
             verbose: common.verbose,
             stopwatch,
+            start: Instant::now(),
         })
     }
 
@@ -116,15 +118,16 @@ impl Terminal {
         let _ = write!(error, "{shown}");
     }
 
-    /// Shows the progress of a long task on a terminal, at every percent.
+    /// Shows the progress of a long task on a terminal, at every percent, with the time that is left.
     pub(super) fn count(&self, doing: &str, done: usize, of: usize) {
         let mut error = io::stderr();
         let [now, before] = [done, done.saturating_sub(1)].map(|steps| 100 * steps / of.max(1));
         if self.quiet || now == before || !error.is_terminal() {
             return;
         }
+        let left = time_left(self.start.elapsed(), done, of);
         let end = if done == of { "\n" } else { "" };
-        let _ = write!(error, "\r{done} of {of} {doing}{end}");
+        let _ = write!(error, "\r\u{1b}[K{done} of {of} {doing}{left}{end}");
     }
 
     /// Returns the screen that texts are laid out for.
@@ -215,6 +218,18 @@ pub(super) fn screen() -> Screen {
     stated.or(own).map_or_else(Screen::default, Screen::of)
 }
 
+/// ", 2 min left": by what was done in this time; empty at the end, and in the first two seconds.
+fn time_left(elapsed: Duration, done: usize, of: usize) -> String {
+    let seconds = elapsed.as_secs_f64();
+    let left = seconds * of.saturating_sub(done) as f64 / done.max(1) as f64;
+    match left {
+        _ if done == 0 || done >= of || seconds < 2.0 => String::new(),
+        left if left < 90.0 => format!(", {left:.0} s left"),
+        left if left < 5400.0 => format!(", {:.0} min left", left / 60.0),
+        left => format!(", {:.1} h left", left / 3600.0),
+    }
+}
+
 /// Returns the text with bold headings and yellow warnings.
 fn coloured(text: &str) -> String {
     const BOLD: &str = "\u{1b}[1m";
@@ -224,8 +239,11 @@ fn coloured(text: &str) -> String {
     let mut after_gap = true;
     let lines = text.lines().map(|line| {
         // A warning goes on in the lines that are indented below it.
-        warning = line.starts_with("warning (") || warning && line.starts_with("  ");
-        let heading = after_gap && !line.is_empty() && !warning;
+        let begins = line.starts_with("warning (") || line.starts_with("! ");
+        warning = begins || warning && line.starts_with("  ");
+        // A caption, or the heads of a table; sentences are longer, or end with a full stop.
+        let caption = line.chars().count() < LONGEST_CAPTION && !line.ends_with('.');
+        let heading = after_gap && !warning && (line.contains("  ") || caption);
         after_gap = line.is_empty();
         match (warning, heading) {
             (true, _) => format!("{YELLOW}{line}{PLAIN}\n"),
@@ -235,6 +253,9 @@ fn coloured(text: &str) -> String {
     });
     lines.collect()
 }
+
+/// Longest caption of a table (characters).
+const LONGEST_CAPTION: usize = 60;
 
 /// Any value of NO_COLOR (no-color.org) turns colours off, and so does a terminal without them.
 fn has_colours() -> bool {
@@ -371,6 +392,18 @@ mod tests {
         let short = format!("a 99999999... (309 digits) b 1{} c 12", "0".repeat(39));
         assert_eq!(shortened(&text), short);
         assert_eq!(shortened("no number"), "no number");
+    }
+
+    #[test]
+    fn val_time_left_follows_from_what_was_done() {
+        let left = |seconds: f64, done| time_left(Duration::from_secs_f64(seconds), done, 100);
+        assert_eq!(left(40.0, 25), ", 2 min left");
+        assert_eq!(left(10.0, 50), ", 10 s left");
+        assert_eq!(left(3600.0, 10), ", 9.0 h left");
+        assert_eq!(
+            (left(1.0, 1), left(9.0, 100)),
+            (String::new(), String::new())
+        );
     }
 
     #[test]

@@ -676,6 +676,11 @@ pub struct NextTest {
 }
 
 impl NextTest {
+    /// Returns the time that the test takes (min), for one beam with its set-up at hand: an estimate, five for each unit of effort.
+    pub fn minutes(&self) -> f64 {
+        5.0 * self.effort
+    }
+
     /// Returns the information per cost (bit), by which tests are ranked.
     pub fn worth(&self) -> f64 {
         self.expected_information / self.effort

@@ -143,6 +143,22 @@ fn regress_a_hammer_that_is_named_or_forgotten_is_suggested() {
 }
 
 #[test]
+fn limit_a_folder_stands_for_its_only_description() {
+    let folder = super::samples();
+    let test = folder.path().join("recordings/cantilever");
+    let (_, error) = told(folder.path(), &["run", "recordings/cantilever"], 2);
+    let wanted = "2 descriptions: source.toml, test.toml; name one";
+    assert!(error.contains(wanted), "{error}");
+    std::fs::remove_file(test.join("source.toml")).unwrap();
+    let (text, _) = told(folder.path(), &["run", "recordings/cantilever"], 0);
+    let page = "recordings/cantilever/Cantilever-report/report.html";
+    // The default folder of the report stands beside the description.
+    assert!(text.contains(page), "{text}");
+    let (_, error) = told(folder.path(), &["run", "examples/.."], 2);
+    assert!(error.contains("a folder without a description"), "{error}");
+}
+
+#[test]
 fn prop_completions_of_every_shell_name_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let names = commands(folder.path());

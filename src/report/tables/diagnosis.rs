@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::{Table, number, page_words, words};
+use super::{Table, number, page_number, page_words, words};
 use crate::document::{Baseline, Document, GapSection};
 use crate::format::{MISSING, or_missing, probability, significant};
 use crate::words::diagnosis::{
-    EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, names, not_predicted, together,
+    EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, gain, names, not_predicted, together,
 };
 use crate::words::sizes::{left, percent, sizes, unit_of};
 use tapjoint_beam::effects::EffectId;
@@ -115,21 +115,22 @@ pub fn next_tests(document: &Document) -> Option<Table> {
     };
     let rows = gap.next_test.iter().map(|test| {
         let unpredicted = not_predicted(test, "; could not be predicted for ");
-        let information = match confirms(test) {
-            true => MISSING.to_owned(),
-            false => format!("{:.2}", test.expected_information),
+        let (gain, information) = match confirms(test) {
+            true => ("confirmed or not", MISSING.to_owned()),
+            false => (gain(test), format!("{:.2}", test.expected_information)),
         };
         [
             words("Test", test.action.clone() + &unpredicted),
-            number("Information (bit)", information),
-            number("Effort", format!("{:.0}", test.effort)),
+            number("Time (min)", format!("{:.0}", test.minutes())),
+            words("Tells", gain),
             page_words("Tells apart", test.separates.join(", ")),
+            page_number("Information (bit)", information),
         ]
     });
     let note = format!(
-        "Information: the least that the test is expected to tell about the cause, {premise}. One bit tells two equally \
-         probable causes apart. Effort: reading the existing recordings again is 1. The test with the most information \
-         for its effort stands first."
+        "Time: an estimate for one beam with its set-up at hand. What it tells follows from the least information that is \
+         expected, {premise}. One bit decides between two equally probable causes. The test that tells most for its time \
+         stands first."
     );
     (!gap.next_test.is_empty()).then(|| Table::of("What to do next", rows, note))
 }

@@ -1,7 +1,7 @@
 //! The answer in short: what a reader asks first. Terminal and page show the same.
 
 use super::comparison;
-use super::diagnosis::{brief_verdict, shows_gap};
+use super::diagnosis::{brief_verdict, next_in_short, shows_gap};
 use super::findings::{no_estimate, tapped_channels, taps};
 use super::series;
 use crate::document::Document;
@@ -198,8 +198,7 @@ fn action(document: &Document) -> Option<String> {
             Verdict::NotEnoughData(_) => shows_gap(gap),
             _ => true,
         };
-        let next = gap.next_test.first().filter(|_| needs)?;
-        return Some(capital(&next.action) + ".");
+        return next_in_short(gap).filter(|_| needs);
     }
     let mut warnings = document.warnings.iter();
     if let Some(forgotten) = warnings.find(|one| one.code == "hammer-channel") {

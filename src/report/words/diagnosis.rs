@@ -638,15 +638,52 @@ fn next_test(gap: &GapSection) -> Option<String> {
         _ => ("To decide", String::new()),
     };
     if confirms(test) {
-        return Some(format!("{purpose}: {}.", test.action));
+        return Some(format!("{purpose}: {} ({}).", test.action, minutes(test)));
     }
     Some(format!(
-        "{purpose}: {}. It separates {} (about {:.2} bit{premise}{}).",
+        "{purpose}: {} ({}). This tells {} about {}{premise}{}.",
         test.action,
+        minutes(test),
+        gain(test),
         listed(&test.separates, "and"),
-        test.expected_information,
         not_predicted(test, "; it could not be predicted for ")
     ))
+}
+
+/// The test to make next, with its time and what it tells; `None` where the best one tells next to nothing.
+pub(crate) fn next_in_short(gap: &GapSection) -> Option<String> {
+    let test = gap.next_test.first()?;
+    if confirms(test) {
+        return Some(format!("{} ({}).", capital(&test.action), minutes(test)));
+    }
+    (test.expected_information >= LITTLE).then(|| {
+        format!(
+            "{} ({}). This tells {} about {}.",
+            capital(&test.action),
+            minutes(test),
+            gain(test),
+            listed(&test.separates, "and")
+        )
+    })
+}
+
+/// "about 10 min": the time of a test.
+pub(crate) fn minutes(test: &NextTest) -> String {
+    format!("about {:.0} min", test.minutes())
+}
+
+/// Information (bit) below which a test tells next to nothing: odds of 50 to 50 would become 60 to 40.
+const LITTLE: f64 = 0.03;
+
+/// How much a test tells about the causes that it separates, by its information. One bit decides between two equally probable
+/// causes; with a tenth odds of 50 to 50 become 70 to 30.
+pub(crate) fn gain(test: &NextTest) -> &'static str {
+    match test.expected_information {
+        bits if bits >= 0.7 => "nearly all",
+        bits if bits >= 0.3 => "much",
+        bits if bits >= 0.1 => "something",
+        _ => "little",
+    }
 }
 
 /// True for a test that tells nothing new about which hypothesis holds.

@@ -411,7 +411,7 @@ fn number(value: &Value) -> f64 {
 fn regress_run_writes_all_it_promises_and_touches_nothing_else() {
     for (name, report, recordings) in [
         ("cantilever", "Cantilever-report", &["low", "high"][..]),
-        ("lap-joint", "Lap joint-report", &["taps"][..]),
+        ("lap-joint", "Lap-joint-report", &["taps"][..]),
     ] {
         let folder = sample(name);
         let before = contents(folder.path());
@@ -686,7 +686,7 @@ fn regress_the_same_bytes_whatever_the_threads() {
 #[test]
 fn regress_a_second_run_replaces_the_first() {
     let folder = sample("lap-joint");
-    let report = folder.path().join("Lap joint-report");
+    let report = folder.path().join("Lap-joint-report");
     fs::create_dir(&report).unwrap();
     fs::write(report.join("notes.txt"), "mine").unwrap();
     for _ in 0..2 {

@@ -6,7 +6,7 @@ use super::modes::reading;
 use super::{Table, number, words};
 use crate::document::{Document, HeadlineValue, ModeSection};
 use crate::format::{
-    MISSING, RIGID, capital, or_missing, prefix, rounded, rounded_digits, signed_percent,
+    MISSING, capital, or_missing, prefix, rounded, rounded_digits, signed_percent,
 };
 use crate::words::sizes::NORMAL;
 
@@ -61,6 +61,9 @@ pub(crate) fn damping(mode: &ModeSection) -> Option<String> {
     Some(rounded_digits(100.0 * ratio, half, DIGITS).joined())
 }
 
+/// Word for a stiffness without bound.
+const NO_SPRING: &str = "rigid";
+
 /// A stiffness or property with its 95 % limits, as the answer gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnsweredValue {
@@ -91,7 +94,10 @@ pub fn answered_values(document: &Document) -> Vec<AnsweredValue> {
     let parameters = estimate.map(estimated).unwrap_or_default();
     let physical = parameters.iter().filter(|one| one.unit != "1");
     let values = physical.map(|parameter| {
-        let [value, _, low, high, unit] = parameter.written();
+        let [mut value, _, low, high, unit] = parameter.written();
+        if parameter.value.value.is_infinite() {
+            value = NO_SPRING.to_owned();
+        }
         let scale = parameter.value.value;
         let (factor, _) = prefix(if scale.is_infinite() { 1.0 } else { scale });
         let with = headline.and_then(|found| match parameter.name {
@@ -138,7 +144,7 @@ pub fn answered_joint(document: &Document) -> Option<Table> {
 /// "2.00 (1.89 to 2.12)", in the unit that `factor` leads to.
 fn with_limits(found: HeadlineValue, factor: f64) -> String {
     let Some(value) = found.value else {
-        return RIGID.to_owned();
+        return NO_SPRING.to_owned();
     };
     let half = found
         .low

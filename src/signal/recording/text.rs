@@ -25,6 +25,12 @@ impl Separator {
     /// In order of preference where several fit equally well.
     pub(super) const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
 
+    /// The only byte that separates; `None` of blanks, which may be several.
+    pub(super) fn single(self) -> Option<u8> {
+        let [first, second] = self.bytes();
+        (first == second).then_some(first)
+    }
+
     /// The bytes that separate; twice the same where there is one.
     fn bytes(self) -> [u8; 2] {
         match self {

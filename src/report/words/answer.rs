@@ -8,7 +8,7 @@ use crate::document::Document;
 use crate::format::capital;
 use crate::tables::{Table, answered_changes, answered_joint, answered_modes, quality_count};
 use tapjoint_analysis::{meaning_of, severity_of};
-use tapjoint_diagnosis::Verdict;
+use tapjoint_diagnosis::{Hypothesis, Verdict};
 
 /// How far an answer can be relied on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,6 +156,10 @@ fn state(document: &Document) -> (State, String) {
             return (State::NoAnswer, reason.to_owned());
         }
         Some((Verdict::NotEnoughData(_), false)) => {
+            Some("these data do not show whether something is missing")
+        }
+        // Nothing is among what may be the cause.
+        Some((Verdict::Set(list), _)) if list.contains(&Hypothesis::None) => {
             Some("these data do not show whether something is missing")
         }
         Some((Verdict::NoGap, _)) | None => None,

@@ -11,7 +11,7 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::tables::{hypotheses, next_tests};
 use tapjoint::report::words::diagnosis::{gap_in_short, gap_story};
-use tapjoint::report::{Screen, render_text};
+use tapjoint::report::{Screen, render_answer, render_text};
 use tapjoint::structure::Assembly;
 
 use crate::golden::assert_snapshot;
@@ -407,4 +407,28 @@ fn regress_the_table_has_the_size_told_apart_and_the_baseline() {
     assert_eq!(table.rows[1][place("Told apart from")], "\u{2013}");
     let baseline = "leaves an error of 0.71 % (rms), of the withheld ones 0.93 %.";
     assert!(table.note.ends_with(baseline), "{}", table.note);
+}
+
+#[test]
+fn limit_the_state_follows_the_verdict() {
+    let state = |verdict: Verdict| {
+        let answer = render_answer(&gap_with(verdict), None, Screen::default());
+        let first = answer.lines().next().unwrap_or_default();
+        first.split_once(": ").unwrap().1.to_owned()
+    };
+    let undecided_too = "doubtful, these data do not show whether something is missing";
+    let missing = "doubtful, something is missing in the description";
+    let named = Verdict::Named(vec![EffectId::JointDamping]);
+    assert_eq!(state(Verdict::NoGap), "good");
+    assert_eq!(state(named), missing);
+    // Nothing is one of the possible causes.
+    assert_eq!(state(undecided()), undecided_too);
+    assert_eq!(
+        state(Verdict::Set(vec![damping(), Hypothesis::Unknown])),
+        missing
+    );
+    let unknown = "no answer, something is missing that the catalogue does not have";
+    assert_eq!(state(Verdict::Unknown), unknown);
+    let reason = "two modes are needed".to_owned();
+    assert_eq!(state(Verdict::NotEnoughData(reason)), undecided_too);
 }

@@ -3,8 +3,8 @@
 
     scripts/compare_speed.py [--part NAME]
 
-Parts: frf, zoom, chain, estimate, stabilisation, universal. Needs numpy, scipy, pyFRF, pyEMA, pyuff and cargo. Printed
-are our time, the other's, their ratio, the ratio that is aimed at, and what bounds ours. All times are of one core. The
+Parts: frf, zoom, chain, commands, estimate, stabilisation, universal. Needs numpy, scipy, pyFRF, pyEMA, pyuff and cargo.
+Printed are our time, the other's, their ratio, the ratio that is aimed at, and what bounds ours. All times are of one core. The
 shortest of several runs counts, so that other work on the machine counts as little as possible. `chain` is a whole
 process, from a text file with ten taps to frequencies and dampings: processor time and peak memory, beside a script with
 pyFRF and pyEMA, which is told where the modes are. Exit code 1 if a ratio is missed.
@@ -108,7 +108,7 @@ def process_cost(command, runs):
                 if line.startswith("VmHWM:"):
                     peak = max(peak, int(line.split()[1]))
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
-            time.sleep(0.0005)
+            time.sleep(0.002)
         if os.waitstatus_to_exitcode(status) != 0:
             sys.exit(f"failed: {' '.join(map(str, command))}")
         least = min(least, usage.ru_utime + usage.ru_stime)
@@ -125,6 +125,28 @@ def chain():
         other, others_memory = process_cost(script, 3)
         note = f"fits of the modes; {memory:.0f} MB beside {others_memory:.0f} MB; aim: 40 ms and 20 MB"
         yield "text of ten taps to modes, whole process", "pyFRF + pyEMA", own, other, 1, note
+
+
+def commands():
+    """Whole commands on virtual tests, beside the processor time that is aimed at."""
+    program = RELEASE / "tapjoint"
+    with tempfile.TemporaryDirectory() as folder:
+        short, five = Path(folder, "short"), Path(folder, "five")
+        simulate = [program, "simulate", "-q", "--seed", "8", "--out"]
+        source = [ROOT / "recordings/cantilever/source.toml", "--kx", "1400", "--ky", "4.8"]
+        source += ["--taps", "1", "--seconds", "1", "--rate", "25600"]
+        subprocess.run([*simulate, short, *source], check=True)
+        subprocess.run([*simulate, five, ROOT / "examples/five_recordings.toml"], check=True)
+        sample = ROOT / "recordings/cantilever/test.toml"
+        report = ["--out", Path(folder, "report"), "--force"]
+        for name, aim, command in (
+            ("modes of 1 s, three channels", 0.010, ["spectrum", short / "low.wav", "--hammer", "1"]),
+            ("diagnose the sample", 0.150, ["diagnose", sample]),
+            ("run the sample, with its report", 0.350, ["run", sample, *report]),
+            ("diagnose five recordings", 0.500, ["diagnose", five / "test.toml"]),
+        ):
+            own, memory = process_cost([program, *command], 7)
+            yield f"{name}, processor time", "aim", own, aim, 1, f"fits and models; {memory:.0f} MB"
 
 
 def estimate():
@@ -155,7 +177,7 @@ def universal():
         yield f"universal file, a million samples, {name}", "pyuff", own, other, least, bound
 
 
-PARTS = {part.__name__: part for part in (frf, zoom, chain, estimate, stabilisation, universal)}
+PARTS = {part.__name__: part for part in (frf, zoom, chain, commands, estimate, stabilisation, universal)}
 
 
 def main():

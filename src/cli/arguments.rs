@@ -1,13 +1,8 @@
 //! Arguments that several commands share, and the parsers of their values.
 
-use super::input::file_name;
-use super::place::is_description;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use clap::builder::{
-    PathBufValueParser, PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser,
-};
-use std::fs;
+use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint::compare::REPEATABILITY_LIMITS;
@@ -23,35 +18,6 @@ use tapjoint::recording::{
 use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
 use tapjoint::taps::TapSettings;
-
-/// Returns the parser of a file; a folder stands for the only description in it.
-pub(super) fn file_or_folder() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| match path.is_dir() {
-        true => only_description(&path),
-        false => Ok(path),
-    })
-}
-
-/// Returns the only description in a folder.
-///
-/// # Errors
-/// There is none, there are several, or the folder cannot be read.
-fn only_description(folder: &Path) -> Result<PathBuf, String> {
-    let entries = fs::read_dir(folder).map_err(|problem| problem.to_string())?;
-    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut found: Vec<PathBuf> = files.filter(|file| is_description(file)).collect();
-    found.sort();
-    let names = found.iter().map(|file| file_name(file));
-    let names = names.collect::<Vec<_>>().join(", ");
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        0 => Err(
-            "a folder without a description (.toml); `tapjoint init` prints one, or name a recording"
-                .to_owned(),
-        ),
-        count => Err(format!("a folder with {count} descriptions: {names}; name one")),
-    }
-}
 
 /// Choice of how much is printed.
 #[derive(Debug, Args)]

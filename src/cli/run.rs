@@ -2,8 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{
-    FullAnswer, RecordingArguments, SpectrumSettings, file_or_folder, perturbed_by,
-    perturbed_methods, reading,
+    FullAnswer, RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
@@ -15,7 +14,9 @@ use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use anyhow::bail;
 use clap::Args;
-use std::path::PathBuf;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::fs;
+use std::path::{Path, PathBuf};
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
@@ -113,6 +114,35 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     Ok(file)
 }
 
+/// Returns the parser of a file; a folder stands for the only description in it.
+fn file_or_folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match path.is_dir() {
+        true => only_description(&path),
+        false => Ok(path),
+    })
+}
+
+/// Returns the only description in a folder.
+///
+/// # Errors
+/// There is none, there are several, or the folder cannot be read.
+fn only_description(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|problem| problem.to_string())?;
+    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut found: Vec<PathBuf> = files.filter(|file| is_description(file)).collect();
+    found.sort();
+    let names = found.iter().map(|file| file_name(file));
+    let names = names.collect::<Vec<_>>().join(", ");
+    match found.len() {
+        1 => Ok(found.remove(0)),
+        0 => Err(
+            "a folder without a description (.toml); `tapjoint init` prints one, or name a recording"
+                .to_owned(),
+        ),
+        count => Err(format!("a folder with {count} descriptions: {names}; name one")),
+    }
+}
+
 /// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens.
 fn report_folder(name: &str) -> String {
     let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
@@ -201,7 +231,6 @@ pub(super) fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn regress_report_folders_have_names_that_can_be_made() {

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use tapjoint::pipeline::Watch;
 use tapjoint::report::document::{Document, TimingsSection};
 use tapjoint::report::{
-    Screen, render_answer, render_json, render_readings, render_stages, render_text,
+    MOST_LINES, Screen, render_answer, render_json, render_readings, render_stages, render_text,
 };
 
 /// Destinations of a command's output.
@@ -150,7 +150,8 @@ impl Terminal {
         full: &FullAnswer,
     ) -> anyhow::Result<()> {
         let (screen, report) = (self.screen(), report.map(|path| path.display().to_string()));
-        let mut text = render_answer(document, report.as_deref(), screen);
+        let most = if full.full { usize::MAX } else { MOST_LINES };
+        let mut text = render_answer(document, report.as_deref(), most, screen);
         if full.full {
             text = format!("{text}\n{}", render_text(document, screen));
         }

@@ -2,14 +2,23 @@
 
 use crate::document::Document;
 use crate::screen::Screen;
-use crate::tables::Table;
+use crate::tables::{Table, answered_joint};
 use crate::words::answer::{Answer, MOST_MODES};
 
-/// Most lines of an answer, with the line of the report's path.
-const MOST_LINES: usize = 25;
+/// Most lines of an answer on 80 columns or more, with the line of the report's path.
+pub const MOST_LINES: usize = 25;
+/// Lines that the modes have at least: an empty line on either side, a heading, three of them, and the count of the others.
+const LEAST_OF_MODES: usize = 7;
+
 /// Returns the answer: how far it can be relied on, the modes, the joint, what is missing, and what to do.
-/// `report` is the path of the report, where one was written.
-pub fn render_answer(document: &Document, report: Option<&str>, screen: Screen) -> String {
+/// `report` is the path of the report, where one was written. Findings and modes for which `most` lines have no room are
+/// counted.
+pub fn render_answer(
+    document: &Document,
+    report: Option<&str>,
+    most: usize,
+    screen: Screen,
+) -> String {
     let answer = Answer::of(document);
     let mut title = answer.name.clone();
     if let Some(state) = answer.state {
@@ -22,19 +31,9 @@ pub fn render_answer(document: &Document, report: Option<&str>, screen: Screen) 
     if !answer.measured.is_empty() {
         head.push_str(&screen.wrapped(&answer.measured.join("; "), 2));
     }
-    let mut findings = String::new();
-    for finding in &answer.findings {
-        findings.push_str(&screen.wrapped(finding, 2));
-    }
-    let mut tail = answer
-        .joint
-        .as_ref()
-        .map_or(String::new(), |table| format!("{}\n", screen.table(table)));
-    // What changed comes before the frequencies that show it.
-    match answer.state {
-        Some(_) => tail.push_str(&findings),
-        None => head.push_str(&format!("\n{findings}")),
-    }
+    let joint = answered_joint(&answer.values, answer.model.as_deref());
+    let joint = joint.map_or(String::new(), |table| screen.table(&table) + "\n");
+    let mut tail = String::new();
     if let Some(action) = &answer.action {
         tail.push_str(&screen.wrapped(&format!("> {action}"), 2));
     }
@@ -42,9 +41,33 @@ pub fn render_answer(document: &Document, report: Option<&str>, screen: Screen) 
     if let Some(report) = report {
         tail.push_str(&format!("Report  {report}\n"));
     }
-    let rest = head.lines().count() + tail.lines().count();
-    let modes = modes(document, &answer, MOST_LINES.saturating_sub(rest), screen);
-    format!("{head}\n{modes}{tail}")
+    let used = [&head, &joint, &tail].map(|part| part.lines().count());
+    let room = most.saturating_sub(used.iter().sum());
+    let findings = findings(&answer, room.saturating_sub(LEAST_OF_MODES), screen);
+    let room = room.saturating_sub(findings.lines().count());
+    let modes = modes(document, &answer, room, screen);
+    // What changed comes before the frequencies that show it.
+    match answer.state {
+        Some(_) => format!("{head}\n{modes}{joint}{findings}{tail}"),
+        None => format!("{head}\n{findings}\n{modes}{joint}{tail}"),
+    }
+}
+
+/// The findings in so many lines: the first ones where there is no room for all.
+fn findings(answer: &Answer, lines: usize, screen: Screen) -> String {
+    let mut text = String::new();
+    for (place, finding) in answer.findings.iter().enumerate() {
+        let own = screen.wrapped(finding, 2);
+        let others = answer.findings.len() - place;
+        // The first always stands, and the line that counts the others needs room.
+        let needed = text.lines().count() + own.lines().count() + usize::from(others > 1);
+        if place > 0 && needed > lines {
+            text.push_str(&format!("and {others} more (--full)\n"));
+            break;
+        }
+        text.push_str(&own);
+    }
+    text
 }
 
 /// The modes in so many lines: the strongest where there is no room for all.

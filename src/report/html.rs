@@ -5,7 +5,7 @@ use askama::Template;
 use super::ReportError;
 use super::document::{Document, WarningSection};
 use super::format::{capital, significant, trimmed};
-use super::tables::{self, AnsweredValue, Table, answered_values};
+use super::tables::{self, Table};
 use super::words::answer::Answer;
 use super::words::diagnosis::gap_story;
 use super::words::findings::{no_estimate, sentences};
@@ -55,9 +55,6 @@ struct Page<'a> {
     title: String,
     facts: Vec<(&'static str, String)>,
     answer: Answer,
-    values: Vec<AnsweredValue>,
-    /// Model of the values: "with sensor-mass"; `None` where it is the described one.
-    model: Option<String>,
     /// The picture of the first screen.
     first_figure: Option<&'a InlineFigure>,
     warnings: Vec<&'a WarningSection>,
@@ -131,12 +128,6 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
         },
         facts: facts(document),
         answer: Answer::of(document),
-        values: answered_values(document),
-        model: document
-            .headline
-            .as_ref()
-            .filter(|found| !found.is_described())
-            .map(|found| found.model.clone()),
         first_figure: figures.iter().find(|figure| figure.section == "answer"),
         warnings,
         hidden_warnings,
@@ -160,7 +151,8 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     page.render().map_err(ReportError::Html)
 }
 
-/// Returns the warnings that are listed, the worst first, and the number of others. Many tests have many doubts of one kind: a few stand for all.
+/// Returns the warnings that are listed, the worst first, and the number of others. Many tests have many doubts of one
+/// kind: a few stand for all.
 fn listed_warnings(document: &Document) -> (Vec<&WarningSection>, usize) {
     let mut listed: Vec<&WarningSection> = Vec::new();
     let mut hidden = 0;

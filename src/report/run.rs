@@ -55,16 +55,16 @@ pub fn draw_run(
 fn leading(recordings: &[RecordingResult]) -> Option<Chart> {
     let modes = |one: &&RecordingResult| one.mode_numbers.iter().flatten().count();
     let recording = recordings.iter().rev().max_by_key(modes)?;
-    let chart = frf(recording, &recording.file, &given_frfs(recording), &[]);
-    let mut chart = chart.or_else(|| spectrum(recording, &recording.file))?;
-    chart.kind = "answer";
-    chart.caption = match chart.caption.contains("fitted") {
-        true => format!(
-            "{}: measured, and the fitted modes as thin lines.",
-            recording.file
-        ),
-        false => format!("{}: averaged spectra.", recording.file),
+    let (file, frfs) = (&recording.file, given_frfs(recording));
+    let chart = frf(recording, file, &frfs, &[]);
+    let what = match (&chart, frfs.iter().any(|frf| frf.fitted.is_some())) {
+        (Some(_), true) => "measured, and the fitted modes as thin lines",
+        (Some(_), false) => "measured",
+        (None, _) => "averaged spectra",
     };
+    let mut chart = chart.or_else(|| spectrum(recording, file))?;
+    chart.kind = "answer";
+    chart.caption = format!("{file}: {what}.");
     chart.width = LEADING_WIDTH;
     let first = chart.blocks.swap_remove(0);
     chart.blocks = vec![Block::new(1, first.panels.into_iter().take(1).collect())];

@@ -337,3 +337,16 @@ pub fn together(warnings: Vec<Warning>) -> Vec<Warning> {
     }
     kept
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prop_every_severe_code_is_one_of_the_list() {
+        let unknown = OF_THE_ANSWER
+            .iter()
+            .filter(|code| meaning_of(code).is_none());
+        assert_eq!(unknown.count(), 0);
+    }
+}

@@ -5,8 +5,8 @@ use crate::document::{Document, GapSection};
 use crate::format::{probability, rounded, signed_percent};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
 use crate::words::diagnosis::{found_best, place_of};
-use crate::words::sizes::NORMAL;
 use tapjoint_diagnosis::{LocationMap, Residual};
+use tapjoint_numerics::stats::NORMAL_95;
 
 /// Hypotheses shown.
 const MOST_BARS: usize = 9;
@@ -155,7 +155,7 @@ pub fn place_map(document: &Document) -> Option<Chart> {
         alone.push(set);
         let mut set = along(map, name, color, changes);
         for (change, std) in changes.iter().zip(stds) {
-            let half = NORMAL * std;
+            let half = NORMAL_95 * std;
             set.low.push(100.0 * (change - half));
             set.high.push(100.0 * (change + half));
             let said = rounded(100.0 * change, Some(100.0 * half));
@@ -178,12 +178,12 @@ pub fn place_map(document: &Document) -> Option<Chart> {
         title: "Where along the beam".to_owned(),
         subtitle: format!(
             "above: what one place alone would explain; below: what all places together ask for, smeared over {:.0} mm, \
-             bands: 95 % intervals",
+             bands: 1.96 standard deviations",
             1e3 * map.resolution
         ),
         caption: "Where along the beam a local change of stiffness or of mass would explain the errors: above each \
-                  place by itself, which peaks where a local cause sits; below all places together, bands: 95 % \
-                  intervals."
+                  place by itself, which peaks where a local cause sits; below all places together, bands: 1.96 \
+                  standard deviations."
             .to_owned(),
         blocks: vec![Block::new(1, panels)],
         ..Chart::default()

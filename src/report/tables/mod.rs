@@ -9,7 +9,7 @@ mod recordings;
 mod series;
 
 pub use answer::{
-    AnsweredValue, answered_changes, answered_joint, answered_modes, answered_values,
+    AnsweredValue, Limited, answered_changes, answered_joint, answered_modes, answered_values,
 };
 pub use comparison::{changed_dampings, changed_joint, changed_modes, changes, compared_tests};
 pub use diagnosis::{hypotheses, next_tests};

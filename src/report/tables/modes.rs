@@ -1,6 +1,5 @@
 //! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
-use super::answer::damping;
 use super::{
     Cell, Place, Table, bound_of, coherence, mode_name, mode_of, number, page_number, page_words,
     words,
@@ -8,12 +7,16 @@ use super::{
 use crate::document::{Document, ModeSection, PredictionSection, ReadBy, is_strong, method_name};
 use crate::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
-    or_missing, rounded_to, signed_percent, significant, trimmed, unit_words, with_decimals_of,
+    or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
+    with_decimals_of,
 };
+use tapjoint_numerics::stats::NORMAL_95;
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
 const LAMBDA_DIGITS: i32 = 6;
+/// Most significant digits of a damping ratio.
+const DAMPING_DIGITS: i32 = 4;
 
 /// Returns true for what tables show: resonances, and strong peaks that are none.
 fn is_shown(mode: &&ModeSection) -> bool {
@@ -369,6 +372,15 @@ fn row(mode: &ModeSection) -> [Cell; 14] {
         page_number("Random error (%)", optional(random_error, 2)),
         words("Recording", or_missing(mode.recording.as_ref())),
     ]
+}
+
+/// "1.200 \u{b1} 0.002": the damping ratio (%) with half its 95 % interval.
+pub(super) fn damping(mode: &ModeSection) -> Option<String> {
+    let ratio = mode.damping?;
+    let own = mode.fit.as_ref();
+    let half = own.map(|fit| 50.0 * (fit.damping_high - fit.damping_low));
+    let half = half.or(mode.damping_std.map(|std| 100.0 * NORMAL_95 * std));
+    Some(rounded_digits(100.0 * ratio, half, DAMPING_DIGITS).joined())
 }
 
 /// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.

@@ -2,13 +2,16 @@
 
 use super::comparison;
 use super::diagnosis::{brief_verdict, next_in_short, shows_gap};
-use super::findings::{no_estimate, tapped_channels, taps};
+use super::findings::{described, no_estimate, tapped_channels, taps};
 use super::series;
 use crate::document::Document;
 use crate::format::capital;
-use crate::tables::{Table, answered_changes, answered_joint, answered_modes, quality_count};
+use crate::tables::{
+    AnsweredValue, Table, answered_changes, answered_modes, answered_values, quality_count,
+};
 use tapjoint_analysis::{meaning_of, severity_of};
 use tapjoint_diagnosis::{Hypothesis, Verdict};
+use tapjoint_signal::quality::{Outcome, Subject};
 
 /// How far an answer can be relied on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,8 +77,10 @@ pub struct Answer {
     pub modes: Option<Table>,
     /// Places of the modes in the table, the strongest first.
     pub strongest: Vec<usize>,
-    /// The joint, as described and with what is missing; `None` without an estimate.
-    pub joint: Option<Table>,
+    /// The joint, as described and with what is missing; without a joint the beam.
+    pub values: Vec<AnsweredValue>,
+    /// What the first values belong to, "with sensor-mass"; `None` where that is the described model.
+    pub model: Option<String>,
     /// What was found, in a few sentences.
     pub findings: Vec<String>,
     /// What to do next; `None` where nothing is needed.
@@ -93,6 +98,8 @@ impl Answer {
             false => answered_modes(document),
         };
         let (state, reason) = state(document);
+        let headline = document.headline.as_ref();
+        let headline = headline.filter(|found| !found.is_described());
         Answer {
             state: Some(state).filter(|_| !is_comparison),
             doubts: doubts(document, &reason),
@@ -101,14 +108,13 @@ impl Answer {
             measured: measured(document),
             modes,
             strongest,
-            joint: answered_joint(document),
+            values: answered_values(document),
+            model: headline.map(|found| found.model.clone()),
             findings: findings(document),
             action: action(document),
         }
     }
-}
 
-impl Answer {
     /// Rows of the strongest modes, so many at most, in their order.
     pub fn strongest_rows(&self, most: usize) -> Vec<&Vec<String>> {
         let mut places: Vec<usize> = self.strongest.iter().copied().take(most).collect();
@@ -168,7 +174,13 @@ fn state(document: &Document) -> (State, String) {
     let codes = document.main_warnings().map(|one| one.code.as_str());
     let of_answer = codes.filter(|code| severity_of(code).is_some());
     let worst = of_answer.min_by_key(|code| severity_of(code));
-    match said.or(worst.and_then(meaning_of)) {
+    // Where no model tests the frequencies, a bad reading of one is a doubt about the answer.
+    let of_mode = |subject: &Subject| matches!(subject, Subject::Mode { is_mode: true, .. });
+    let mut checks = document.quality.iter().flatten();
+    let bad = checks.find(|one| one.outcome == Outcome::Bad && of_mode(&one.subject));
+    let bad = bad.filter(|_| document.estimate.is_none());
+    let bad = bad.map(|one| one.check.code());
+    match said.or(worst.or(bad).and_then(meaning_of)) {
         Some(words) => (State::Doubtful, words.to_owned()),
         None => (State::Good, String::new()),
     }
@@ -208,19 +220,7 @@ fn action(document: &Document) -> Option<String> {
     if let Some(forgotten) = warnings.find(|one| one.code == "hammer-channel") {
         return Some(format!("{}.", capital(&forgotten.text)));
     }
-    let bare = document
-        .test
-        .as_ref()
-        .is_some_and(|test| test.kind.is_none());
-    let found = document
-        .modes
-        .as_ref()
-        .is_some_and(|modes| !modes.is_empty());
-    (bare && found).then(|| {
-        "Describe the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml): this adds mode numbers, the joint and what the \
-         model misses."
-            .to_owned()
-    })
+    described(document)
 }
 
 /// Returns each kind of doubt once, the worst first, but for the one that `reason` gives.

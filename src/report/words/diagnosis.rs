@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::sizes::{NORMAL, left, percent, sizes, stiffness_with_limits};
+use super::sizes::{left, percent, sizes, stiffness_with_limits};
 use crate::document::{Document, GapSection};
 use crate::format::{capital, probability, rounded, signed_percent, significant, trimmed};
 use tapjoint_beam::effects::{EffectId, Group, Place};
@@ -10,7 +10,7 @@ use tapjoint_diagnosis::{
     Closure, CommonFactor, Hypothesis, HypothesisResult, NextTest, Proposal, Residual, Thresholds,
     UnlocatedSensors, Verdict,
 };
-use tapjoint_numerics::stats::times;
+use tapjoint_numerics::stats::{NORMAL_95, times};
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
 pub fn gap_story(document: &Document) -> Vec<String> {
@@ -253,7 +253,7 @@ fn along_decays(gap: &GapSection) -> Option<String> {
         format!(
             "its rotational stiffness changes by {} \u{b1} {:.1} % at the largest amplitude",
             change(100.0 * found.ratio, 1),
-            100.0 * NORMAL * found.ratio_std
+            100.0 * NORMAL_95 * found.ratio_std
         )
     } else {
         "modes that hardly rotate the joint change too, so the size stays open".to_owned()
@@ -425,7 +425,7 @@ fn scale_of(effects: &[EffectId], gap: &GapSection) -> String {
 
 /// "+1.02 \u{b1} 0.20": a common factor and half its 95 % interval.
 fn asked(factor: &CommonFactor) -> String {
-    let text = rounded(factor.percent, Some(NORMAL * factor.std_percent)).joined();
+    let text = rounded(factor.percent, Some(NORMAL_95 * factor.std_percent)).joined();
     match text.starts_with('-') || text.starts_with('\u{2212}') {
         true => text,
         false => format!("+{text}"),

@@ -1,12 +1,12 @@
 //! The findings in a few plain sentences, for the page.
 
 use super::diagnosis::{gap_in_short, gap_story, listed};
-use super::sizes::stiffness_with_limits;
+use super::sizes::{limits, stiffness_with_limits};
 use super::{comparison, series};
 use crate::document::{
     Document, EstimateSection, HeadlineSection, HeadlineValue, PredictionSection, ReadBy,
 };
-use crate::format::{bound_percent, capital, signed_or_below, significant, trimmed};
+use crate::format::{MISSING, bound_percent, capital, signed_or_below, significant, trimmed};
 use crate::picture::extent;
 use crate::tables::{Parameter, estimated, quality_count, reading_bound};
 use tapjoint_identify::observation::UNPAIRED;
@@ -132,7 +132,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
 }
 
 /// Tells what a description would add to a bare recording; `None` where there is one, and without an analysis.
-fn described(document: &Document) -> Option<String> {
+pub(super) fn described(document: &Document) -> Option<String> {
     let bare = document
         .test
         .as_ref()
@@ -140,8 +140,8 @@ fn described(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref().unwrap_or_default();
     let analysed = document.recordings.is_some() && !modes.is_empty();
     (bare && analysed && document.frfs.is_none()).then(|| {
-        "A description of the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml) would add mode numbers, measured \
-         beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
+        "Describe the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml): this adds mode numbers, the joint and what the \
+         model misses."
             .to_owned()
     })
 }
@@ -250,23 +250,16 @@ fn joint_if_confirmed(document: &Document) -> Option<String> {
 fn stiffness(parameter: &Parameter<'_>) -> String {
     let [value, _, low, high, unit] = parameter.written();
     let unit = behind(parameter, &unit.replace(' ', "\u{a0}"));
-    let limits = match (parameter.value.low, parameter.value.high) {
+    let [low, high] = [&low, &high].map(|end| Some(end.as_str()).filter(|end| *end != MISSING));
+    let interval = match (parameter.value.low, parameter.value.high) {
         // More digits of a stiffness than that say nothing; how narrow the interval is does.
         (Some(from), Some(to)) if low == high && to > from && parameter.value.value != 0.0 => {
-            format!(
-                "\u{b1}{} %",
-                significant(50.0 * (to - from) / parameter.value.value.abs(), 2)
-            )
+            let half = 50.0 * (to - from) / parameter.value.value.abs();
+            Some(format!("\u{b1}{} %", significant(half, 2)))
         }
-        (Some(_), Some(_)) => format!("{low} to {high}"),
-        (Some(_), None) => format!("above {low}"),
-        (None, Some(_)) => format!("below {high}"),
-        (None, None) => String::new(),
+        _ => limits(low, high),
     };
-    let interval = match limits.is_empty() {
-        true => String::new(),
-        false => format!(" (95 %: {limits})"),
-    };
+    let interval = interval.map_or_else(String::new, |limits| format!(" (95 %: {limits})"));
     format!(
         "{} {}\u{a0}=\u{a0}{value}{unit}{interval}",
         parameter.meaning, parameter.symbol

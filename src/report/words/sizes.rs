@@ -1,11 +1,10 @@
 //! Sizes in words: parameters of effects, stiffnesses, and errors in percent.
 
-use crate::format::{RIGID, or_missing, prefix, rounded, significant};
+use crate::format::{RIGID, or_missing, prefix, rounded, significant, with_decimals_of};
 use tapjoint_beam::effects::Group;
 use tapjoint_diagnosis::{HypothesisResult, ParameterValue};
+use tapjoint_numerics::stats::NORMAL_95;
 
-/// Standard deviations on either side that hold 95 % of a normal distribution.
-pub(crate) const NORMAL: f64 = 1.96;
 /// A size below this is zero but for rounding, in the unit that it is written in.
 const NOTHING: f64 = 1e-9;
 
@@ -48,7 +47,7 @@ fn size(parameter: &ParameterValue) -> String {
     }
     let (unit, factor) = unit_of(parameter);
     let value = factor * parameter.value;
-    let half = parameter.std.map(|std| factor * NORMAL * std);
+    let half = parameter.std.map(|std| factor * NORMAL_95 * std);
     let size = match half.filter(|half| half.is_finite() && *half > 0.0) {
         Some(half) => rounded(value, Some(half)).joined(),
         None if value.abs() < NOTHING => "0".to_owned(),
@@ -96,14 +95,34 @@ pub(crate) fn stiffness_with_limits(value: f64, interval: Option<[f64; 2]>, unit
         return RIGID.to_owned();
     }
     let (factor, letter) = prefix(value);
-    let known = interval.filter(|ends| ends.iter().all(|end| end.is_finite()));
-    let Some([low, high]) = known.map(|ends| ends.map(|end| factor * end)) else {
-        return format!("{}\u{a0}{letter}{unit}", significant(factor * value, 4));
-    };
-    // All with the digits that the interval supports.
-    let shown = rounded(factor * value, Some(0.5 * (high - low))).value;
-    let decimals = shown.split_once('.').map_or(0, |(_, behind)| behind.len());
-    format!("{shown}\u{a0}{letter}{unit} (95 %: {low:.decimals$} to {high:.decimals$})")
+    let [low, high] = [0, 1].map(|end| interval.map(|ends| factor * ends[end]));
+    let (shown, limits) = with_limits(factor * value, low, high);
+    let limits = limits.map_or_else(String::new, |limits| format!(" (95 %: {limits})"));
+    format!("{shown}\u{a0}{letter}{unit}{limits}")
+}
+
+/// "1.995" and "1.991 to 1.999", all with the digits that the interval supports; an end that is not finite is none.
+pub(crate) fn with_limits(
+    value: f64,
+    low: Option<f64>,
+    high: Option<f64>,
+) -> (String, Option<String>) {
+    let [low, high] = [low, high].map(|end| end.filter(|end| end.is_finite()));
+    let half = low.zip(high).map(|(low, high)| 0.5 * (high - low));
+    let shown = rounded(value, half).value;
+    let [low, high] = [low, high].map(|end| end.map(|end| with_decimals_of(end, &shown)));
+    let limits = limits(low.as_deref(), high.as_deref());
+    (shown, limits)
+}
+
+/// "1.991 to 1.999", "above 1.991" or "below 1.999"; `None` without an end.
+pub(crate) fn limits(low: Option<&str>, high: Option<&str>) -> Option<String> {
+    match (low, high) {
+        (Some(low), Some(high)) => Some(format!("{low} to {high}")),
+        (Some(low), None) => Some(format!("above {low}")),
+        (None, Some(high)) => Some(format!("below {high}")),
+        (None, None) => None,
+    }
 }
 
 #[cfg(test)]

@@ -70,8 +70,9 @@ impl SpectralAverager {
 
     /// H1 = Gfx/Gff of a response on a line so far (unit of the response per N); 0 where the force has no power.
     pub fn h1(&self, response: usize, line: usize) -> Complex64 {
-        match self.cross[response].get(line) {
-            Some(cross) if self.force_power[line] > 0.0 => cross / self.force_power[line],
+        let cross = self.cross.get(response).and_then(|cross| cross.get(line));
+        match (cross, self.force_power.get(line)) {
+            (Some(cross), Some(&power)) if power > 0.0 => cross / power,
             _ => Complex64::ZERO,
         }
     }

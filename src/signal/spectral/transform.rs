@@ -15,7 +15,7 @@ use super::{DISPLAY_RATIO, Lines, smallest_smooth_block};
 /// The Fourier transform X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate} of windowed records (unit of
 /// the samples times s) on given lines; time zero is a record's first sample.
 ///
-/// Over the full band of a block that is one FFT, and so are lines that an FFT of no more samples has. Into another band
+/// Lines of a real FFT, as those of the full band, come from one. Into another band
 /// a record is mixed down, low-pass filtered, decimated and transformed on the band's own lines, as an analyser does.
 /// Everything that does not depend on the samples is computed once, here.
 #[derive(Debug)]
@@ -27,9 +27,13 @@ pub struct Transformer {
 }
 
 enum Plan {
-    /// A real FFT, of whose lines these begin with this one. On lines 1/(n samples) apart, samples n apart turn by the same
-    /// angle: a longer record is wrapped to n samples by addition.
-    Real(Arc<dyn RealToComplex<f64>>, usize),
+    /// A real FFT of n samples, where the lines are its own. On its lines samples n apart turn by the same angle, so a longer
+    /// record is wrapped: they are added.
+    Real {
+        fft: Arc<dyn RealToComplex<f64>>,
+        /// Number of the first line.
+        first: usize,
+    },
     /// Lines anywhere, without decimation.
     Lines(Chirp),
     /// A zoom band.
@@ -51,14 +55,18 @@ pub struct Workspace {
 impl Transformer {
     /// Plans the transform of records of at most `length` samples at `sample_rate` (Hz) on `lines`.
     pub fn new(sample_rate: f64, lines: Lines, length: usize) -> Self {
-        // Numbers of samples and of lines before the first; both are whole where the lines are those of an FFT.
+        // Numbers of samples and of lines before the first; both are whole where the lines are those of an FFT. 1e-9 is far
+        // above their rounding, and moves a line by no more than that part of its frequency.
         let samples = sample_rate / lines.spacing;
         let before = lines.low / lines.spacing;
         let are_whole = (samples - samples.round()).abs() < 1e-9 * samples
             && (before - before.round()).abs() < 1e-9 * samples;
         let (samples, before) = (samples.round() as usize, before.round() as usize);
         let plan = if are_whole {
-            Plan::Real(RealFftPlanner::new().plan_fft_forward(samples), before)
+            Plan::Real {
+                fft: RealFftPlanner::new().plan_fft_forward(samples),
+                first: before,
+            }
         } else {
             Plan::zoomed(sample_rate, lines, length.max(1))
         };
@@ -113,7 +121,7 @@ impl Transformer {
         values: &mut Vec<Complex64>,
     ) {
         match &self.plan {
-            Plan::Real(fft, before) => {
+            Plan::Real { fft, first } => {
                 // A shorter record is padded with zeros.
                 let length = fft.len().min(samples.len());
                 let (kept, wrapped) = samples.split_at_mut(length);
@@ -126,7 +134,7 @@ impl Transformer {
                 // It refuses buffers of a wrong length alone, and these have just been given theirs.
                 let done = fft.process_with_scratch(samples, values, scratch);
                 debug_assert!(done.is_ok(), "{done:?}");
-                values.drain(..before);
+                values.drain(..first);
                 values.truncate(self.lines.points());
             }
             Plan::Lines(chirp) => {
@@ -178,7 +186,7 @@ impl Plan {
 impl fmt::Debug for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Plan::Real(fft, before) => write!(f, "Real({}, {before})", fft.len()),
+            Plan::Real { fft, first } => write!(f, "Real({}, {first})", fft.len()),
             Plan::Lines(chirp) => f.debug_tuple("Lines").field(chirp).finish(),
             Plan::Zoom { chirp, .. } => f.debug_tuple("Zoom").field(chirp).finish(),
         }

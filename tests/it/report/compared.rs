@@ -2,13 +2,16 @@
 
 use super::{fixture, names, spectra_of, text_of, words_of};
 use tapjoint::compare::{
-    ChangeVerdict, Comparison, ModeChange, RepeatabilityOrigin, RepeatabilityResult, VerdictKind,
+    self, ChangeVerdict, Comparison, LeftOutMode, ModeChange, RepeatabilityOrigin,
+    RepeatabilityResult, VerdictKind,
 };
 use tapjoint::pipeline::RecordingResult;
 use tapjoint::report::charts::comparison_spectra::overlay;
-use tapjoint::report::document::{ComparisonSection, Document, PairFiles, VERSION, WarningSection};
+use tapjoint::report::document::{
+    ComparisonSection, Document, PairFiles, SeriesSection, VERSION, WarningSection,
+};
 use tapjoint::report::picture::{Block, Chart, Color, Mark, Panel, Series};
-use tapjoint::report::{ComparedRecordings, render_compared};
+use tapjoint::report::{ComparedRecordings, MOST_LINES, Screen, render_answer, render_compared};
 
 /// Changes of the five modes (%).
 const CHANGES: [f64; 5] = [-0.9, -0.4, -0.2, -0.1, 0.05];
@@ -342,5 +345,30 @@ fn prop_a_report_on_a_comparison_has_its_files_alone() {
     assert!(
         rows.contains("\n1,2,118.04,117.56784,-0.4,0,-0.3,0.05,"),
         "{rows}"
+    );
+}
+
+#[test]
+fn limit_an_answer_with_many_findings_keeps_to_its_lines() {
+    let tests: Vec<String> = (1..=40).map(|test| format!("week{test}.toml")).collect();
+    let left_out = (1..=39).map(|test| LeftOutMode { mode: 3, test });
+    let series = compare::Series {
+        charts: Vec::new(),
+        first: None,
+        is_stated: true,
+        matched: Vec::new(),
+        left_out: left_out.collect(),
+    };
+    let document = Document {
+        series: Some(SeriesSection { tests, series }),
+        ..Document::default()
+    };
+    let answer = |most: usize| render_answer(&document, None, most, Screen::default());
+    let (short, full) = (answer(MOST_LINES), answer(usize::MAX));
+    assert!(short.lines().count() <= MOST_LINES, "{short}");
+    assert!(short.contains("more (--full)"), "{short}");
+    assert!(
+        !full.contains("more (--full)") && full.contains("week40.toml"),
+        "{full}"
     );
 }

@@ -11,7 +11,7 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::tables::{hypotheses, next_tests};
 use tapjoint::report::words::diagnosis::{gap_in_short, gap_story};
-use tapjoint::report::{Screen, render_answer, render_text};
+use tapjoint::report::{MOST_LINES, Screen, render_answer, render_text};
 use tapjoint::structure::Assembly;
 
 use crate::golden::assert_snapshot;
@@ -412,7 +412,7 @@ fn regress_the_table_has_the_size_told_apart_and_the_baseline() {
 #[test]
 fn limit_the_state_follows_the_verdict() {
     let state = |verdict: Verdict| {
-        let answer = render_answer(&gap_with(verdict), None, Screen::default());
+        let answer = render_answer(&gap_with(verdict), None, MOST_LINES, Screen::default());
         let first = answer.lines().next().unwrap_or_default();
         first.split_once(": ").unwrap().1.to_owned()
     };

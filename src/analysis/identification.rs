@@ -401,6 +401,23 @@ pub struct SampledShape {
     pub displacements: Vec<f64>,
 }
 
+impl SampledShape {
+    /// Displacement at a place (m), between the points next to it; beyond the ends that of the end.
+    pub fn at(&self, place: f64) -> f64 {
+        let after = self.positions.partition_point(|x| *x < place);
+        let points = self.positions.iter().zip(&self.displacements);
+        let mut near = points.skip(after.saturating_sub(1));
+        match (near.next(), near.next()) {
+            (Some((x0, y0)), Some((x1, y1))) if after > 0 && x1 > x0 => {
+                y0 + (y1 - y0) * (place - x0) / (x1 - x0)
+            }
+            (Some(_), Some((_, y))) if after > 0 => *y,
+            (Some((_, y)), _) => *y,
+            (None, _) => 0.0,
+        }
+    }
+}
+
 /// Shapes of the predicted modes: of the structure that the prediction is of, shear, masses of sensors
 /// and a lap joint's two halves included. Empty where nothing could be predicted.
 pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {

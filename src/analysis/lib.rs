@@ -23,6 +23,7 @@ mod function_file;
 mod function_fits;
 mod identification;
 mod lengths;
+mod measured_shapes;
 mod measurement;
 mod mode_file;
 mod modes;
@@ -49,6 +50,9 @@ use function_file::measure_functions;
 use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
+pub use measured_shapes::{
+    MeasuredShape, ShapeAgreement, ShapeBy, ShapePoint, measured_shapes, shape_agreement,
+};
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };

@@ -9,7 +9,7 @@ use tapjoint_signal::spectral::FrfEstimator;
 
 use crate::charts::comparison_spectra::ComparedRecordings;
 use crate::charts::diagnosis::{gap, place_map};
-use crate::charts::joint::{cloud, frequencies, shapes};
+use crate::charts::joint::{agreement, cloud, frequencies, shapes};
 use crate::charts::modes::{amplitude, stabilisation};
 use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
@@ -24,7 +24,7 @@ use crate::{
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
 /// `taps.csv` where there are taps, `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
-/// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `cloud`,
+/// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `shape-agreement`, `cloud`,
 /// `gap`, `gap-place`.
 ///
 /// # Errors
@@ -266,7 +266,7 @@ fn inline_figure(chart: &Chart, drawing: &Drawing) -> Result<InlineFigure, Repor
         section: match chart.kind {
             "answer" => "answer",
             "taps" => "recordings",
-            "frequencies" | "mode-shapes" => "joint",
+            "frequencies" | "mode-shapes" | "shape-agreement" => "joint",
             "gap" | "gap-place" => "gap",
             "cloud" => "uncertainty",
             "compare" | "compare-spectra" => "compare",
@@ -301,6 +301,7 @@ fn pictures(document: &Document, recordings: &[RecordingResult]) -> Vec<(String,
     let of_model = [
         frequencies(document),
         shapes(document),
+        agreement(document),
         gap(document),
         place_map(document),
         cloud(document),
@@ -345,7 +346,14 @@ const TABLES: [&str; 4] = [
     "perturbation.csv",
 ];
 /// Pictures of the whole test.
-const OF_TEST: [&str; 5] = ["frequencies", "mode-shapes", "cloud", "gap", "gap-place"];
+const OF_TEST: [&str; 6] = [
+    "frequencies",
+    "mode-shapes",
+    "shape-agreement",
+    "cloud",
+    "gap",
+    "gap-place",
+];
 /// Pictures of each recording, followed by its name.
 const OF_RECORDING: [&str; 5] = ["spectrum", "frf", "stabilisation", "amplitude", "taps"];
 

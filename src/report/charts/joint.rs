@@ -9,7 +9,7 @@ use crate::document::{Document, EstimateMethod, PredictionSection};
 use crate::format::{rounded_to, signed, signed_percent, significant};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
 use crate::tables::{patterns_in_words, reading_bound};
-use tapjoint_analysis::SampledShape;
+use tapjoint_analysis::{MeasuredShape, SampledShape, ShapeAgreement, ShapeBy};
 use tapjoint_beam::Assembly;
 
 /// Most modes whose frequencies fit under the picture side by side, and with their words.
@@ -349,6 +349,8 @@ fn stiffness_axis(values: impl Iterator<Item = f64>) -> Axis {
 
 /// Shapes in a row.
 const ACROSS: usize = 3;
+/// Height of a row of a matrix (pixels).
+const CELL: f64 = 44.0;
 /// Most shapes drawn: a dozen fits a page.
 const MOST_SHAPES: usize = 12;
 
@@ -368,29 +370,94 @@ pub fn shapes(document: &Document) -> Option<Chart> {
     let kind = document.kind();
     let mut panels = Vec::new();
     for shape in shapes.iter().take(MOST_SHAPES) {
-        panels.push(shape_panel(shape, &sensors, &taps, kind));
+        let measured = document.measured_shapes.iter().flatten();
+        let measured = measured.filter(|one| one.mode == shape.mode).collect();
+        panels.push(shape_panel(shape, measured, &sensors, &taps, kind));
     }
+    let caption = match document.measured_shapes {
+        Some(_) => {
+            "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. Points: \
+             measured at sensors, or at taps by reciprocity, and scaled to fit each curve best. Bars: 95 % by noise and the \
+             scatter of the taps. Where points of all modes lie off at one sensor, its scale or its place is wrong."
+        }
+        None => {
+            "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. They are not \
+             measured: that takes two sensors, or taps at two places."
+        }
+    };
     (!panels.is_empty()).then(|| Chart {
         kind: "mode-shapes",
         title: "Mode shapes".to_owned(),
-        subtitle: "displacement over the position along the beam, each relative to its largest".to_owned(),
-        caption: "Shapes of the predicted modes, of the described beam on the estimated joint with what sits \
-                  on it. A sensor or a tap near a node hardly sees the mode."
+        subtitle: "displacement over the position along the beam, each relative to its largest"
             .to_owned(),
+        caption: caption.to_owned(),
         blocks: vec![Block::new(ACROSS, panels)],
         ..Chart::default()
     })
 }
 
+/// Agreement of measured and predicted shapes as a matrix; `None` where no set-up has enough places.
+pub fn agreement(document: &Document) -> Option<Chart> {
+    let ShapeAgreement {
+        recordings,
+        by,
+        places,
+        measured,
+        predicted,
+        values,
+    } = document.shape_agreement.as_ref()?;
+    let number = |modes: &[usize], sign: f64| {
+        let modes = modes.iter().enumerate();
+        modes
+            .map(|(at, mode)| (sign * at as f64, mode.to_string()))
+            .collect::<Vec<_>>()
+    };
+    let x = Axis::linear(-0.5, predicted.len() as f64 - 0.5)
+        .of("predicted mode", "")
+        .named(number(predicted, 1.0));
+    let y = Axis::linear(0.5 - measured.len() as f64, 0.5)
+        .of("measured mode", "")
+        .named(number(measured, -1.0));
+    let mut cells = Series::new("", Color::Blue, Mark::Cell);
+    for (row, values) in values.iter().enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            cells.push(column as f64, -(row as f64));
+            cells.low.push(*value);
+            cells.labels.push(format!("{value:.2}"));
+        }
+    }
+    let panel = Panel::new(CELL * measured.len() as f64, x, y).with([cells]);
+    let what = match by {
+        ShapeBy::Sensors => format!("{places} sensors of {}", recordings.join(", ")),
+        ShapeBy::Taps => format!("taps at {places} places"),
+    };
+    Some(Chart {
+        kind: "shape-agreement",
+        title: "Modal assurance criterion".to_owned(),
+        subtitle: format!("measured against predicted shapes \u{b7} {what}"),
+        caption: format!(
+            "Modal assurance criterion (MAC) of measured and predicted shapes, {what}: 1 for shapes that are alike, 0 for \
+             shapes that share nothing. With few places different shapes may look alike."
+        ),
+        blocks: vec![Block::new(1, vec![panel])],
+        ..Chart::default()
+    })
+}
+
+/// A panel of one mode: its predicted curve, what was measured of it, and the places of sensors and taps on the axis.
 fn shape_panel(
     shape: &SampledShape,
+    measured: Vec<&MeasuredShape>,
     sensors: &BTreeMap<&str, Vec<f64>>,
     taps: &[f64],
     kind: Option<Assembly>,
 ) -> Panel {
     let end = 1e3 * shape.positions.last().copied().unwrap_or(1.0);
     let x = Axis::linear(0.0, end).of("position", "mm");
-    let y = Axis::linear(-1.2, 1.2).of("displacement", "");
+    let points = measured.iter().flat_map(|one| &one.points);
+    let points = points.map(|point| point.displacement);
+    let (low, high) = extent(points.chain([-1.0, 1.0])).unwrap_or((-1.0, 1.0));
+    let y = Axis::linear(low - 0.2, high + 0.2).of("displacement", "");
     let points = shape.positions.iter().zip(&shape.displacements);
     let points: Vec<(f64, f64)> = points.map(|(at, y)| (1e3 * at, *y)).collect();
     let mut series = Vec::new();
@@ -414,20 +481,25 @@ fn shape_panel(
         Mark::Square(5.0),
         joint,
     ));
-    let mut tapped = Series::new("tap", Color::Vermilion, Mark::Cross(6.0));
+    let mut tapped = Series::new("tap", Color::Vermilion, Mark::Cross(5.0));
     for place in taps {
-        tapped.push(1e3 * place, displacement(shape, *place));
-        tapped.words.push(format!("mode {}", shape.mode));
+        tapped.push(1e3 * place, 0.0);
+        tapped
+            .words
+            .push(format!("at {} mm", significant(1e3 * place, 4)));
     }
     series.push(tapped);
     for (name, places) in sensors {
-        let mut sensed = Series::new("sensor", Color::Orange, Mark::Dot(5.0));
+        let mut sensed = Series::new("sensor", Color::Orange, Mark::Ring(4.0));
         for place in places {
-            sensed.push(1e3 * place, displacement(shape, *place));
-            sensed.words.push(format!("{name}: mode {}", shape.mode));
+            sensed.push(1e3 * place, 0.0);
+            sensed.words.push((*name).to_owned());
             sensed.labels.push((*name).to_owned());
         }
         series.push(sensed);
+    }
+    for one in measured {
+        series.extend(measured_points(one));
     }
     let title = format!(
         "mode {}, {} Hz",
@@ -438,17 +510,30 @@ fn shape_panel(
     panel.with_zero().with(series)
 }
 
-/// Displacement at a place, between the points next to it.
-fn displacement(shape: &SampledShape, place: f64) -> f64 {
-    let after = shape.positions.partition_point(|x| *x < place);
-    let points = shape.positions.iter().zip(&shape.displacements);
-    let mut near = points.skip(after.saturating_sub(1));
-    match (near.next(), near.next()) {
-        (Some((x0, y0)), Some((x1, y1))) if after > 0 && x1 > x0 => {
-            y0 + (y1 - y0) * (place - x0) / (x1 - x0)
-        }
-        (Some(_), Some((_, y))) if after > 0 => *y,
-        (Some((_, y)), _) => *y,
-        (None, _) => 0.0,
+/// The points of a measured shape, those with bars apart: a series has bars of all its points or of none.
+fn measured_points(shape: &MeasuredShape) -> [Series; 2] {
+    let mut sets = [(); 2].map(|()| Series::new("measured", Color::Ink, Mark::Dot(3.6)));
+    for point in &shape.points {
+        let set = &mut sets[usize::from(point.low.is_some())];
+        set.push(1e3 * point.position, point.displacement);
+        set.low.extend(point.low);
+        set.high.extend(point.high);
+        let seen = match shape.by {
+            ShapeBy::Sensors => format!("sensor {}", point.sensor),
+            ShapeBy::Taps => format!("tap, seen by {}", point.sensor),
+        };
+        set.words.push(seen);
+        let half = point
+            .low
+            .zip(point.high)
+            .map(|(low, high)| 0.5 * (high - low));
+        set.said.push(match half {
+            Some(_) => rounded_to(point.displacement, half, -3).joined(),
+            None => format!(
+                "{}, the place that the others are relative to",
+                significant(point.displacement, 3)
+            ),
+        });
     }
+    sets
 }

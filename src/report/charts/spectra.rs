@@ -144,8 +144,8 @@ pub fn frf(
     let mut caption = format!("Response per force (H1) of {name}, magnitude, phase and coherence.");
     if frfs.iter().any(|frf| frf.fitted.is_some()) {
         caption.push_str(
-            " Thin dark line: what the fitted modes explain, with a term each for modes below and above the band. Where it \
-             leaves the measured curve, a mode may be missing.",
+            " Thin dark line: what the fitted modes explain, with a term each for modes below and above the band. Broken \
+             line: the residual. Where it has a peak, a mode may be missing.",
         );
     }
     Some(Chart {
@@ -205,7 +205,19 @@ fn magnitude_panels(
         let Some(fitted) = &frf.fitted else { continue };
         let name = fitted_name(frfs, index);
         let curve = fitted_curve(lines, &name, magnitudes(&fitted.values));
-        panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit)).push(curve);
+        let left = frf.values().iter().zip(&fitted.values);
+        let left = left.map(|(measured, fitted)| Some((*measured)? - (*fitted)?));
+        let name = match frfs.len() {
+            1 => "residual: measured less fitted".to_owned(),
+            _ => format!("residual, {}", frf.response),
+        };
+        let residual = Series {
+            mark: Mark::Dashed(OVER),
+            opacity: FAINT,
+            ..over_lines(lines, &name, Color::curve(index), magnitudes(&left.collect::<Vec<_>>()))
+        };
+        let series = panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit));
+        series.extend([curve, residual]);
     }
     panels
 }

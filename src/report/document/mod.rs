@@ -37,7 +37,8 @@ use model::{estimate_section, free_test_of, lengths_of};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_analysis::{
-    Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
+    Analysis, MeasuredShape, RecordingResult, SampledShape, ShapeAgreement, TestedStructure,
+    Warning, measured_shapes, sampled_shapes, shape_agreement,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
 use tapjoint_compare::{Comparison, Series, WatchedSeries};
@@ -89,6 +90,12 @@ pub struct Document {
     /// Shapes of the predicted modes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_shapes: Option<Vec<SampledShape>>,
+    /// Measured shapes of these modes, of every set-up with two places or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_shapes: Option<Vec<MeasuredShape>>,
+    /// How well measured and predicted shapes agree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_agreement: Option<ShapeAgreement>,
     /// Estimates under changed frequencies, by every method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation: Option<Vec<PerturbationSection>>,
@@ -207,6 +214,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
     let modes = analysis.modes.iter();
     let modes = modes.map(|mode| ModeSection::of(mode, &analysis.recordings));
     let shapes = sampled_shapes(analysis);
+    let measured = measured_shapes(analysis, &shapes);
     // Doubts about the pair regression concern the result only where it is the estimate.
     let has_better = identification.is_some_and(|found| found.consistent.is_some());
     let warnings = analysis.warnings.iter();
@@ -222,7 +230,9 @@ pub fn document_of(analysis: &Analysis) -> Document {
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification.map(|found| predictions(&found.prediction)),
+        shape_agreement: shape_agreement(&measured, &shapes),
         mode_shapes: (!shapes.is_empty()).then_some(shapes),
+        measured_shapes: (!measured.is_empty()).then_some(measured),
         quality: (!analysis.verdicts.is_empty()).then(|| analysis.verdicts.clone()),
         warnings: warnings.collect(),
         ..Document::default()

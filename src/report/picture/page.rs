@@ -54,6 +54,10 @@ impl Chart {
         let series = panels.iter().flat_map(|panel| &panel.series);
         let most = series.clone().map(Series::count).max();
         let most = most.filter(|most| *most > 0)?;
+        // A table of numbers has nothing to zoom.
+        if series.clone().any(|one| one.mark == Mark::Cell) {
+            return None;
+        }
         let mut page = Chart {
             kind: self.kind,
             ..Chart::default()

@@ -29,6 +29,8 @@ const LAMBDAS: [f64; 5] = [1.6061, 4.2318, 7.1372, 9.7680, 12.2817];
 pub fn document() -> Document {
     Document {
         mode_shapes: None,
+        measured_shapes: None,
+        shape_agreement: None,
         lengths: None,
         free_test: None,
         frfs: None,

@@ -197,7 +197,7 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
 }
 
 /// Returns the files that a description names: recordings, modes, and the free bar's test with its own.
-fn files_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
+pub(super) fn files_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let recordings = test.recordings.iter();
     let modes = test.measured.iter().filter_map(|one| one.file.as_ref());
@@ -354,7 +354,8 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
             words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
         }
         _ if text.starts_with(PAGE_HEAD) => true,
-        _ if path.ends_with(CHECKSUMS) && !checksums(&text).is_empty() => true,
+        // A list of many files is longer than what was looked at.
+        _ if path.ends_with(CHECKSUMS) => !checksums(&fs::read_to_string(path)?).is_empty(),
         _ => CSV_HEADS
             .iter()
             .chain(&DESCRIPTION_HEADS)
@@ -402,7 +403,11 @@ fn name_in_list(name: &Path) -> String {
     parts.collect::<Vec<_>>().join("/")
 }
 
-fn checksum(path: &Path) -> io::Result<String> {
+/// Returns the SHA-256 of a file's content in hexadecimal digits.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn checksum(path: &Path) -> io::Result<String> {
     let mut sum = Sha256::new();
     io::copy(&mut File::open(path)?, &mut sum)?;
     Ok(sum
@@ -489,5 +494,17 @@ mod tests {
         assert!(!is_made_here(&file));
         // A file that only the earlier list names stays listed.
         assert_eq!(checksum_list(&list, &[]).unwrap(), list);
+    }
+    #[test]
+    fn regress_a_long_list_is_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CHECKSUMS);
+        let line = |number| format!("{:064x}  spectrum-{number}.png\n", number);
+        let list: String = (0..200u32).map(line).collect();
+        assert!(list.len() as u64 > 2 * LOOKED_AT);
+        fs::write(&path, &list).unwrap();
+        assert!(is_made_here(&path));
+        fs::write(&path, list + "notes of mine\n").unwrap();
+        assert!(!is_made_here(&path));
     }
 }

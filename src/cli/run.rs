@@ -6,13 +6,13 @@ use super::arguments::{
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
-use super::overwrite::Expanded;
+use super::overwrite::{Expanded, checksum, files_of};
 use super::place::is_description;
 use super::publication::OutputFolder;
 use super::recording::analyse;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::fs;
@@ -21,6 +21,7 @@ use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::recording::ReadSettings;
+use tapjoint::report::document::{FileSection, SheetSection};
 use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_section, run_files};
 
 /// Analyse a test, from recordings to joint, and write a report.
@@ -49,6 +50,10 @@ pub(super) struct RunArguments {
     method: &'static [EstimateMethod],
     #[command(flatten)]
     recording: RecordingArguments,
+    /// Also write sheet.html, one page to sign and file, with the checksums of all files read. Texts for it stand under
+    /// [sheet] of the description. Print it for a PDF
+    #[arg(long)]
+    sheet: bool,
     #[command(flatten)]
     full: FullAnswer,
     #[command(flatten)]
@@ -112,6 +117,34 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
     Ok(file)
+}
+
+/// Returns the description and the files that it names, or the bare recording, with their checksums.
+fn summed_files(path: &Path, described: Option<&TestFile>) -> anyhow::Result<Vec<FileSection>> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut paths = vec![path.to_owned()];
+    paths.extend(
+        described
+            .into_iter()
+            .flat_map(|file| files_of(path, &file.test)),
+    );
+    let mut files: Vec<FileSection> = Vec::new();
+    for path in paths {
+        let file = path.strip_prefix(folder).unwrap_or(&path);
+        let file = file.display().to_string();
+        if files.iter().any(|known| known.file == file) {
+            continue;
+        }
+        let summed = fs::metadata(&path).and_then(|data| Ok((data.len(), checksum(&path)?)));
+        let (bytes, sha256) =
+            summed.with_context(|| format!("{}: cannot be read", path.display()))?;
+        files.push(FileSection {
+            file,
+            bytes,
+            sha256,
+        });
+    }
+    Ok(files)
 }
 
 /// Returns the parser of a file; a folder stands for the only description in it.
@@ -196,6 +229,11 @@ pub(super) fn run(
         )?,
     };
     let mut document = document_of(&analysis);
+    document.sheet = described.as_ref().map(|file| SheetSection::of(&file.test));
+    if arguments.sheet {
+        let sheet = document.sheet.get_or_insert_default();
+        sheet.files = summed_files(&arguments.file, described.as_ref())?;
+    }
     let mut model = None;
     if let Some(file) = &described {
         let settings = GapSettings {

@@ -32,7 +32,7 @@ impl KnownTable {
 
 pub(super) const TOP: KnownTable = KnownTable::new(
     "the top level",
-    "name beam joint hammer sensor recording measured analysis effect",
+    "name beam joint hammer sensor recording measured analysis effect sheet",
 );
 pub(super) const BEAM: KnownTable = KnownTable::new(
     "[beam]",
@@ -48,10 +48,11 @@ pub(super) const RIGHT: KnownTable =
 pub(super) const JOINT: KnownTable =
     KnownTable::new("[joint]", "kind model kt kr ktr beam position overlap");
 pub(super) const OVERLAP: KnownTable = KnownTable::new("joint.overlap", "length mass");
-pub(super) const HAMMER: KnownTable = KnownTable::new("[hammer]", "channel scale sensitivity");
+pub(super) const HAMMER: KnownTable =
+    KnownTable::new("[hammer]", "channel scale sensitivity instrument");
 pub(super) const SENSOR: KnownTable = KnownTable::new(
     "[[sensor]]",
-    "name channel scale sensitivity position mass kind",
+    "name channel scale sensitivity position mass kind instrument",
 );
 pub(super) const RECORDING: KnownTable = KnownTable::new(
     "[[recording]]",
@@ -68,6 +69,11 @@ pub(super) const ANALYSIS: KnownTable = KnownTable::new(
     "window reading fit_modes weights sensor_mass fit",
 );
 
+pub(super) const SHEET: KnownTable = KnownTable::new(
+    "[sheet]",
+    "number date operator specimen laboratory remarks",
+);
+
 /// Not in [`ALL`], because many of its keys also belong to other tables.
 pub(super) const EFFECT: KnownTable = KnownTable::new(
     "[[effect]]",
@@ -75,7 +81,7 @@ pub(super) const EFFECT: KnownTable = KnownTable::new(
      factor offset",
 );
 
-const ALL: [&KnownTable; 13] = [
+const ALL: [&KnownTable; 14] = [
     &TOP,
     &BEAM,
     &TOLERANCE,
@@ -89,6 +95,7 @@ const ALL: [&KnownTable; 13] = [
     &MEASURED,
     &FIRST_NODE,
     &ANALYSIS,
+    &SHEET,
 ];
 
 /// Other usual names of keys, which differ too much to be found by spelling.

@@ -10,6 +10,7 @@ mod parse;
 mod property;
 mod reader;
 mod recordings;
+mod sheet;
 mod structure;
 mod template;
 mod tolerance;
@@ -20,6 +21,7 @@ pub use reader::DescriptionError;
 pub use recordings::{FORMS, OVERLOADS, SENSOR_KINDS};
 use schemars::JsonSchema;
 use serde::Serialize;
+pub use sheet::Sheet;
 pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, lap_layout};
 pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
@@ -54,6 +56,8 @@ pub struct TestDescription {
     pub analysis: AnalysisDescription,
     /// Effects of the model, for predictions and virtual tests.
     pub effects: Vec<EffectDescription>,
+    /// What is filed with the test.
+    pub sheet: Sheet,
     /// Doubtful values that can still be used, in the order of reading.
     pub warnings: Vec<DescriptionError>,
 }
@@ -216,6 +220,8 @@ pub struct HammerDescription {
     /// Newtons per unit of the file (integer WAV: full scale = 1); `None` when the file does not
     /// say, so that a unit in a CSV header may decide (else 1).
     pub scale: Option<Scale>,
+    /// Make, type and serial number; `None` when not given.
+    pub instrument: Option<String>,
 }
 
 /// What a file of functions holds.
@@ -257,6 +263,8 @@ pub struct SensorDescription {
     pub mass: Option<f64>,
     /// Quantity that it measures.
     pub kind: SensorKind,
+    /// Make, type and serial number; `None` when not given.
+    pub instrument: Option<String>,
 }
 
 /// One recording of the test.

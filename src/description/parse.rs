@@ -12,7 +12,7 @@ use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
 use super::{
     AnalysisDescription, Assembly, BeamDescription, ChannelRef, FitParameter, JointDescription,
-    JointModel, ModeFile, RecordingDescription, SensorDescription, TestDescription, Weights,
+    JointModel, ModeFile, RecordingDescription, SensorDescription, Sheet, TestDescription, Weights,
     WindowKind, keys,
 };
 use std::fmt;
@@ -81,6 +81,7 @@ impl TestDescription {
             .iter()
             .map(read_effect)
             .collect::<Result<Vec<_>, _>>()?;
+        let sheet = top.optional("sheet", |entry| Sheet::read(&entry.table(&keys::SHEET)?))?;
         // A test without a name is called like its file, without the ending.
         let stem = Path::new(file_name).file_stem();
         let stem = stem.map(|stem| stem.to_string_lossy().into_owned());
@@ -95,6 +96,7 @@ impl TestDescription {
             measured,
             analysis,
             effects,
+            sheet: sheet.unwrap_or_default(),
             warnings: source.warnings.take(),
         })
     }

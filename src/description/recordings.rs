@@ -6,6 +6,7 @@ use super::property::read_free_length;
 use super::reader::{
     DescriptionError, Entry, Limits, Table, did_you_mean, number, quoted, with_unit,
 };
+use super::sheet::instrument;
 use super::structure::along;
 use super::{
     Assembly, BeamDescription, ChannelPlace, ChannelRef, FirstNode, FunctionForm,
@@ -52,6 +53,7 @@ pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, Descri
         channel: read_channel(&channel)?,
         place: place_of(&channel),
         scale: read_scale(table, Dimension::Force, Dimension::ForceSensitivity)?,
+        instrument: instrument(table)?,
     })
 }
 
@@ -133,6 +135,7 @@ fn read_sensor(
         })?,
         mass: table.within("mass", Dimension::Mass, &SENSOR_MASS)?,
         kind,
+        instrument: instrument(table)?,
     };
     if let Some((entry, mass)) = table.get("mass").zip(sensor.mass) {
         if kind == SensorKind::Sound {

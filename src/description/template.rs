@@ -66,6 +66,7 @@ const INSTRUMENTS: &str = r#"
 channel = 1                    # 1-based, not counting a time column; or the name of a CSV column
 # scale = 1.0                  # N per unit of the file, default: 1, or the unit in the CSV header; integer WAV: full scale = 1
 #   sensitivity = "2.25 mV/N" instead of scale for files in volts
+# instrument = "make, type, serial number"   # for the sheet
 
 [[sensor]]                     # once for each sensor
 name = "A"
@@ -74,6 +75,7 @@ channel = 2                    # default: the CSV column with the sensor's name
 #   sensitivity = "100 mV/g" instead of scale for files in volts
 position = 0.338               # m
 # mass = "24 g"                # kg, from the data sheet, default: not known
+# instrument = "make, type, serial number"   # for the sheet
 # kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
 
 [[recording]]                  # once for each file; the same file may be read in several bands
@@ -112,6 +114,16 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 # fit_modes = 4                # number of modes that enter the estimate, from the first, default: all
 # weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights
 # sensor_mass = true           # the sensors' masses enter the model, default: true
+"#;
+
+const SHEET: &str = r#"
+# [sheet]                      # texts for the sheet of `run --sheet`, all of them optional
+# number = "2024-017"
+# date = 2024-05-17
+# operator = "name"
+# specimen = "what was tested, serial number"
+# laboratory = "name"
+# remarks = "anything else"
 "#;
 
 const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # estimated quantities, default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
@@ -450,7 +462,7 @@ pub fn template(kind: Assembly) -> String {
             FIT_FREE,
         ),
     };
-    [HEAD, joint, INSTRUMENTS, fit]
+    [HEAD, joint, INSTRUMENTS, fit, SHEET]
         .concat()
         .replace("@NAME@", name)
         .replace("@ORIGIN@", origin)

@@ -3,8 +3,9 @@
 use askama::Template;
 
 use super::ReportError;
-use super::document::{Document, WarningSection};
+use super::document::{Document, SheetSection, WarningSection};
 use super::format::{capital, significant, trimmed};
+use super::sheet::{Sheet, running_head};
 use super::tables::{self, Table};
 use super::words::answer::Answer;
 use super::words::diagnosis::gap_story;
@@ -36,6 +37,7 @@ const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const PLOT_LICENSE: &str = include_str!("assets/uPlot-LICENSE.txt");
 const SCRIPT: &str = include_str!("templates/report.js");
 const POINTS: &str = include_str!("templates/report_points.js");
+const VIEWS: &str = include_str!("templates/report_views.js");
 
 /// Warnings of one code that a page on several tests lists: those of two tests with two recordings each.
 const MOST_ALIKE: usize = 4;
@@ -47,6 +49,7 @@ struct Live {
     license: &'static str,
     script: &'static str,
     points: &'static str,
+    views: &'static str,
 }
 
 #[derive(Template)]
@@ -54,7 +57,12 @@ struct Live {
 struct Page<'a> {
     title: String,
     facts: Vec<(&'static str, String)>,
-    answer: Answer,
+    answer: &'a Answer,
+    sheet: Option<Sheet<'a>>,
+    /// Number, date, operator, laboratory and specimen, as far as they are known.
+    filed: Vec<&'a str>,
+    /// Foot of printed pages.
+    running: String,
     /// The picture of the first screen.
     first_figure: Option<&'a InlineFigure>,
     warnings: Vec<&'a WarningSection>,
@@ -120,15 +128,22 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     let name = name.filter(|name| !name.is_empty());
     let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
     let (warnings, hidden_warnings) = listed_warnings(document);
+    let answer = Answer::of(document);
+    let first_figure = figures.iter().find(|figure| figure.section == "answer");
+    let filed = document.sheet.iter().flat_map(SheetSection::facts);
+    let filed = filed.map(|(_, text)| text).filter(|text| !text.is_empty());
     let page = Page {
         title: match (&document.series, &document.compare) {
             (Some(_), _) => format!("{name}: a series of tests"),
             (None, Some(_)) => format!("{name}: before and after"),
-            (None, None) => name,
+            (None, None) => name.clone(),
         },
         facts: facts(document),
-        answer: Answer::of(document),
-        first_figure: figures.iter().find(|figure| figure.section == "answer"),
+        answer: &answer,
+        sheet: Sheet::of(document, &answer, first_figure),
+        filed: filed.collect(),
+        running: running_head(document, &name),
+        first_figure,
         warnings,
         hidden_warnings,
         findings: sentences(document),
@@ -145,6 +160,7 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
             license: PLOT_LICENSE,
             script: SCRIPT,
             points: POINTS,
+            views: VIEWS,
         }),
         version: env!("CARGO_PKG_VERSION"),
     };

@@ -14,6 +14,7 @@ pub mod picture;
 mod resolution;
 mod run;
 mod screen;
+mod sheet;
 mod short_names;
 pub mod tables;
 mod text;

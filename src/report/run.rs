@@ -16,13 +16,14 @@ use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::html::{InlineFigure, render_html};
 use crate::picture::{Block, Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
+use crate::sheet::render_sheet;
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
     ReportError, ReportFile, render_changes_csv, render_modes_csv, render_parameters_csv,
     render_perturbation_csv, render_series_csv, render_taps_csv,
 };
 
-/// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
+/// All files of a report: `report.html`, `report.json`, `sheet.html` of a document with a sheet, `parameters.csv`, `modes.csv`,
 /// `taps.csv` where there are taps, `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
 /// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `shape-agreement`, `cloud`,
 /// `gap`, `gap-place`.
@@ -171,6 +172,8 @@ impl DrawnPictures {
 /// Returns the pictures, the page with them, and `report.json`.
 fn render_page(document: &Document, drawn: DrawnPictures) -> Result<Vec<ReportFile>, ReportError> {
     let DrawnPictures { mut files, figures } = drawn;
+    let sheet = render_sheet(document, &figures)?;
+    files.extend(sheet.map(|sheet| ReportFile::of(SHEET, sheet)));
     let (page, json) = rayon::join(|| render_html(document, &figures), || render_json(document));
     files.extend([
         ReportFile::of("report.html", page?),
@@ -336,8 +339,10 @@ pub fn render_schema() -> String {
 
 /// The model that a diagnosis leads to, beside the report.
 pub const MODEL_FILE: &str = "updated-model.toml";
+/// The sheet, where one was asked for.
+const SHEET: &str = "sheet.html";
 /// Files of every report.
-const OF_ALL: [&str; 2] = ["report.html", "report.json"];
+const OF_ALL: [&str; 3] = ["report.html", "report.json", SHEET];
 /// Tables of a test.
 const TABLES: [&str; 4] = [
     "parameters.csv",

@@ -201,23 +201,28 @@ fn magnitude_panels(
     }
     // The axes are those of what was measured.
     scale_to_magnitudes(&mut panels);
+    // Measured curves, fitted ones, residuals: the page matches the first two with those of the phases by their order.
     for (index, frf) in frfs.iter().enumerate() {
         let Some(fitted) = &frf.fitted else { continue };
         let name = fitted_name(frfs, index);
         let curve = fitted_curve(lines, &name, magnitudes(&fitted.values));
-        let left = frf.values().iter().zip(&fitted.values);
-        let left = left.map(|(measured, fitted)| Some((*measured)? - (*fitted)?));
+        panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit)).push(curve);
+    }
+    for (index, frf) in frfs.iter().enumerate() {
+        let Some(fitted) = &frf.fitted else { continue };
+        let values = frf.values().iter().zip(&fitted.values);
+        let residual = values.map(|(measured, fitted)| Some((*measured)? - (*fitted)?));
+        let residual: Vec<Option<Complex64>> = residual.collect();
         let name = match frfs.len() {
             1 => "residual: measured less fitted".to_owned(),
             _ => format!("residual, {}", frf.response),
         };
-        let residual = Series {
+        let series = panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit));
+        series.push(Series {
             mark: Mark::Dashed(OVER),
             opacity: FAINT,
-            ..over_lines(lines, &name, Color::curve(index), magnitudes(&left.collect::<Vec<_>>()))
-        };
-        let series = panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit));
-        series.extend([curve, residual]);
+            ..over_lines(lines, &name, Color::curve(index), magnitudes(&residual))
+        });
     }
     panels
 }

@@ -7,6 +7,7 @@ mod gap;
 mod headline;
 mod measured;
 mod model;
+mod sheet;
 mod timings;
 
 pub use gap::{
@@ -23,6 +24,7 @@ pub use model::{
     BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection, FreeTestSection, FromReadings,
     IdentifiabilitySection, LengthSection, MisfitSection, PairsSection, PredictionSection,
 };
+pub use sheet::{FileSection, InstrumentSection, SheetSection};
 pub use timings::{StageTiming, Timing, TimingsSection};
 // Sections that are results as they are.
 pub use tapjoint_analysis::{
@@ -124,6 +126,9 @@ pub struct Document {
     /// What each stage of the command took; only with `--timings`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timings: Option<TimingsSection>,
+    /// What is filed with the test.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<SheetSection>,
     /// Everything that a reader of the results has to know.
     pub warnings: Vec<WarningSection>,
 }

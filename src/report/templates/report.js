@@ -139,13 +139,16 @@ function closeUp(figure, tap) {
   return true;
 }
 
-function axes(panel, last) {
+function axes(panel, last, log) {
   var ink = color("--ink"), rule = color("--rule");
   var common = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { stroke: rule, width: 1 } };
   var narrow = innerWidth < 600;
   return [
     Object.assign({}, common, { label: last ? panel.x.label + " (" + panel.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
-      values: function (u, splits) { return last ? tickNames(splits) : []; } }),
+      values: function (u, splits) { return last ? tickNames(splits) : []; } }, !log ? {} : {
+      splits: function (u, index, low, high) { return ticks(low, high, true, narrow); },
+      filter: function (u, splits) { return splits; }
+    }),
     Object.assign({}, common, {
       label: panel.y.label + " (" + (panel.y.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
       values: function (u, splits) { return tickNames(splits); }
@@ -162,7 +165,7 @@ var padded = { min: { pad: 0.08 }, max: { pad: 0.14 } };
 function isBand(curve) { return curve.mark === "band"; }
 
 function vertical(panel) {
-  if (!logarithmic(panel.y)) return { range: panel.series.some(isBand) ? padded : [panel.y.low, panel.y.high] };
+  if (!logarithmic(panel.y)) return { range: panel.y.fits || panel.series.some(isBand) ? padded : [panel.y.low, panel.y.high] };
   return {
     distr: 3,
     // As in the pictures, 140 dB below the largest are shown at most.
@@ -195,8 +198,8 @@ function options(figure, index) {
   return {
     width: Math.max(figure.host.clientWidth, 240),
     height: Math.min(panel.height, 280) + (last ? 36 : 0),
-    series: series, axes: axes(panel, last),
-    scales: { x: { time: false }, y: vertical(panel) },
+    series: series, axes: axes(panel, last, figure.log),
+    scales: { x: { time: false, distr: figure.log ? 3 : 1 }, y: vertical(panel) },
     bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
     padding: [index === 0 ? 22 : 8, 30, 0, 0],
     cursor: { sync: { key: figure.key, scales: ["x", null] }, drag: { x: true, y: false } },
@@ -206,8 +209,10 @@ function options(figure, index) {
 
 function zoom(figure, low, high) {
   var x = figure.x, end = x[x.length - 1];
+  // A logarithmic axis has no zero.
+  var begin = figure.log ? x.find(function (place) { return place > 0; }) : x[0];
   figure.panels.forEach(function (u) {
-    u.setScale("x", { min: Math.max(low, x[0]), max: Math.min(high, end) });
+    u.setScale("x", { min: Math.max(low, begin), max: Math.min(high, end) });
   });
 }
 
@@ -217,6 +222,7 @@ function build(figure) {
   closeUp(figure, figure.taps[figure.tap]);
   if (figure.points) return buildPoints(figure);
   figure.panels.forEach(function (u) { u.destroy(); });
+  figure.host.textContent = "";
   figure.panels = figure.curves.map(function (panel, index) {
     var period = panel.y.period;
     var data = [figure.x].concat(curves(panel).map(function (curve) {
@@ -245,17 +251,47 @@ function chosen(figure, index) {
 }
 
 function chips(figure) {
-  var bar = element("div", "chips");
+  figure.bar.textContent = "";
   function chip(words, className, action) {
     var button = element("button", className, words);
     button.type = "button";
     button.addEventListener("click", function () { action(button); });
-    bar.appendChild(button);
+    figure.bar.appendChild(button);
   }
+  figure.views.forEach(function (view) {
+    chip(view[0], view[1] === figure.plot ? "reset chosen" : "reset", function () {
+      adopt(figure, view[1]);
+      chips(figure);
+      build(figure);
+    });
+  });
+  if (!figure.points && figure.plot.kind !== "taps") chip(figure.log ? "linear frequency" : "log frequency", "reset", function () {
+    figure.log = !figure.log;
+    chips(figure);
+    build(figure);
+  });
   if (figure.points) pointChips(figure, chip);
   else curveChips(figure, chip);
   chip("picture", "reset", function () { figure.element.classList.toggle("still"); });
-  return bar;
+}
+
+// Takes what is shown out of a plot. Curves stand over runs of equally spaced places, single points over places of
+// their own.
+function adopt(figure, plot) {
+  var panels = plot.blocks[0].panels, first = panels[0].series[0];
+  figure.points = !(first && first.x[0] && first.x[0].count);
+  figure.plot = plot;
+  figure.tap = -1;
+  figure.shown = 0;
+  figure.taps = [];
+  figure.marks = [];
+  figure.host.classList.toggle("points", figure.points);
+  if (figure.points) return;
+  figure.curves = panels;
+  figure.x = places(first.x);
+  figure.marks = panels[0].rules;
+  figure.taps = panels[0].events;
+  figure.taps.forEach(function (tap, number) { tap.name = "tap " + (number + 1); });
 }
 
 // The least distance of points.
@@ -299,30 +335,21 @@ function unpacked(node) {
   return new Response(stream).text().then(JSON.parse);
 }
 
-// Curves stand over runs of equally spaced places, single points over places of their own.
 function start(node, index, plot) {
-  var panels = plot.blocks[0].panels, first = panels[0].series[0], points = !(first && first.x[0] && first.x[0].count);
-  var figure = { element: node, key: "figure" + index, plot: plot, panels: [], tap: -1, shown: 0, points: points, x: [], marks: [], taps: [] };
-  if (points) plot.blocks.forEach(function (block) { block.panels.forEach(function (panel) { ends(panel.x); ends(panel.y); }); });
-  else {
-    figure.curves = panels;
-    figure.x = places(first.x);
-    figure.marks = panels[0].rules;
-    figure.taps = panels[0].events;
-    figure.taps.forEach(function (tap, number) { tap.name = "tap " + (number + 1); });
-  }
+  var figure = { element: node, key: "figure" + index, panels: [], log: false, views: viewsOf(plot) };
   var live = element("div", "plot");
+  figure.bar = element("div", "chips");
   figure.host = element("div", "host");
   figure.said = element("p", "said");
   figure.said.setAttribute("aria-live", "polite");
-  live.appendChild(chips(figure));
-  live.appendChild(figure.host);
-  live.appendChild(figure.said);
   figure.nearHost = element("div", "host near");
-  live.appendChild(figure.nearHost);
-  live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + panels[0].note));
+  var note = "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + plot.blocks[0].panels[0].note;
+  [figure.bar, figure.host, figure.said, figure.nearHost, element("p", "note", note)].forEach(function (part) { live.appendChild(part); });
   node.insertBefore(live, node.firstChild);
   node.classList.add("live");
+  adopt(figure, plot);
+  if (figure.points) plot.blocks.forEach(function (block) { block.panels.forEach(function (panel) { ends(panel.x); ends(panel.y); }); });
+  chips(figure);
   build(figure);
   clicks(figure);
   all.push(figure);

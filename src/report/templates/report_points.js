@@ -49,8 +49,9 @@ function shown(set, i, xs, ys) { return (set.mark === "bar" || within(xs, set.x[
 
 function drawSet(u, panel, set, lit) {
   var c = u.ctx, ratio = devicePixelRatio || 1, size = set.size * ratio;
+  var factor = set.name === "mode shape" || set.name === "measured" ? (panel.swing == null ? 1 : panel.swing) : 1;
   function px(i) { return u.valToPos(set.x[i], "x", true); }
-  function py(value) { return u.valToPos(value, "y", true); }
+  function py(value) { return u.valToPos(factor * value, "y", true); }
   c.strokeStyle = c.fillStyle = color("--" + set.color);
   var curve = set.mark === "curve";
   c.lineWidth = (set.mark === "line" || curve ? set.size : 1.6) * ratio;
@@ -246,6 +247,7 @@ function buildPoints(figure) {
   figure.panels.forEach(function (u) { u.destroy(); });
   figure.host.textContent = figure.said.textContent = "";
   figure.host.classList.add("points");
+  figure.host.classList.toggle("square", figure.plot.kind === "circles");
   figure.host.classList.toggle("many", figure.plot.blocks[figure.shown].panels.length > 3);
   figure.panels = figure.plot.blocks[figure.shown].panels.map(function (panel) {
     var holder = element("div", "");
@@ -265,6 +267,7 @@ function buildPoints(figure) {
 
 function pointChips(figure, chip) {
   var views = figure.plot.blocks;
+  if (swings(figure)) chip("move", "reset", function (button) { swing(figure, button); });
   chip("whole range", "reset", function () { buildPoints(figure); });
   if (views.length > 1) views.forEach(function (view, index) {
     chip(view.name, index === figure.shown ? "mode chosen" : "mode", function (button) {

@@ -12,8 +12,8 @@ use tapjoint_signal::modal::fit::{
     PoleStart, SteadyLine, TapForce, UncertaintySource, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
-    BandPeaks, BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
-    all_modes, find_modes,
+    BandPeaks, BandSearch, MOST_DAMPING, PoleStability, PolyreferenceMode, PolyreferenceSettings,
+    ResponseMatrix, StabilisationPole, all_modes, find_modes,
 };
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::recording::ResponseForm;
@@ -32,6 +32,8 @@ pub(super) const UNLIKE: f64 = 0.9;
 /// Distance from the ends of the band within which a mode without a peak is none: lines, and a share of the frequency,
 /// whichever is more.
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
+/// Share of a chosen frequency within which a stable pole is the one meant. 1 %: what a sensor moves that is moved.
+const CHOSEN_REACH: f64 = 0.01;
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 pub(super) const CLEAR_AMPLITUDE: f64 = 5.0;
 
@@ -76,11 +78,16 @@ pub(super) struct Candidates<'a> {
     pub stabilisation: &'a Stabilisation,
     /// Mains hum.
     pub hum: Vec<SteadyLine>,
+    /// Frequencies (Hz) of the modes that were chosen by hand; empty where the program chooses.
+    pub chosen: &'a [f64],
 }
 
 impl Candidates<'_> {
     /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
     pub fn fit(&self, readings: &mut Vec<ModeReading>) {
+        if !self.chosen.is_empty() {
+            return self.fit_chosen(readings);
+        }
         let settings = FitSettings {
             steady_lines: self.hum.clone(),
             ..FitSettings::default()
@@ -156,6 +163,62 @@ impl Candidates<'_> {
         for (proposal, fit) in added.into_iter().zip(of_added) {
             let Ok(fit) = fit else { continue };
             readings.push(self.without_peak(fit, proposal.above_noise_db));
+        }
+        readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    }
+
+    /// Fits the modes that were chosen by hand and no others: each starts at the pole of any order nearest to its
+    /// frequency. Of the peaks only those of chosen modes stay.
+    pub fn fit_chosen(&self, readings: &mut Vec<ModeReading>) {
+        let settings = FitSettings {
+            steady_lines: self.hum.clone(),
+            ..FitSettings::default()
+        };
+        let lines = self.data.frequencies();
+        let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
+            return;
+        };
+        let searches = self.stabilisation.searches.iter();
+        let poles = searches.flat_map(|search| &search.diagram);
+        let mut starts = Vec::new();
+        for &frequency in self.chosen.iter().filter(|one| (*first..=*last).contains(*one)) {
+            let distance = |pole: &&StabilisationPole| (pole.frequency - frequency).abs();
+            let nearest = |reach: f64, stable: bool| {
+                let known = poles.clone().filter(|pole| {
+                    distance(pole) <= reach && (!stable || pole.stability == PoleStability::All)
+                });
+                known.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            };
+            // The pole may have been chosen in another recording, where its frequency differed somewhat.
+            let nearest = nearest(2.0 * self.lines.half_line(), false)
+                .or_else(|| nearest(CHOSEN_REACH * frequency, true));
+            starts.push(PoleStart {
+                frequency: nearest.map_or(frequency, |pole| pole.frequency),
+                damping_ratio: nearest.map(|pole| pole.damping_ratio),
+            });
+        }
+        let (_, fits) = Accepted::new(self.data, &starts, &settings);
+        let mut peaks = std::mem::take(readings);
+        for (start, fit) in starts.iter().zip(&fits) {
+            let width = start.damping_ratio.unwrap_or(0.0) * start.frequency;
+            let reach = 2.0 * self.lines.half_line() + width;
+            let distance = |peak: &ModeReading| (peak.frequency - start.frequency).abs();
+            let places = (0..peaks.len()).filter(|&place| distance(&peaks[place]) <= reach);
+            let place = places
+                .min_by(|&a, &b| distance(&peaks[a]).total_cmp(&distance(&peaks[b])));
+            match (place, fit) {
+                (Some(place), fit) => {
+                    let mut reading = peaks.remove(place);
+                    // Whatever the program takes the peak for: it was chosen.
+                    reading.label = None;
+                    if let Ok(fit) = fit {
+                        self.adopt(&mut reading, fit);
+                    }
+                    readings.push(reading);
+                }
+                (None, Ok(fit)) => readings.push(self.without_peak(fit, 0.0)),
+                (None, Err(_)) => {}
+            }
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
@@ -410,13 +473,15 @@ impl FreeDecays {
     }
 
     /// Fits the decays, and puts into the readings the fits with what else the decays give: modal constants, and
-    /// frequency and damping against amplitude, beside the lines of `hum`.
+    /// frequency and damping against amplitude, beside the lines of `hum`. Modes at the frequencies of `chosen` (Hz) are
+    /// fitted and no others, where it is not empty.
     pub(super) fn fit(
         &self,
         readings: &mut Vec<ModeReading>,
         lines: &Lines,
         kinds: &[Option<ResponseForm>],
         hum: Vec<SteadyLine>,
+        chosen: &[f64],
     ) -> Stabilisation {
         let functions = self.functions();
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
@@ -429,6 +494,7 @@ impl FreeDecays {
             data: &self.data,
             stabilisation: &stabilisation,
             hum,
+            chosen,
         };
         candidates.fit(readings);
         let settings = FitSettings {

@@ -31,6 +31,8 @@ pub struct FunctionSettings {
     pub band: Option<(f64, f64)>,
     /// Way in which natural frequencies are read.
     pub reading: ReadBy,
+    /// Frequencies (Hz) of the modes that were chosen by hand; empty where the program chooses.
+    pub poles: Vec<f64>,
 }
 
 /// Reads the resonances of frequency response functions. `work` goes through the stages of spectra and fits.
@@ -68,7 +70,7 @@ pub(super) fn measure_functions(
     }
     let mut spectra = match is_spectrum {
         true => spectra_of_magnitudes(lines, &values, settings.reading),
-        false => spectra_of_functions(lines, values, &forms, settings.reading, work),
+        false => spectra_of_functions(lines, values, &forms, settings, work),
     };
     spectra.fitted = explain(
         &spectra.averages,
@@ -87,6 +89,8 @@ pub(super) fn measure_functions(
         band,
         spectra.fitted.is_some(),
     ));
+    let poles = Warning::poles_without_mode(file, &settings.poles, band, &spectra.readings);
+    warnings.extend(poles);
     Ok(RecordingResult {
         file: functions.file.clone(),
         files: Vec::new(),
@@ -190,7 +194,7 @@ fn spectra_of_functions(
     lines: Lines,
     values: Vec<Vec<Complex64>>,
     forms: &[Option<ResponseForm>],
-    wanted: ReadBy,
+    settings: &FunctionSettings,
     work: &mut Work,
 ) -> MeasuredSpectra {
     let columns: Vec<&[Complex64]> = values.iter().map(Vec::as_slice).collect();
@@ -217,6 +221,7 @@ fn spectra_of_functions(
             data: &data,
             stabilisation: &stabilisation,
             hum: Vec::new(),
+            chosen: &settings.poles,
         });
         modes.fit(&mut readings);
         // There are modal constants where the form of every function is known.
@@ -227,7 +232,7 @@ fn spectra_of_functions(
         }
     }
     for reading in &mut readings {
-        reading.select_estimate(wanted);
+        reading.select_estimate(settings.reading);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     set_strengths(&mut readings, forms, false);

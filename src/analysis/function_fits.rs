@@ -59,6 +59,9 @@ pub(super) struct FunctionModes<'a>(pub Candidates<'a>);
 impl FunctionModes<'_> {
     /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
     pub fn fit(&self, readings: &mut Vec<ModeReading>) {
+        if !self.0.chosen.is_empty() {
+            return self.0.fit_chosen(readings);
+        }
         let proposals = self.starts(readings);
         let (mut starts, others): (Vec<Proposal>, Vec<Proposal>) =
             proposals.iter().cloned().partition(|one| one.sure);

@@ -40,6 +40,8 @@ pub struct MeasureSettings {
     /// Form of each response, for modal constants; `None` where it is not known, or no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
+    /// Frequencies (Hz) of the modes that were chosen by hand; empty where the program chooses.
+    pub poles: Vec<f64>,
     /// Limits for taps.
     pub taps: TapSettings,
     /// Limits for resonances.
@@ -58,6 +60,7 @@ impl MeasureSettings {
             window: None,
             reading: ReadBy::default(),
             kinds: Vec::new(),
+            poles: Vec::new(),
             taps: TapSettings::default(),
             peaks: PeakSettings::default(),
             mains: MainsSettings::default(),
@@ -369,7 +372,8 @@ impl<'a> Inputs<'a> {
         let stabilisation = match decays {
             Some(decays) => {
                 let hum = quiet.hum_beside(&readings, &self.lines, &self.settings.mains);
-                decays.fit(&mut readings, &self.lines, &self.settings.kinds, hum)
+                let settings = &self.settings;
+                decays.fit(&mut readings, &self.lines, &settings.kinds, hum, &settings.poles)
             }
             None => Stabilisation::default(),
         };

@@ -89,6 +89,7 @@ fn measure_described(
             sensor,
             band: description.band,
             reading: test.analysis.reading,
+            poles: test.analysis.poles.clone(),
         };
         let mut result = measure_functions(&functions, &settings, work)?;
         result.conditions = conditions(test, description);
@@ -111,6 +112,7 @@ fn measure_described(
     settings.taps.keep_overload = description.keep_overload;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
+    settings.poles.clone_from(&test.analysis.poles);
     let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
     settings.kinds = kinds.collect();
     let finished = finish(recording.renamed(file), settings, &wiring, work);
@@ -357,6 +359,8 @@ fn result(
             spectra.fitted.is_some(),
         );
         measurement.warnings.extend(unlisted);
+        let poles = Warning::poles_without_mode(recording.name(), &settings.poles, band, &spectra.readings);
+        measurement.warnings.extend(poles);
     }
     // What is shown of the recording is read again.
     work.go_on(Stage::Taps);

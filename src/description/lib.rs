@@ -398,6 +398,8 @@ pub struct AnalysisDescription {
     pub reading: ReadBy,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
+    /// Frequencies (Hz) of the modes that were chosen by hand, ascending; empty where the program chooses.
+    pub poles: Vec<f64>,
     /// Weights of the frequencies; `None` = measured where bounds are known.
     pub weights: Option<Weights>,
     /// The sensors' masses enter the nominal model.

@@ -6,7 +6,7 @@ use super::property::{
 };
 use super::reader::{DescriptionError, Entry, Limits, Source, Table, with_unit};
 use super::recordings::{
-    check_lengths, check_places, read_hammer, read_measured, read_recording, read_sensors,
+    check_lengths, check_places, read_ascending, read_hammer, read_measured, read_recording, read_sensors,
 };
 use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
@@ -257,6 +257,7 @@ fn read_analysis(
         window: None,
         reading: ReadBy::default(),
         fit_modes: None,
+        poles: Vec::new(),
         weights: None,
         sensor_mass: true,
         fit: None,
@@ -265,6 +266,8 @@ fn read_analysis(
         analysis.window = table.choice("window", &WINDOWS)?;
         analysis.reading = table.choice("reading", &READINGS)?.unwrap_or_default();
         analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
+        let poles = table.optional("poles", read_ascending)?;
+        analysis.poles = poles.unwrap_or_default();
         analysis.weights = table.choice("weights", &WEIGHTS)?;
         let sensor_mass = table.optional("sensor_mass", Entry::boolean)?;
         analysis.sensor_mass = sensor_mass.unwrap_or(true);

@@ -641,7 +641,8 @@ pub(super) fn read_free_frequencies(
     Ok((frequencies, stds))
 }
 
-fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+/// Reads natural frequencies (Hz), the lowest first.
+pub(super) fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
     if items.is_empty() {
         let remedy = "list the natural frequencies in Hz, lowest first";

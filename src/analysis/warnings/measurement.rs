@@ -132,6 +132,33 @@ impl Warning {
         })
     }
 
+    /// Frequencies (Hz) of `poles` in the band at which no mode was found; `None` where there are none.
+    pub(crate) fn poles_without_mode(
+        file: &str,
+        poles: &[f64],
+        band: (f64, f64),
+        readings: &[ModeReading],
+    ) -> Option<Self> {
+        let found = |pole: f64| {
+            let mut near = readings.iter();
+            near.any(|reading| {
+                let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
+                (reading.frequency - pole).abs() <= 2.0 * (reading.half_line + width)
+            })
+        };
+        let without = poles.iter().filter(|pole| (band.0..=band.1).contains(*pole) && !found(**pole));
+        let without: Vec<String> = without.map(|pole| frequency_words(*pole)).collect();
+        if without.is_empty() {
+            return None;
+        }
+        let text = format!(
+            "`poles` in [analysis] names {} Hz, and no mode could be fitted there; choose poles that return at order after \
+             order in the stabilisation diagram",
+            without.join(", ")
+        );
+        Some(Warning::about(file, "pole-without-mode", text))
+    }
+
     /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none. `band` was analysed (Hz);
     /// `has_curves` says that charts show curves of the fitted modes.
     pub(crate) fn unlisted_peaks(

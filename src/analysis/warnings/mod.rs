@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/guide.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 76] = [
+pub const WARNING_CODES: [(&str, &str); 77] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -119,6 +119,10 @@ pub const WARNING_CODES: [(&str, &str); 76] = [
         "peaks are sums and differences of others, as a nonlinear joint makes them",
     ),
     ("unlisted-peak", "a strong peak is no listed mode"),
+    (
+        "pole-without-mode",
+        "no mode could be fitted where `poles` names one",
+    ),
     // Of the checks of good practice.
     (
         "force-ripple",

@@ -115,7 +115,7 @@ pub fn stabilisation(recording: &RecordingResult, name: &str, frfs: &[Frf]) -> O
         ),
         caption: format!(
             "Stabilisation diagram of {name}: poles that the fit finds at each order, marked by \
-             what they share with a pole of the order before."
+             what they share with a pole of the order before. On the page a click chooses a pole."
         ),
         blocks,
         ..Chart::default()

@@ -348,11 +348,13 @@ function start(node, index, plot) {
   node.insertBefore(live, node.firstChild);
   node.classList.add("live");
   adopt(figure, plot);
+  if (choosesPoles(figure)) startPoles(figure);
   if (figure.points) plot.blocks.forEach(function (block) { block.panels.forEach(function (panel) { ends(panel.x); ends(panel.y); }); });
   chips(figure);
   build(figure);
   clicks(figure);
   all.push(figure);
+  all.filter(choosesPoles).forEach(showPoles);
 }
 
 var nodes = Array.from(document.querySelectorAll("figure.curves"));

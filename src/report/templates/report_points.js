@@ -179,7 +179,7 @@ function hover(figure, panel) {
 function look(figure, u, panel, x, y) {
   function range(axis, ends) { return axis.label + " " + digits(ends[0]) + " to " + digits(ends[1]) + unit(axis.unit); }
   var all = x === panel.x.range && y === panel.y.range;
-  figure.said.textContent = all ? "" : "shown: " + range(panel.x, x) + ", " + range(panel.y, y);
+  if (!choosesPoles(figure)) figure.said.textContent = all ? "" : "shown: " + range(panel.x, x) + ", " + range(panel.y, y);
   panel.view = { x: x, y: y };
   u.batch(function () {
     u.setScale("x", { min: x[0], max: x[1] });
@@ -216,7 +216,7 @@ function pointOptions(figure, panel, holder) {
       bind: { dblclick: function (u) { return function () { look(figure, u, panel, panel.x.range, panel.y.range); return null; }; } }
     },
     hooks: {
-      draw: [drawPanel(panel)], setCursor: [hover(figure, panel)],
+      draw: [drawPanel(panel), function (u) { if (choosesPoles(figure)) drawChosen(figure, u); }], setCursor: [hover(figure, panel)],
       setSelect: [function (u) {
         var box = u.select;
         if (box.width < 2 && box.height < 2) return;
@@ -245,6 +245,7 @@ function key(panel) {
 
 function buildPoints(figure) {
   figure.panels.forEach(function (u) { u.destroy(); });
+  figure.panels = [];
   figure.host.textContent = figure.said.textContent = "";
   figure.host.classList.add("points");
   figure.host.classList.toggle("square", figure.plot.kind === "circles");
@@ -261,8 +262,14 @@ function buildPoints(figure) {
     panel.tip = element("div", "tip");
     u.over.appendChild(panel.tip);
     fingers(u, { x: panel.x.range, y: panel.y.range }, function (x, y) { look(figure, u, panel, x, y); });
+    if (choosesPoles(figure)) u.over.addEventListener("click", function () {
+      if (!panel.lit || panel.lit.set.mark === "square") return;
+      // One and a half per mille of what is shown is the width of a mark.
+      togglePole(figure, panel.lit.set.x[panel.lit.index], 0.0015 * (panel.view.x[1] - panel.view.x[0]));
+    });
     return u;
   });
+  if (choosesPoles(figure)) showPoles(figure);
 }
 
 function pointChips(figure, chip) {

@@ -102,3 +102,60 @@ function swing(figure, button) {
   }
   requestAnimationFrame(step);
 }
+
+// Poles chosen by hand in a stabilisation diagram, as the line that a test description takes.
+function choosesPoles(figure) { return figure.plot.kind === "stabilisation"; }
+
+function poleWords(frequency) { return String(+frequency.toPrecision(7)); }
+
+// The modes that the program selected are chosen to begin with.
+function startPoles(figure) {
+  figure.poles = {};
+  figure.plot.blocks[0].panels[0].rules.forEach(function (rule) {
+    if (rule.mode) figure.poles[poleWords(rule.at)] = { at: rule.at, mode: rule.name };
+  });
+}
+
+function chosenPoles(figure) {
+  return Object.keys(figure.poles).map(function (key) { return figure.poles[key]; });
+}
+
+// The poles of all recordings, each mode once.
+function allPoles(figure) {
+  var found = [];
+  all.concat([figure]).forEach(function (one) {
+    if (one.poles) chosenPoles(one).forEach(function (pole) {
+      var known = found.some(function (other) { return pole.mode ? other.mode === pole.mode : Math.abs(other.at - pole.at) < 1e-3 * pole.at; });
+      if (!known) found.push(pole);
+    });
+  });
+  return found.map(function (pole) { return pole.at; }).sort(function (a, b) { return a - b; });
+}
+
+// A click on a pole chooses it; a click on one that is chosen, or beside it, leaves it out.
+function togglePole(figure, frequency, near) {
+  var close = chosenPoles(figure).filter(function (other) { return Math.abs(other.at - frequency) <= near; });
+  if (close.length) close.forEach(function (other) { delete figure.poles[poleWords(other.at)]; });
+  else figure.poles[poleWords(frequency)] = { at: frequency };
+  all.filter(choosesPoles).forEach(showPoles);
+}
+
+function showPoles(figure) {
+  var line = "poles = [" + allPoles(figure).map(poleWords).join(", ") + "]";
+  figure.said.textContent = "Click poles to choose modes by hand, then write this line under [analysis] of the description: ";
+  figure.said.appendChild(element("code", "", line));
+  figure.panels.forEach(function (u) { u.redraw(false); });
+}
+
+function drawChosen(figure, u) {
+  var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1;
+  c.save();
+  c.beginPath(); c.rect(box.left, box.top, box.width, box.height); c.clip();
+  c.strokeStyle = c.fillStyle = color("--ink");
+  c.lineWidth = 1.6 * ratio;
+  chosenPoles(figure).forEach(function (pole) {
+    var x = u.valToPos(pole.at, "x", true), y = box.top + 7 * ratio;
+    c.beginPath(); c.moveTo(x - 5 * ratio, y - 6 * ratio); c.lineTo(x + 5 * ratio, y - 6 * ratio); c.lineTo(x, y + 3 * ratio); c.closePath(); c.fill();
+  });
+  c.restore();
+}

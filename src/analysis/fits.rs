@@ -181,7 +181,11 @@ impl Candidates<'_> {
         let searches = self.stabilisation.searches.iter();
         let poles = searches.flat_map(|search| &search.diagram);
         let mut starts = Vec::new();
-        for &frequency in self.chosen.iter().filter(|one| (*first..=*last).contains(*one)) {
+        for &frequency in self
+            .chosen
+            .iter()
+            .filter(|one| (*first..=*last).contains(*one))
+        {
             let distance = |pole: &&StabilisationPole| (pole.frequency - frequency).abs();
             let nearest = |reach: f64, stable: bool| {
                 let known = poles.clone().filter(|pole| {
@@ -204,8 +208,7 @@ impl Candidates<'_> {
             let reach = 2.0 * self.lines.half_line() + width;
             let distance = |peak: &ModeReading| (peak.frequency - start.frequency).abs();
             let places = (0..peaks.len()).filter(|&place| distance(&peaks[place]) <= reach);
-            let place = places
-                .min_by(|&a, &b| distance(&peaks[a]).total_cmp(&distance(&peaks[b])));
+            let place = places.min_by(|&a, &b| distance(&peaks[a]).total_cmp(&distance(&peaks[b])));
             match (place, fit) {
                 (Some(place), fit) => {
                     let mut reading = peaks.remove(place);

@@ -373,7 +373,13 @@ impl<'a> Inputs<'a> {
             Some(decays) => {
                 let hum = quiet.hum_beside(&readings, &self.lines, &self.settings.mains);
                 let settings = &self.settings;
-                decays.fit(&mut readings, &self.lines, &settings.kinds, hum, &settings.poles)
+                decays.fit(
+                    &mut readings,
+                    &self.lines,
+                    &settings.kinds,
+                    hum,
+                    &settings.poles,
+                )
             }
             None => Stabilisation::default(),
         };

@@ -359,7 +359,8 @@ fn result(
             spectra.fitted.is_some(),
         );
         measurement.warnings.extend(unlisted);
-        let poles = Warning::poles_without_mode(recording.name(), &settings.poles, band, &spectra.readings);
+        let poles =
+            Warning::poles_without_mode(recording.name(), &settings.poles, band, &spectra.readings);
         measurement.warnings.extend(poles);
     }
     // What is shown of the recording is read again.

@@ -6,7 +6,8 @@ use super::property::{
 };
 use super::reader::{DescriptionError, Entry, Limits, Source, Table, with_unit};
 use super::recordings::{
-    check_lengths, check_places, read_ascending, read_hammer, read_measured, read_recording, read_sensors,
+    check_lengths, check_places, read_ascending, read_hammer, read_measured, read_recording,
+    read_sensors,
 };
 use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};

@@ -384,7 +384,7 @@ const ANSWERS: [(&str, usize, &[&str]); 6] = [
     ),
     ("mode shape · ", 1, &["position ", " mm", "displacement "]),
     (
-        "described model, joint fitted, mode ",
+        "exactly as described, joint fitted, mode ",
         1,
         &[
             " in ",

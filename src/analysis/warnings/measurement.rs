@@ -146,7 +146,9 @@ impl Warning {
                 (reading.frequency - pole).abs() <= 2.0 * (reading.half_line + width)
             })
         };
-        let without = poles.iter().filter(|pole| (band.0..=band.1).contains(*pole) && !found(**pole));
+        let without = poles
+            .iter()
+            .filter(|pole| (band.0..=band.1).contains(*pole) && !found(**pole));
         let without: Vec<String> = without.map(|pole| frequency_words(*pole)).collect();
         if without.is_empty() {
             return None;

@@ -52,7 +52,7 @@ fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
         format!("; modes above {fitted} took no part")
     });
     let before = pulls.iter().map(|pull| (pull.error_percent, pull.z));
-    let mut described = "described model, joint fitted".to_owned();
+    let mut described = "exactly as described, joint fitted".to_owned();
     let mut series = Vec::new();
     if let Ok(effect) = found_best(gap) {
         let name = format!("with {effect}{withheld}");

@@ -516,7 +516,8 @@ pub fn prediction(document: &Document) -> Option<Table> {
         true => (
             "Measured and predicted frequencies",
             "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
-             frequency. Used: the mode entered the estimate; the others are true predictions.",
+             frequency. Used: the mode entered the estimate; the others are true predictions. The estimate may move the \
+             beam's properties within their uncertainty: with the beam exactly as described errors are larger.",
         ),
         false => (
             "Predicted frequencies",

@@ -135,7 +135,13 @@ function allPoles(figure) {
 // A click on a pole chooses it; a click on one that is chosen, or beside it, leaves it out.
 function togglePole(figure, frequency, near) {
   var close = chosenPoles(figure).filter(function (other) { return Math.abs(other.at - frequency) <= near; });
-  if (close.length) close.forEach(function (other) { delete figure.poles[poleWords(other.at)]; });
+  // A mode that is left out is left out of all recordings.
+  if (close.length) all.filter(choosesPoles).forEach(function (one) {
+    chosenPoles(one).forEach(function (pole) {
+      var gone = close.some(function (other) { return other === pole || pole.mode && other.mode === pole.mode; });
+      if (gone) delete one.poles[poleWords(pole.at)];
+    });
+  });
   else figure.poles[poleWords(frequency)] = { at: frequency };
   all.filter(choosesPoles).forEach(showPoles);
 }

@@ -52,7 +52,7 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
         false => format!("Where, if something is missing: {}.", listed.join(", ")),
     };
     Some(format!(
-        "{places} Relative to its uncertainty, the described model misses mode {} in {} most: {} % ({} standard deviations).",
+        "{places} Exactly as described, the model misses mode {} in {} most, relative to the uncertainty: {} % ({} standard deviations).",
         worst.mode,
         place_of(worst),
         change(worst.error_percent, 3),
@@ -134,7 +134,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         _ => "shrink",
     };
     let mut text = format!(
-        "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
+        "How far: with {} the errors {shrink} from {} (exactly as described) to {} % (rms over fitted frequencies)",
         together(&found.hypothesis),
         percent(found.gap_before),
         left(found.gap_after, gap.noise_floor),

@@ -461,8 +461,9 @@ def descriptions():
         yield name, (first + BEAM + "[" + more).encode()
     for path in sorted([*ROOT.glob("recordings/*/*.toml"), *ROOT.glob("examples/*.toml")]):
         yield f"{path.parent.name}-{path.stem}", path.read_bytes()
-    guide = (ROOT / "docs/guide.md").read_text() + (ROOT / "README.md").read_text()
-    for at, part in enumerate(guide.split("```toml\n")[1:]):
+    documents = ["docs/guide.md", "docs/reference.md", "README.md"]
+    text = "".join((ROOT / name).read_text() for name in documents)
+    for at, part in enumerate(text.split("```toml\n")[1:]):
         yield f"guide-{at}", part.split("```")[0].encode()
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of README.md anew, from the samples.
+# Makes the pictures of README.md and docs/gallery.md anew, from the samples.
 #
 #   scripts/make_pictures.sh
 #
@@ -18,17 +18,22 @@ browser="${TAPJOINT_CHROMIUM:-chromium}"
 made="$(mktemp -d)"
 trap 'rm -r "$made"' EXIT
 
-"${tapjoint[@]}" run recordings/lap-joint/test.toml --out "$made/lap" --quiet
-cp "$made/lap/spectrum-taps.png" docs/pictures/spectrum.png
-"$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,860 \
+for test in lap-joint cantilever; do
+    "${tapjoint[@]}" run "recordings/$test/test.toml" --out "$made/$test" --quiet
+done
+cp "$made/lap-joint/spectrum-taps.png" docs/pictures/spectrum.png
+cp "$made/lap-joint/frf-taps.png" docs/pictures/frf.png
+cp "$made/lap-joint/cloud.png" docs/pictures/cloud.png
+cp "$made/cantilever/gap-place.png" docs/pictures/place.png
+"$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=1280,800 \
     --blink-settings=preferredColorScheme=1 --virtual-time-budget=4000 \
-    --screenshot="$PWD/docs/pictures/report.png" "file://$made/lap/report.html" 2>/dev/null
+    --screenshot="$PWD/docs/pictures/report.png" "file://$made/cantilever/report.html" 2>/dev/null
 # A page of few colours: a palette is a third of the size. Without Pillow it stays as it is.
 python3 - docs/pictures/*.png <<'END' || true
 import sys
 from PIL import Image
 
 for name in sys.argv[1:]:
-    Image.open(name).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(name, optimize=True)
+    Image.open(name).convert("RGB").quantize(128, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(name, optimize=True)
 END
 ls -l docs/pictures

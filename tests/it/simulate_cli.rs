@@ -138,22 +138,22 @@ fn regress_the_folder_holds_what_a_user_believes_and_the_truth_beside_it() {
 }
 
 #[test]
-fn regress_every_effect_is_listed_in_help_and_guide() {
+fn regress_every_effect_is_listed_in_help_and_reference() {
     let help = tapjoint(Path::new("."))
         .args(["simulate", "--help"])
         .output()
         .unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
-    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide.md");
-    let guide = fs::read_to_string(guide).unwrap();
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference.md");
+    let reference = fs::read_to_string(reference).unwrap();
     for id in EffectId::ALL {
         let name = id.name();
         // A bias of reading is in no recording.
         let is_listed = help.contains(&format!("\n  {name}: "));
         assert_eq!(is_listed, id != EffectId::Resolution, "{name}");
-        let mut rows = guide.lines().filter(|line| line.starts_with("| `"));
+        let mut rows = reference.lines().filter(|line| line.starts_with("| `"));
         let row = rows.find(|row| row.contains(&format!("`{name}`")));
-        let row = row.unwrap_or_else(|| panic!("{name} is not in the guide"));
+        let row = row.unwrap_or_else(|| panic!("{name} is not in the reference"));
         for info in id.parameters() {
             let parameter = format!("`{}`", info.name);
             assert!(row.contains(&parameter), "{name}: {parameter}");

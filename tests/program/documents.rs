@@ -1,21 +1,49 @@
-//! What the documents say: every command that they show runs as printed.
+//! What the documents say: every command that they show runs as printed, and answers as printed.
 
 use super::{program, samples};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tapjoint::pipeline::WARNING_CODES;
 
-/// The commands of a document's `console` blocks, with the code that they end with: lines that begin
-/// with "$ ", and "# exits with 1" behind those that have no answer.
-fn commands(text: &str) -> Vec<(String, i32)> {
+/// A command of a document's `console` blocks.
+struct Shown {
+    /// As typed: the line behind "$ ".
+    command: String,
+    /// The code that it ends with: that of "# exits with 1" behind it, else 0.
+    code: i32,
+    /// Lines of its answer that the document shows, in order.
+    answer: Vec<String>,
+}
+
+/// The commands of a document's `console` blocks. In an answer "..." stands for lines that are left out.
+fn commands(text: &str) -> Vec<Shown> {
+    let mut all: Vec<Shown> = Vec::new();
     let blocks = text.split("```console\n").skip(1);
-    let lines = blocks.flat_map(|block| block.split("```").next().unwrap_or_default().lines());
-    lines
-        .filter_map(|line| line.strip_prefix("$ "))
-        .map(|line| match line.split_once("# exits with ") {
-            Some((command, code)) => (command.trim().to_owned(), code.trim().parse().unwrap()),
-            None => (line.to_owned(), 0),
-        })
+    for line in blocks.flat_map(|block| block.split("```").next().unwrap_or_default().lines()) {
+        if let Some(typed) = line.strip_prefix("$ ") {
+            let (command, code) = match typed.split_once("# exits with ") {
+                Some((command, code)) => (command.trim(), code.trim().parse().unwrap()),
+                None => (typed, 0),
+            };
+            all.push(Shown {
+                command: command.to_owned(),
+                code,
+                answer: Vec::new(),
+            });
+        } else if !line.is_empty() && line != "..." {
+            all.last_mut().unwrap().answer.push(line.to_owned());
+        }
+    }
+    all
+}
+
+/// Test descriptions of a document: `toml` blocks whose first line is a comment with the name of a file.
+fn descriptions(text: &str) -> Vec<(&str, &str)> {
+    let blocks = text.split("```toml\n").skip(1);
+    let blocks = blocks.filter_map(|block| block.split("```").next());
+    blocks
+        .filter_map(|block| Some((block.lines().next()?.strip_prefix("# ")?, block)))
+        .filter(|(name, _)| name.ends_with(".toml"))
         .collect()
 }
 
@@ -41,9 +69,13 @@ fn prop_every_command_in_the_documents_runs_as_printed() {
         let text = std::fs::read_to_string(&document).unwrap();
         // One after the other in one folder, as a reader types them.
         let folder = samples();
-        for (command, code) in commands(&text) {
+        for (name, description) in descriptions(&text) {
+            std::fs::write(folder.path().join(name), description).unwrap();
+        }
+        for shown in commands(&text) {
+            let (command, code) = (&shown.command, shown.code);
             let run = Command::new("sh")
-                .args(["-c", &command])
+                .args(["-c", command])
                 .current_dir(folder.path())
                 .env("PATH", &path)
                 .output()
@@ -51,19 +83,27 @@ fn prop_every_command_in_the_documents_runs_as_printed() {
             let error = String::from_utf8_lossy(&run.stderr).into_owned();
             let place = document.display();
             assert_eq!(run.status.code(), Some(code), "{place}: {command}\n{error}");
+            let answer = String::from_utf8_lossy(&run.stdout).into_owned() + &error;
+            let mut lines = answer.lines();
+            for line in &shown.answer {
+                let is_printed = lines.any(|one| one.trim_end() == line.trim_end());
+                assert!(is_printed, "{place}: {command}: no {line:?} in\n{answer}");
+            }
             tried += 1;
         }
     }
     assert!(tried >= 20, "only {tried} commands were found");
 }
 
-/// Scripts look for these codes: the guide's table and the program's list have the same rows.
+/// Scripts look for these codes: the reference's table and the program's list have the same rows.
 #[test]
-fn prop_the_guide_lists_every_code_of_a_warning() {
-    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide.md");
-    let guide = std::fs::read_to_string(guide).unwrap();
+fn prop_the_reference_lists_every_code_of_a_warning() {
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference.md");
+    let reference = std::fs::read_to_string(reference).unwrap();
     let rows = WARNING_CODES.map(|(code, when)| format!("| `{code}` | {when} |"));
-    let (_, section) = guide.split_once("## Codes of the warnings").unwrap();
+    let (_, section) = reference
+        .split_once("\n## Codes of the warnings\n")
+        .unwrap();
     let (section, _) = section.split_once("\n## ").unwrap();
     let listed: Vec<&str> = section
         .lines()

@@ -83,6 +83,8 @@ use tapjoint_signal::recording::{FrequencyResponses, Recording};
 pub struct Analysis {
     /// Name of the test.
     pub name: String,
+    /// Name of the description's file, or of the bare recording's; `None` where it has none.
+    pub file: Option<String>,
     /// The structure; `None` for a bare recording.
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
@@ -158,6 +160,9 @@ pub fn run_test_watched(
     warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
+        file: Path::new(place.1)
+            .file_name()
+            .map(|file| file.to_string_lossy().into_owned()),
         structure: Some(structure),
         aside: found.aside,
         recordings,
@@ -253,6 +258,7 @@ fn analysis_of(mut recording: RecordingResult) -> Analysis {
     warnings.extend(doubts);
     Analysis {
         name: recording.file.clone(),
+        file: Some(recording.file.clone()),
         structure: None,
         aside: vec![None],
         verdicts,

@@ -38,7 +38,8 @@ pub(super) struct RunArguments {
     /// functions (UFF58, text, LabVIEW, MATLAB)
     #[arg(value_name = "FILE", value_parser = file_or_folder())]
     file: PathBuf,
-    /// Folder of the report; default: NAME-report beside FILE
+    /// Folder of the report; default: NAME-report beside FILE, or NAME-2-report where that holds the report of another
+    /// file
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Way of reading the frequencies; default: that of the description, else fit
@@ -56,12 +57,20 @@ pub(super) struct RunArguments {
 }
 
 impl RunArguments {
-    /// Returns the report's folder, for a test of this name.
-    fn folder(&self, name: &str) -> PathBuf {
-        match &self.out {
-            Some(out) => out.clone(),
-            None => self.file.with_file_name(report_folder(name)),
+    /// Returns the report's folder, for a test of this name. Folders with the report of another file are passed over; the
+    /// last of them comes second, with the name of that file.
+    fn folder(&self, name: &str) -> (PathBuf, Option<(PathBuf, String)>) {
+        if let Some(out) = &self.out {
+            return (out.clone(), None);
         }
+        let own = file_name(&self.file);
+        let numbered = |number| self.file.with_file_name(report_folder(name, number));
+        let (mut number, mut passed) = (1, None);
+        while let Some(other) = reported_file(&numbered(number)).filter(|other| *other != own) {
+            passed = Some((numbered(number), other));
+            number += 1;
+        }
+        (numbered(number), passed)
     }
 
     /// Returns the files that a report may consist of.
@@ -85,7 +94,7 @@ impl RunArguments {
             "gap": { "updated_model": { "file": MODEL_FILE } },
             "warnings": [],
         });
-        let folder = self.folder(&name);
+        let (folder, _) = self.folder(&name);
         let files = earlier_files(&report.to_string());
         vec![("out", files.iter().map(|file| folder.join(file)).collect())]
     }
@@ -143,8 +152,20 @@ fn only_description(folder: &Path) -> Result<PathBuf, String> {
     }
 }
 
-/// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens.
-fn report_folder(name: &str) -> String {
+/// Returns the name of the file whose report a folder holds; `None` without a report, and of one that does not name it.
+fn reported_file(folder: &Path) -> Option<String> {
+    // Other commands write a report.json alone.
+    if !folder.join("report.html").is_file() {
+        return None;
+    }
+    let text = fs::read_to_string(folder.join("report.json")).ok()?;
+    let report: serde_json::Value = serde_json::from_str(&text).ok()?;
+    Some(report["test"]["file"].as_str()?.to_owned())
+}
+
+/// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens. `number` tells
+/// the reports of one name apart, from 1.
+fn report_folder(name: &str, number: usize) -> String {
     let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
     let name: String = name
         .chars()
@@ -155,9 +176,10 @@ fn report_folder(name: &str) -> String {
         })
         .take(100)
         .collect();
-    match name.as_str() {
-        "" => "test-report".to_owned(),
-        name => format!("{name}-report"),
+    let name = if name.is_empty() { "test" } else { &name };
+    match number {
+        1 => format!("{name}-report"),
+        number => format!("{name}-{number}-report"),
     }
 }
 
@@ -177,7 +199,15 @@ pub(super) fn run(
             stem(&arguments.file)
         }
     };
-    let output = OutputFolder::prepare(&arguments.folder(&name), terminal.files())?;
+    let (folder, passed) = arguments.folder(&name);
+    if let Some((earlier, other)) = passed {
+        terminal.warn(&format!(
+            "{} holds the report of {other}; this report goes to {}; --out names another folder",
+            earlier.display(),
+            folder.display()
+        ));
+    }
+    let output = OutputFolder::prepare(&folder, terminal.files())?;
     let progress = terminal.progress("measuring, fitting and estimating");
     let analysis = match &described {
         Some(file) => file.analyse(
@@ -244,8 +274,9 @@ mod tests {
             ("x\ny", "x-y-report"),
         ];
         for (name, expected) in cases {
-            assert_eq!(report_folder(name), expected, "{name:?}");
+            assert_eq!(report_folder(name, 1), expected, "{name:?}");
             assert_eq!(Path::new(expected).components().count(), 1, "{expected:?}");
         }
+        assert_eq!(report_folder("x", 2), "x-2-report");
     }
 }

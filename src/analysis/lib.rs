@@ -44,15 +44,14 @@ pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
 pub use free_test::{FreeTest, FreeTestError, measure_free_test};
 pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
-pub use function_file::FunctionSettings;
-use function_file::measure_functions;
+pub use function_file::{FunctionSettings, measure_functions_watched};
 use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };
-use modes::modes_of_bare;
+use modes::{modes_of_bare, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
 use recording_result::amplitude_changes;
@@ -69,11 +68,12 @@ pub use structure::{
 };
 pub use warnings::{WARNING_CODES, Warning, meaning_of, severity_of, together};
 use warnings::{neglected_effects, of_amplitude};
-pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
-use wiring::{finish, measure_bare_watched};
+use wiring::finish;
+pub use wiring::{
+    PipelineError, Wiring, inspect_bare, measure_bare, measure_bare_watched, si_unit,
+};
 
 use std::path::Path;
-use std::slice::from_ref;
 use tapjoint_description::{ChannelRef, TestDescription};
 use tapjoint_signal::quality::QualityVerdict;
 use tapjoint_signal::recording::{FrequencyResponses, Recording};
@@ -244,29 +244,36 @@ pub fn run_functions_watched(
     settings: &FunctionSettings,
     watch: &dyn Watch,
 ) -> Result<Analysis, PipelineError> {
-    let mut work = Work::begin(watch, Stage::Spectra);
-    let result = measure_functions(functions, settings, &mut work)?;
+    let result = measure_functions_watched(functions, settings, watch)?;
     Ok(analysis_of(result))
 }
 
-/// The analysis of a recording about which nothing is described.
-fn analysis_of(mut recording: RecordingResult) -> Analysis {
-    let modes = modes_of_bare(&mut recording);
-    let (verdicts, doubts) = judge(from_ref(&recording));
-    let mut warnings = recording.measurement.warnings.clone();
-    warnings.extend(of_amplitude(amplitude_changes(from_ref(&recording))));
+/// Returns the analysis of measured recordings about which nothing is described, as one test of this name.
+pub fn analysis_of_bare(name: String, mut recordings: Vec<RecordingResult>) -> Analysis {
+    let aside = set_aside(&[], &recordings);
+    let (modes, doubts) = modes_of_bare(&mut recordings, &aside);
+    let measured = recordings.iter();
+    let measured = measured.flat_map(|recording| recording.measurement.warnings.iter().cloned());
+    let mut warnings: Vec<Warning> = measured.chain(doubts).collect();
+    warnings.extend(of_amplitude(amplitude_changes(&recordings)));
+    let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Analysis {
-        name: recording.file.clone(),
-        file: Some(recording.file.clone()),
+        file: Some(name.clone()),
+        name,
         structure: None,
-        aside: vec![None],
+        aside,
         verdicts,
         warnings: together(warnings),
         modes,
         lengths: Vec::new(),
         free_test: None,
         identification: None,
-        recordings: vec![recording],
+        recordings,
     }
+}
+
+/// The analysis of one recording about which nothing is described.
+fn analysis_of(recording: RecordingResult) -> Analysis {
+    analysis_of_bare(recording.file.clone(), vec![recording])
 }

@@ -170,19 +170,23 @@ fn run_command(
     stopwatch: Option<Arc<Stopwatch>>,
 ) -> anyhow::Result<Outcome> {
     // The files that the command reads and writes, from its arguments and its test description.
-    let files = matches
-        .subcommand()
-        .map_or_else(Files::default, |(_, own)| {
-            let [test, file] =
-                ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
-            let description = test.or(file.filter(|path| is_description(path)));
-            let test = description.and_then(|path| described(path));
-            let expanded = line.command.expanded(test.as_ref());
-            // `simulate` writes the recordings that the description names.
-            let read = description.map(PathBuf::as_path).zip(test.as_ref());
-            let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
-            Files::of(own, read, expanded)
-        });
+    let mut files = Files::default();
+    if let Some((_, own)) = matches.subcommand() {
+        let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
+        let mut named: Vec<PathBuf> = test.or(file).into_iter().cloned().collect();
+        if let Command::Run(arguments) = &line.command {
+            named = arguments.subject()?.files().to_vec();
+        }
+        let description = named.first().map(PathBuf::as_path);
+        let description = description.filter(|path| test.is_some() || is_description(path));
+        let test = description.and_then(described);
+        let expanded = line.command.expanded(test.as_ref());
+        // `simulate` writes the recordings that the description names.
+        let read = description.zip(test.as_ref());
+        let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
+        files = Files::of(own, read, expanded);
+        files.add_inputs(&named);
+    }
     for folder in files.folders() {
         publication::end_begun(folder, &files)?;
     }

@@ -98,6 +98,12 @@ impl Files {
         }
     }
 
+    /// Adds files that the command reads beside those of its arguments.
+    pub(super) fn add_inputs(&mut self, paths: &[PathBuf]) {
+        self.inputs
+            .extend(paths.iter().filter_map(|path| Place::of(path)));
+    }
+
     /// Returns the folders of all outputs.
     pub(super) fn folders(&self) -> BTreeSet<&Path> {
         let outputs = self.outputs.iter();

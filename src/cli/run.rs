@@ -7,20 +7,20 @@ use super::arguments::{
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
 use super::overwrite::Expanded;
-use super::place::is_description;
+use super::place::{FolderContents, RECORDINGS, is_description, report_in};
 use super::publication::OutputFolder;
-use super::recording::analyse;
+use super::recording::{analyse, analyse_together};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
-use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::slice::from_ref;
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
-use tapjoint::recording::ReadSettings;
+use tapjoint::recording::{MOST_FILES, ReadSettings};
 use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_section, run_files};
 
 /// Analyse a test, from recordings to joint, and write a report.
@@ -34,9 +34,9 @@ use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_sec
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// Test description (.toml), folder with one, recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response
-    /// functions (UFF58, text, LabVIEW, MATLAB)
-    #[arg(value_name = "FILE", value_parser = file_or_folder())]
+    /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58,
+    /// text, LabVIEW, MATLAB), or a folder with one description. All recordings in a folder without one are one test
+    #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Folder of the report; default: NAME-report beside FILE, or NAME-2-report where that holds the report of another
     /// file
@@ -57,14 +57,63 @@ pub(super) struct RunArguments {
 }
 
 impl RunArguments {
+    /// Returns what is to be run.
+    ///
+    /// # Errors
+    /// A folder that cannot be read, or that is no test.
+    pub(super) fn subject(&self) -> anyhow::Result<Subject> {
+        let path = &self.file;
+        if !path.is_dir() {
+            let path = path.clone();
+            return Ok(match is_description(&path) {
+                true => Subject::Described(path),
+                false => Subject::Bare(path),
+            });
+        }
+        let shown = path.display();
+        let found = FolderContents::of(path).with_context(|| format!("{shown}: cannot be read"))?;
+        match (&found.descriptions[..], &found.recordings[..]) {
+            ([only], _) => Ok(Subject::Described(only.clone())),
+            ([], [only]) => Ok(Subject::Bare(only.clone())),
+            ([], []) => bail!(
+                "{shown}: a folder without a description (.toml) and without recordings ({}); name a recording, or \
+                 write a description: `tapjoint init` prints one",
+                RECORDINGS.map(|ending| format!(".{ending}")).join(", ")
+            ),
+            ([], files) if files.len() > MOST_FILES => bail!(
+                "{shown}: a folder with {} recordings; allowed: up to {MOST_FILES}; write a description, which names \
+                 those of one test",
+                files.len()
+            ),
+            ([], files) => Ok(Subject::Folder(path.clone(), files.to_vec())),
+            (several, _) => {
+                let count = several.len();
+                let names = several.iter().take(MOST_NAMES).map(|file| file_name(file));
+                let mut names = names.collect::<Vec<_>>().join(", ");
+                if count > MOST_NAMES {
+                    names.push_str(", ...");
+                }
+                bail!("{shown}: a folder with {count} descriptions: {names}; name one")
+            }
+        }
+    }
+
     /// Returns the report's folder, for a test of this name. Folders with the report of another file are passed over; the
     /// last of them comes second, with the name of that file.
-    fn folder(&self, name: &str) -> (PathBuf, Option<(PathBuf, String)>) {
+    fn folder(&self, subject: &Subject, name: &str) -> (PathBuf, Option<(PathBuf, String)>) {
         if let Some(out) = &self.out {
             return (out.clone(), None);
         }
-        let own = file_name(&self.file);
-        let numbered = |number| self.file.with_file_name(report_folder(name, number));
+        let numbered = |number| match subject {
+            Subject::Described(file) | Subject::Bare(file) => {
+                file.with_file_name(report_folder(name, number))
+            }
+            Subject::Folder(folder, _) => folder.join(report_folder(name, number)),
+        };
+        let own = match subject {
+            Subject::Described(file) | Subject::Bare(file) => file_name(file),
+            Subject::Folder(..) => name.to_owned(),
+        };
         let (mut number, mut passed) = (1, None);
         while let Some(other) = reported_file(&numbered(number)).filter(|other| *other != own) {
             passed = Some((numbered(number), other));
@@ -75,14 +124,19 @@ impl RunArguments {
 
     /// Returns the files that a report may consist of.
     pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
-        let name = test.map_or_else(|| stem(&self.file), |test| test.name.clone());
-        let recordings: Vec<PathBuf> = match test {
-            Some(test) => test
+        // A folder that is no test is reported later.
+        let Ok(subject) = self.subject() else {
+            return Vec::new();
+        };
+        let name = test.map_or_else(|| subject.name(), |test| test.name.clone());
+        let recordings: Vec<PathBuf> = match (test, &subject) {
+            (Some(test), _) => test
                 .recordings
                 .iter()
                 .map(|one| one.name().into())
                 .collect(),
-            None => vec![self.file.clone()],
+            (None, Subject::Described(file) | Subject::Bare(file)) => vec![file.clone()],
+            (None, Subject::Folder(_, files)) => files.clone(),
         };
         let recordings: Vec<_> = recordings
             .into_iter()
@@ -94,17 +148,52 @@ impl RunArguments {
             "gap": { "updated_model": { "file": MODEL_FILE } },
             "warnings": [],
         });
-        let (folder, _) = self.folder(&name);
+        let (folder, _) = self.folder(&subject, &name);
         let files = earlier_files(&report.to_string());
         vec![("out", files.iter().map(|file| folder.join(file)).collect())]
     }
 }
 
+/// What is run.
+#[derive(Debug)]
+pub(super) enum Subject {
+    /// A test that a description describes.
+    Described(PathBuf),
+    /// A recording, or a file of functions.
+    Bare(PathBuf),
+    /// A folder, all recordings in which are one test.
+    Folder(PathBuf, Vec<PathBuf>),
+}
+
+impl Subject {
+    /// Returns the description, or the recordings.
+    pub(super) fn files(&self) -> &[PathBuf] {
+        match self {
+            Self::Described(file) | Self::Bare(file) => from_ref(file),
+            Self::Folder(_, files) => files,
+        }
+    }
+
+    /// Returns the name of a test without a description: that of its recording, or of their folder.
+    fn name(&self) -> String {
+        match self {
+            Self::Described(file) | Self::Bare(file) => stem(file),
+            // The folder may be `.` or `..`.
+            Self::Folder(folder, _) => {
+                file_name(&fs::canonicalize(folder).unwrap_or_else(|_| folder.clone()))
+            }
+        }
+    }
+}
+
+/// Most descriptions that a message lists.
+const MOST_NAMES: usize = 10;
+
 /// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
 const SAMPLES: usize = 1000;
 
 /// Reads the description, and checks that options and recordings go with it.
-fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
+fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let bare = &arguments.recording;
     if bare.hammer.is_some()
         || bare.overload.is_some()
@@ -114,7 +203,7 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
             "--hammer, --sample-rate, --time-unit, --values, --variable and --overload are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
-    let mut file = read_test(&arguments.file, terminal)?;
+    let mut file = read_test(file, terminal)?;
     if let Some(reading) = arguments.reading {
         file.test.analysis.reading = reading;
     }
@@ -123,43 +212,9 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     Ok(file)
 }
 
-/// Returns the parser of a file; a folder stands for the only description in it.
-fn file_or_folder() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| match path.is_dir() {
-        true => only_description(&path),
-        false => Ok(path),
-    })
-}
-
-/// Returns the only description in a folder.
-///
-/// # Errors
-/// There is none, there are several, or the folder cannot be read.
-fn only_description(folder: &Path) -> Result<PathBuf, String> {
-    let entries = fs::read_dir(folder).map_err(|problem| problem.to_string())?;
-    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut found: Vec<PathBuf> = files.filter(|file| is_description(file)).collect();
-    found.sort();
-    let names = found.iter().map(|file| file_name(file));
-    let names = names.collect::<Vec<_>>().join(", ");
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        0 => Err(
-            "a folder without a description (.toml); `tapjoint init` prints one, or name a recording"
-                .to_owned(),
-        ),
-        count => Err(format!("a folder with {count} descriptions: {names}; name one")),
-    }
-}
-
 /// Returns the name of the file whose report a folder holds; `None` without a report, and of one that does not name it.
 fn reported_file(folder: &Path) -> Option<String> {
-    // Other commands write a report.json alone.
-    if !folder.join("report.html").is_file() {
-        return None;
-    }
-    let text = fs::read_to_string(folder.join("report.json")).ok()?;
-    let report: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let report: serde_json::Value = serde_json::from_str(&report_in(folder)?).ok()?;
     Some(report["test"]["file"].as_str()?.to_owned())
 }
 
@@ -188,18 +243,20 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    let described = match is_description(&arguments.file) {
-        true => Some(resolve(arguments, &terminal)?),
-        false => None,
+    let subject = arguments.subject()?;
+    let described = match &subject {
+        Subject::Described(file) => Some(resolve(arguments, file, &terminal)?),
+        Subject::Bare(file) => {
+            check_file(file)?;
+            None
+        }
+        Subject::Folder(..) => None,
     };
     let name = match &described {
         Some(file) => file.test.name.clone(),
-        None => {
-            check_file(&arguments.file)?;
-            stem(&arguments.file)
-        }
+        None => subject.name(),
     };
-    let (folder, passed) = arguments.folder(&name);
+    let (folder, passed) = arguments.folder(&subject, &name);
     if let Some((earlier, other)) = passed {
         terminal.warn(&format!(
             "{} holds the report of {other}; this report goes to {}; --out names another folder",
@@ -209,21 +266,22 @@ pub(super) fn run(
     }
     let output = OutputFolder::prepare(&folder, terminal.files())?;
     let progress = terminal.progress("measuring, fitting and estimating");
-    let analysis = match &described {
-        Some(file) => file.analyse(
+    let (bare, reading) = (&arguments.recording, arguments.reading.unwrap_or_default());
+    let analysis = match (&described, &subject) {
+        (Some(file), _) => file.analyse(
             &IdentifySettings {
                 monte_carlo: Some((SAMPLES, seed)),
                 ..perturbed_by(arguments.method)
             },
             terminal.watch(),
         )?,
-        None => analyse(
-            &arguments.file,
-            &arguments.recording,
-            &SpectrumSettings::default(),
-            arguments.reading.unwrap_or_default(),
-            terminal.watch(),
-        )?,
+        (None, Subject::Described(file) | Subject::Bare(file)) => {
+            let spectrum = SpectrumSettings::default();
+            analyse(file, bare, &spectrum, reading, terminal.watch())?
+        }
+        (None, Subject::Folder(_, files)) => {
+            analyse_together(name, files, bare, reading, terminal.watch())?
+        }
     };
     let mut document = document_of(&analysis);
     let mut model = None;

@@ -19,6 +19,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use tapjoint::description::TestDescription;
+use tapjoint::report::VERSION_HEAD;
 
 /// Options that name an output; all other paths are inputs.
 const OUTPUTS: [&str; 8] = [
@@ -203,7 +204,7 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
 }
 
 /// Returns the files that a description names: recordings, modes, and the free bar's test with its own.
-fn files_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
+pub(super) fn files_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let recordings = test.recordings.iter();
     let modes = test.measured.iter().filter_map(|one| one.file.as_ref());
@@ -308,7 +309,7 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// | HTML | end of the title |
 /// | JSON | an object with a whole `version` and a list `warnings` |
 /// | CSV | names of the first columns |
-/// | TOML, manual page, deck | first comment |
+/// | TOML, manual page, deck, version of a page | first comment |
 /// | list of checksums | its name, and the form of its lines |
 ///
 /// A file of any other format, and a file that cannot be read, counts as foreign.
@@ -359,7 +360,7 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
                 lines.flat_map(|line| line.trim_start_matches(['$', '*']).split_whitespace());
             words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
         }
-        _ if text.starts_with(PAGE_HEAD) => true,
+        _ if text.starts_with(PAGE_HEAD) || text.starts_with(VERSION_HEAD) => true,
         _ if path.ends_with(CHECKSUMS) && !checksums(&text).is_empty() => true,
         _ => CSV_HEADS
             .iter()

@@ -21,7 +21,10 @@ use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use tapjoint::recording::{MOST_FILES, ReadSettings};
-use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_section, run_files};
+use tapjoint::report::{
+    MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, gap_section, run_files,
+    watched_files,
+};
 
 /// Analyse a test, from recordings to joint, and write a report.
 ///
@@ -37,7 +40,7 @@ pub(super) struct RunArguments {
     /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58,
     /// text, LabVIEW, MATLAB), or a folder with one description. All recordings in a folder without one are one test
     #[arg(value_name = "FILE")]
-    file: PathBuf,
+    pub(super) file: PathBuf,
     /// Folder of the report; default: NAME-report beside FILE, or NAME-2-report where that holds the report of another
     /// file
     #[arg(long, value_name = "DIR")]
@@ -122,8 +125,12 @@ impl RunArguments {
         (numbered(number), passed)
     }
 
-    /// Returns the files that a report may consist of.
-    pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
+    /// Returns the files that a report may consist of, also one that is watched.
+    pub(super) fn expanded(
+        &self,
+        test: Option<&TestDescription>,
+        is_watched: bool,
+    ) -> Vec<Expanded> {
         // A folder that is no test is reported later.
         let Ok(subject) = self.subject() else {
             return Vec::new();
@@ -149,7 +156,8 @@ impl RunArguments {
             "warnings": [],
         });
         let (folder, _) = self.folder(&subject, &name);
-        let files = earlier_files(&report.to_string());
+        let mut files = earlier_files(&report.to_string());
+        files.retain(|file| is_watched || file != VERSION_FILE);
         vec![("out", files.iter().map(|file| folder.join(file)).collect())]
     }
 }
@@ -238,8 +246,10 @@ fn report_folder(name: &str, number: usize) -> String {
     }
 }
 
+/// Runs a test. The page of one that is watched reloads itself.
 pub(super) fn run(
     arguments: &RunArguments,
+    is_watched: bool,
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
@@ -305,7 +315,11 @@ pub(super) fn run(
     if let Some(model) = model {
         output.add(MODEL_FILE, model.as_bytes())?;
     }
-    for file in run_files(&document, drawn)? {
+    let files = match is_watched {
+        true => watched_files(&document, drawn)?,
+        false => run_files(&document, drawn)?,
+    };
+    for file in files {
         output.add(&file.name, &file.bytes)?;
     }
     let (folder, left) = output.publish_report()?;

@@ -5,7 +5,7 @@ use super::fits::{Candidates, Stabilisation, stabilisation};
 use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
 use super::recording_result::{Conditions, RecordingResult, Response};
-use super::stages::{Stage, Work};
+use super::stages::{Stage, Watch, Work};
 use super::warnings::Warning;
 use num_complex::Complex64;
 use tapjoint_description::{FunctionForm, ReadBy, SensorKind};
@@ -33,6 +33,19 @@ pub struct FunctionSettings {
     pub reading: ReadBy,
     /// Frequencies (Hz) of the modes that were chosen by hand; empty where the program chooses.
     pub poles: Vec<f64>,
+}
+
+/// Reads the resonances of frequency response functions, and announces the stages to `watch`.
+///
+/// # Errors
+/// A band without enough lines.
+pub fn measure_functions_watched(
+    functions: &FrequencyResponses,
+    settings: &FunctionSettings,
+    watch: &dyn Watch,
+) -> Result<RecordingResult, MeasureError> {
+    let mut work = Work::begin(watch, Stage::Spectra);
+    measure_functions(functions, settings, &mut work)
 }
 
 /// Reads the resonances of frequency response functions. `work` goes through the stages of spectra and fits.

@@ -128,7 +128,7 @@ fn numbered(
         let taken = places.iter().filter_map(|&place| all[place].take());
         let mut own: Vec<RecordingResult> = taken.collect();
         let own_test = test.of_length(length);
-        let aside = set_aside(&own_test, &own);
+        let aside = set_aside(&own_test.recordings, &own);
         if let Some(length) = length {
             let structure = tested_structure(&own_test);
             let details_of_length = structure_details(&own_test, &structure.beam);

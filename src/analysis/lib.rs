@@ -45,8 +45,7 @@ pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
 pub use found::look_at;
 pub use free_test::{FreeTest, FreeTestError, measure_free_test};
 pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
-pub use function_file::FunctionSettings;
-use function_file::measure_functions;
+pub use function_file::{FunctionSettings, measure_functions_watched};
 use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
@@ -56,7 +55,7 @@ pub use measured_shapes::{
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };
-use modes::modes_of_bare;
+use modes::{modes_of_bare, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
 use recording_result::amplitude_changes;
@@ -73,11 +72,12 @@ pub use structure::{
 };
 pub use warnings::{WARNING_CODES, Warning, meaning_of, severity_of, together};
 use warnings::{neglected_effects, of_amplitude};
-pub use wiring::{PipelineError, Wiring, inspect_bare, measure_bare, si_unit};
-use wiring::{finish, measure_bare_watched};
+use wiring::finish;
+pub use wiring::{
+    PipelineError, Wiring, inspect_bare, measure_bare, measure_bare_watched, si_unit,
+};
 
 use std::path::Path;
-use std::slice::from_ref;
 use tapjoint_description::{ChannelRef, TestDescription};
 use tapjoint_signal::quality::QualityVerdict;
 use tapjoint_signal::recording::{FrequencyResponses, Recording};
@@ -87,6 +87,8 @@ use tapjoint_signal::recording::{FrequencyResponses, Recording};
 pub struct Analysis {
     /// Name of the test.
     pub name: String,
+    /// Name of the description's file, or of the bare recording's; `None` where it has none.
+    pub file: Option<String>,
     /// The structure; `None` for a bare recording.
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
@@ -162,6 +164,9 @@ pub fn run_test_watched(
     warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
+        file: Path::new(place.1)
+            .file_name()
+            .map(|file| file.to_string_lossy().into_owned()),
         structure: Some(structure),
         aside: found.aside,
         recordings,
@@ -243,28 +248,36 @@ pub fn run_functions_watched(
     settings: &FunctionSettings,
     watch: &dyn Watch,
 ) -> Result<Analysis, PipelineError> {
-    let mut work = Work::begin(watch, Stage::Spectra);
-    let result = measure_functions(functions, settings, &mut work)?;
+    let result = measure_functions_watched(functions, settings, watch)?;
     Ok(analysis_of(result))
 }
 
-/// The analysis of a recording about which nothing is described.
-fn analysis_of(mut recording: RecordingResult) -> Analysis {
-    let modes = modes_of_bare(&mut recording);
-    let (verdicts, doubts) = judge(from_ref(&recording));
-    let mut warnings = recording.measurement.warnings.clone();
-    warnings.extend(of_amplitude(amplitude_changes(from_ref(&recording))));
+/// Returns the analysis of measured recordings about which nothing is described, as one test of this name.
+pub fn analysis_of_bare(name: String, mut recordings: Vec<RecordingResult>) -> Analysis {
+    let aside = set_aside(&[], &recordings);
+    let (modes, doubts) = modes_of_bare(&mut recordings, &aside);
+    let measured = recordings.iter();
+    let measured = measured.flat_map(|recording| recording.measurement.warnings.iter().cloned());
+    let mut warnings: Vec<Warning> = measured.chain(doubts).collect();
+    warnings.extend(of_amplitude(amplitude_changes(&recordings)));
+    let (verdicts, doubts) = judge(&recordings);
     warnings.extend(doubts);
     Analysis {
-        name: recording.file.clone(),
+        file: Some(name.clone()),
+        name,
         structure: None,
-        aside: vec![None],
+        aside,
         verdicts,
         warnings: together(warnings),
         modes,
         lengths: Vec::new(),
         free_test: None,
         identification: None,
-        recordings: vec![recording],
+        recordings,
     }
+}
+
+/// The analysis of one recording about which nothing is described.
+fn analysis_of(recording: RecordingResult) -> Analysis {
+    analysis_of_bare(recording.file.clone(), vec![recording])
 }

@@ -12,7 +12,9 @@ use super::warnings::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
-use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
+use tapjoint_description::{
+    FitParameter, MeasuredFrequencies, RecordingDescription, TestDescription,
+};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::pairing::{MeasuredPeak, PairingSettings, ShapeAt, SizeAt};
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
@@ -41,9 +43,9 @@ const FREE_BEAM_MODES: usize = 30;
 
 /// Returns how each recording differs from the first, so that it is left out of the list of modes; `None` where it
 /// belongs to the reference configuration: the first recording, and all others with its sensor positions, fastened
-/// masses and tap level.
+/// masses and tap level. `described` are the recordings of the description; none of bare recordings.
 pub(super) fn set_aside(
-    test: &TestDescription,
+    described: &[RecordingDescription],
     recordings: &[RecordingResult],
 ) -> Vec<Option<String>> {
     let Some(first) = recordings.first() else {
@@ -58,7 +60,7 @@ pub(super) fn set_aside(
                 words.push(format!("{} times its tap level", times(ratio)));
             }
         }
-        if let (Some(first), Some(own)) = (test.recordings.first(), test.recordings.get(index)) {
+        if let (Some(first), Some(own)) = (described.first(), described.get(index)) {
             if first.at != own.at {
                 words.push("sensors elsewhere".to_owned());
             }
@@ -102,18 +104,10 @@ pub fn modes_of_recordings(
     details: &StructureDetails,
 ) -> (Vec<ModeResult>, Vec<Warning>) {
     let seen: Vec<&RecordingResult> = reference.iter().map(|&index| &recordings[index]).collect();
-    let shown = seen.iter().map(|recording| BandReadings {
-        band: recording.looked_at().unwrap_or((0.0, f64::INFINITY)),
-        tap: recording.conditions.tap,
-        readings: recording.readings().to_vec(),
-    });
-    let merged = merge_modes(&shown.collect::<Vec<_>>()).into_iter();
-    let mut modes: Vec<ModeResult> = merged
-        .map(|mode| ModeResult {
-            lambda: Some(structure.beam.lambda_of(mode.reading.frequency)),
-            ..ModeResult::of(mode.reading, &seen[mode.recording].file)
-        })
-        .collect();
+    let mut modes = merged(&seen);
+    for mode in &mut modes {
+        mode.lambda = Some(structure.beam.lambda_of(mode.frequency));
+    }
     let bands = seen.iter().filter_map(|recording| recording.looked_at());
     let placed = seen.iter();
     let placed = placed.flat_map(|recording| &recording.conditions.sensor_positions);
@@ -124,8 +118,32 @@ pub fn modes_of_recordings(
         sensors: placed.map(|(name, place)| (name.clone(), *place)).collect(),
     };
     let mut warnings = number(&mut modes, &candidates, structure, details);
+    warnings.extend(add_repeats(&mut modes, recordings, reference));
+    (modes, warnings)
+}
+
+/// Merges the readings of recordings into one list of modes, which have no numbers yet.
+fn merged(recordings: &[&RecordingResult]) -> Vec<ModeResult> {
+    let shown = recordings.iter().map(|recording| BandReadings {
+        band: recording.looked_at().unwrap_or((0.0, f64::INFINITY)),
+        tap: recording.conditions.tap,
+        readings: recording.readings().to_vec(),
+    });
+    let merged = merge_modes(&shown.collect::<Vec<_>>()).into_iter();
+    merged
+        .map(|mode| ModeResult::of(mode.reading, &recordings[mode.recording].file))
+        .collect()
+}
+
+/// Numbers every recording's own readings by the numbered `modes`, and gives these their frequencies in the `reference`
+/// recordings. Warns of modes that moved between them.
+fn add_repeats(
+    modes: &mut [ModeResult],
+    recordings: &mut [RecordingResult],
+    reference: &[usize],
+) -> Option<Warning> {
     for recording in recordings.iter_mut() {
-        recording.mode_numbers = own_numbers(&modes, recording.readings());
+        recording.mode_numbers = own_numbers(modes, recording.readings());
     }
     for mode in modes.iter_mut().filter(|mode| mode.mode.is_some()) {
         let mut frequencies = Vec::new();
@@ -148,20 +166,23 @@ pub fn modes_of_recordings(
         }
         mode.between = between(&frequencies);
     }
-    warnings.extend(Warning::moved_modes(&modes));
-    (modes, warnings)
+    Warning::moved_modes(modes)
 }
 
-/// The readings of a bare recording, numbered as they come.
-pub(super) fn modes_of_bare(recording: &mut RecordingResult) -> Vec<ModeResult> {
-    let readings = recording.readings().iter().cloned();
-    let mut modes: Vec<ModeResult> = readings
-        .map(|reading| ModeResult::of(reading, &recording.file))
-        .collect();
+/// The readings of bare recordings that are not set `aside`, merged and numbered as they come; the readings of all others
+/// get the same numbers.
+pub(super) fn modes_of_bare(
+    recordings: &mut [RecordingResult],
+    aside: &[Option<String>],
+) -> (Vec<ModeResult>, Option<Warning>) {
+    let mut reference: Vec<usize> = (0..recordings.len()).collect();
+    reference.retain(|&index| aside[index].is_none());
+    let seen: Vec<&RecordingResult> = reference.iter().map(|&index| &recordings[index]).collect();
+    let mut modes = merged(&seen);
     let all = unlabelled(&modes);
     number_in_order(&mut modes, &all);
-    recording.mode_numbers = modes.iter().map(|mode| mode.mode).collect();
-    modes
+    let warnings = add_repeats(&mut modes, recordings, &reference);
+    (modes, warnings)
 }
 
 /// The frequencies that the description gives.

@@ -213,8 +213,11 @@ pub fn measure_bare(
     measure_bare_watched(recording, hammer, adjust, &())
 }
 
-/// Measures as [`measure_bare`] does, and announces the stages.
-pub(super) fn measure_bare_watched(
+/// Measures as [`measure_bare`] does, and announces the stages to `watch`.
+///
+/// # Errors
+/// Those of [`measure_bare`].
+pub fn measure_bare_watched(
     recording: Recording,
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),

@@ -29,6 +29,7 @@ mod recording;
 mod resolution;
 mod run;
 mod simulate;
+mod watch;
 
 use arguments::CommonArguments;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -67,6 +68,7 @@ struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::RunArguments),
+    Watch(watch::WatchArguments),
     Init(program::InitArguments),
     Inspect(recording::InspectArguments),
     Spectrum(recording::SpectrumArguments),
@@ -128,16 +130,32 @@ pub(super) fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
         }
     };
+    let ready = staging::watch_signals().map_err(Into::into);
+    let ready = ready.and_then(|()| line.common.set_threads());
+    let outcome = ready.and_then(|()| match &line.command {
+        Command::Watch(arguments) => {
+            watch::run(arguments, line.common.quiet, || timed(&line, &matches))
+        }
+        _ => timed(&line, &matches),
+    });
+    match outcome {
+        Ok(Outcome::Answered) => ExitCode::SUCCESS,
+        Ok(Outcome::NoAnswer) => ExitCode::from(1),
+        Err(error) => {
+            terminal::print_error(&error);
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Runs the command, and prints what it took where that was asked for.
+fn timed(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
     let start = Instant::now();
     let timings = line.command.timings();
     let stopwatch = timings
         .is_some_and(|given| given.timings)
         .then(|| Arc::new(Stopwatch::start()));
-    if let Err(cause) = staging::watch_signals() {
-        terminal::print_error(&cause.into());
-        return ExitCode::from(2);
-    }
-    let outcome = run_command(&line, &matches, stopwatch.clone());
+    let outcome = run_command(line, matches, stopwatch.clone());
     if let Some(stopwatch) = stopwatch.filter(|_| outcome.is_ok() && !line.common.quiet) {
         let _ = write!(
             io::stderr(),
@@ -154,14 +172,7 @@ pub(super) fn main() -> ExitCode {
             line.common.seed
         );
     }
-    match outcome {
-        Ok(Outcome::Answered) => ExitCode::SUCCESS,
-        Ok(Outcome::NoAnswer) => ExitCode::from(1),
-        Err(error) => {
-            terminal::print_error(&error);
-            ExitCode::from(2)
-        }
-    }
+    outcome
 }
 
 fn run_command(
@@ -170,28 +181,34 @@ fn run_command(
     stopwatch: Option<Arc<Stopwatch>>,
 ) -> anyhow::Result<Outcome> {
     // The files that the command reads and writes, from its arguments and its test description.
-    let files = matches
-        .subcommand()
-        .map_or_else(Files::default, |(_, own)| {
-            let [test, file] =
-                ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
-            let description = test.or(file.filter(|path| is_description(path)));
-            let test = description.and_then(|path| described(path));
-            let expanded = line.command.expanded(test.as_ref());
-            // `simulate` writes the recordings that the description names.
-            let read = description.map(PathBuf::as_path).zip(test.as_ref());
-            let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
-            Files::of(own, read, expanded)
-        });
+    let mut files = Files::default();
+    if let Some((_, own)) = matches.subcommand() {
+        let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
+        let mut named: Vec<PathBuf> = test.or(file).into_iter().cloned().collect();
+        if let Command::Run(arguments)
+        | Command::Watch(watch::WatchArguments { run: arguments, .. }) = &line.command
+        {
+            named = arguments.subject()?.files().to_vec();
+        }
+        let description = named.first().map(PathBuf::as_path);
+        let description = description.filter(|path| test.is_some() || is_description(path));
+        let test = description.and_then(described);
+        let expanded = line.command.expanded(test.as_ref());
+        // `simulate` writes the recordings that the description names.
+        let read = description.zip(test.as_ref());
+        let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
+        files = Files::of(own, read, expanded);
+        files.add_inputs(&named);
+    }
     for folder in files.folders() {
         publication::end_begun(folder, &files)?;
     }
     files.check()?;
-    line.common.set_threads()?;
     let terminal = Terminal::new(&line.common, files, stopwatch)?;
     let seed = line.common.seed;
     match &line.command {
-        Command::Run(arguments) => run::run(arguments, seed, terminal),
+        Command::Run(arguments) => run::run(arguments, false, seed, terminal),
+        Command::Watch(arguments) => run::run(&arguments.run, true, seed, terminal),
         Command::Init(arguments) => program::print_template(arguments, terminal),
         Command::Inspect(arguments) => recording::inspect(arguments, terminal),
         Command::Spectrum(arguments) => recording::spectrum(arguments, terminal),
@@ -222,6 +239,7 @@ impl Command {
     fn timings(&self) -> Option<&TimingsArguments> {
         match self {
             Self::Run(arguments) => Some(&arguments.timings),
+            Self::Watch(arguments) => Some(&arguments.run.timings),
             Self::Inspect(arguments) => Some(&arguments.timings),
             Self::Spectrum(arguments) => Some(&arguments.timings),
             Self::Frf(arguments) => Some(&arguments.timings),
@@ -245,7 +263,8 @@ impl Command {
     /// Returns the files of those options that write several files.
     fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
         match self {
-            Self::Run(arguments) => arguments.expanded(test),
+            Self::Run(arguments) => arguments.expanded(test, false),
+            Self::Watch(arguments) => arguments.run.expanded(test, true),
             Self::Frf(arguments) => arguments.expanded(test),
             Self::BlindCheck(arguments) => arguments.expanded(),
             Self::Compare(arguments) => arguments.expanded(),

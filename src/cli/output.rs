@@ -41,9 +41,10 @@ pub(super) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
 }
 
 /// Length and time of an existing file: when they change, somebody else has written it.
-type State = (u64, Option<SystemTime>);
+pub(super) type State = (u64, Option<SystemTime>);
 
-fn state_of(path: &Path) -> Option<State> {
+/// Returns length and time of a file; `None` without one.
+pub(super) fn state_of(path: &Path) -> Option<State> {
     let found = fs::metadata(path).ok()?;
     Some((found.len(), found.modified().ok()))
 }

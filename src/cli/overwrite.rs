@@ -19,6 +19,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use tapjoint::description::TestDescription;
+use tapjoint::report::VERSION_HEAD;
 
 /// Options that name an output; all other paths are inputs.
 const OUTPUTS: [&str; 8] = [
@@ -96,6 +97,12 @@ impl Files {
                 .collect(),
             force: matches.get_flag("force"),
         }
+    }
+
+    /// Adds files that the command reads beside those of its arguments.
+    pub(super) fn add_inputs(&mut self, paths: &[PathBuf]) {
+        self.inputs
+            .extend(paths.iter().filter_map(|path| Place::of(path)));
     }
 
     /// Returns the folders of all outputs.
@@ -302,7 +309,7 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// | HTML | end of the title |
 /// | JSON | an object with a whole `version` and a list `warnings` |
 /// | CSV | names of the first columns |
-/// | TOML, manual page, deck | first comment |
+/// | TOML, manual page, deck, version of a page | first comment |
 /// | list of checksums | its name, and the form of its lines |
 ///
 /// A file of any other format, and a file that cannot be read, counts as foreign.
@@ -353,7 +360,7 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
                 lines.flat_map(|line| line.trim_start_matches(['$', '*']).split_whitespace());
             words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
         }
-        _ if text.starts_with(PAGE_HEAD) => true,
+        _ if text.starts_with(PAGE_HEAD) || text.starts_with(VERSION_HEAD) => true,
         // A list of many files is longer than what was looked at.
         _ if path.ends_with(CHECKSUMS) => !checksums(&fs::read_to_string(path)?).is_empty(),
         _ => CSV_HEADS

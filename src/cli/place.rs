@@ -3,6 +3,7 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use tapjoint::report::earlier_files;
 
 /// Links that are followed one after the other.
 const LINKS: usize = 40;
@@ -115,4 +116,54 @@ pub(super) fn owner_of(_found: &fs::Metadata) -> Option<u32> {
 pub(super) fn is_description(path: &Path) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// Endings of the names of recordings in a folder. Text files of other endings may be notes.
+pub(super) const RECORDINGS: [&str; 8] = ["wav", "flac", "csv", "uff", "unv", "58", "lvm", "mat"];
+
+/// Files of a folder that a test may consist of, each list in order.
+#[derive(Debug, Default)]
+pub(super) struct FolderContents {
+    /// Test descriptions.
+    pub(super) descriptions: Vec<PathBuf>,
+    /// Recordings and files of functions.
+    pub(super) recordings: Vec<PathBuf>,
+}
+
+impl FolderContents {
+    /// Looks into a folder. Hidden files, and files of a report that was written into it, are left out.
+    ///
+    /// # Errors
+    /// The folder cannot be read.
+    pub(super) fn of(folder: &Path) -> io::Result<Self> {
+        let report = report_in(folder).map_or_else(Vec::new, |report| earlier_files(&report));
+        let mut files = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if !name.starts_with('.') && !report.contains(&name.into_owned()) && path.is_file() {
+                files.push(path);
+            }
+        }
+        files.sort();
+        let (descriptions, mut recordings): (Vec<_>, Vec<_>) =
+            files.into_iter().partition(|file| is_description(file));
+        recordings.retain(|file| {
+            let ending = file.extension().unwrap_or_default().to_string_lossy();
+            RECORDINGS.contains(&&*ending.to_lowercase())
+        });
+        Ok(Self {
+            descriptions,
+            recordings,
+        })
+    }
+}
+
+/// Returns the text of the report.json of a report in a folder; `None` without a report.
+pub(super) fn report_in(folder: &Path) -> Option<String> {
+    // Other commands write a report.json alone.
+    let is_report = folder.join("report.html").is_file();
+    fs::read_to_string(folder.join("report.json"))
+        .ok()
+        .filter(|_| is_report)
 }

@@ -24,7 +24,7 @@ use tapjoint::study::publication::reproduce;
 const TASKS: &[(&str, &[&str])] = &[
     (
         "A test from recordings to report",
-        &["init", "run", "inspect"],
+        &["init", "run", "watch", "inspect"],
     ),
     ("Spectra", &["spectrum", "frf"]),
     (

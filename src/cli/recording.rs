@@ -11,11 +11,12 @@ use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use anyhow::{bail, ensure};
 use clap::Args;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use tapjoint::description::ReadBy;
 use tapjoint::pipeline::{
-    Analysis, FunctionSettings, MeasureSettings, Stage, Watch, Work, inspect_bare,
-    run_functions_watched, run_recording_watched, together,
+    Analysis, FunctionSettings, MeasureSettings, RecordingResult, Stage, Watch, Work,
+    analysis_of_bare, inspect_bare, measure_bare_watched, measure_functions_watched, together,
 };
 use tapjoint::recording::{
     RecordingError, is_universal_file, list_datasets, open_frequency_responses,
@@ -25,7 +26,7 @@ use tapjoint::report::{datasets_of, document_of, inspection_of, render_spectrum_
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
 ///
 /// # Errors
-/// The file cannot be read, an option does not apply to functions, or the analysis is not possible.
+/// Those of [`measured`].
 pub(super) fn analyse(
     path: &Path,
     recording: &RecordingArguments,
@@ -33,6 +34,42 @@ pub(super) fn analyse(
     reading: ReadBy,
     watch: &dyn Watch,
 ) -> anyhow::Result<Analysis> {
+    let result = measured(path, recording, spectrum, reading, watch)?;
+    Ok(analysis_of_bare(result.file.clone(), vec![result]))
+}
+
+/// Analyses several files as one test of this name.
+///
+/// # Errors
+/// Those of [`measured`], for the first file that has any.
+pub(super) fn analyse_together(
+    name: String,
+    files: &[PathBuf],
+    recording: &RecordingArguments,
+    reading: ReadBy,
+    watch: &dyn Watch,
+) -> anyhow::Result<Analysis> {
+    let spectrum = SpectrumSettings::default();
+    // In parallel, but collected in order, so that of several errors the first is reported.
+    let results: Vec<anyhow::Result<_>> = files
+        .par_iter()
+        .map(|file| measured(file, recording, &spectrum, reading, watch))
+        .collect();
+    let results = results.into_iter().collect::<anyhow::Result<_>>()?;
+    Ok(analysis_of_bare(name, results))
+}
+
+/// Measures a recording, or the frequency response functions of a file without samples in time.
+///
+/// # Errors
+/// The file cannot be read, an option does not apply to functions, or the analysis is not possible.
+fn measured(
+    path: &Path,
+    recording: &RecordingArguments,
+    spectrum: &SpectrumSettings,
+    reading: ReadBy,
+    watch: &dyn Watch,
+) -> anyhow::Result<RecordingResult> {
     let work = Work::begin(watch, Stage::Taps);
     let problem = match recording.open(path) {
         Ok(opened) => {
@@ -43,7 +80,7 @@ pub(super) fn analyse(
                 measure.reading = reading;
             };
             let hammer = recording.hammer.as_ref();
-            return Ok(run_recording_watched(opened, hammer, adjust, watch)?);
+            return Ok(measure_bare_watched(opened, hammer, adjust, watch)?);
         }
         Err(problem) => problem,
     };
@@ -76,7 +113,7 @@ pub(super) fn analyse(
         reading,
         ..FunctionSettings::default()
     };
-    Ok(run_functions_watched(&functions, &settings, watch)?)
+    Ok(measure_functions_watched(&functions, &settings, watch)?)
 }
 
 /// Returns true if a file holds frequency response functions and no samples in time.

@@ -7,22 +7,25 @@ use super::arguments::{
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
 use super::overwrite::{Expanded, checksum, files_of};
-use super::place::is_description;
+use super::place::{FolderContents, RECORDINGS, is_description, report_in};
 use super::publication::OutputFolder;
-use super::recording::analyse;
+use super::recording::{analyse, analyse_together};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use anyhow::{Context, bail};
 use clap::Args;
-use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::slice::from_ref;
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
-use tapjoint::recording::ReadSettings;
+use tapjoint::recording::{MOST_FILES, ReadSettings};
 use tapjoint::report::document::{FileSection, SheetSection};
-use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_section, run_files};
+use tapjoint::report::{
+    MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, gap_section, run_files,
+    watched_files,
+};
 
 /// Analyse a test, from recordings to joint, and write a report.
 ///
@@ -35,11 +38,12 @@ use tapjoint::report::{MODEL_FILE, document_of, draw_run, earlier_files, gap_sec
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// Test description (.toml), folder with one, recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), or frequency response
-    /// functions (UFF58, text, LabVIEW, MATLAB)
-    #[arg(value_name = "FILE", value_parser = file_or_folder())]
-    file: PathBuf,
-    /// Folder of the report; default: NAME-report beside FILE
+    /// Test description (.toml), recording (WAV, FLAC, CSV, UFF58, LabVIEW, MATLAB), frequency response functions (UFF58,
+    /// text, LabVIEW, MATLAB), or a folder with one description. All recordings in a folder without one are one test
+    #[arg(value_name = "FILE")]
+    pub(super) file: PathBuf,
+    /// Folder of the report; default: NAME-report beside FILE, or NAME-2-report where that holds the report of another
+    /// file
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Way of reading the frequencies; default: that of the description, else fit
@@ -61,24 +65,90 @@ pub(super) struct RunArguments {
 }
 
 impl RunArguments {
-    /// Returns the report's folder, for a test of this name.
-    fn folder(&self, name: &str) -> PathBuf {
-        match &self.out {
-            Some(out) => out.clone(),
-            None => self.file.with_file_name(report_folder(name)),
+    /// Returns what is to be run.
+    ///
+    /// # Errors
+    /// A folder that cannot be read, or that is no test.
+    pub(super) fn subject(&self) -> anyhow::Result<Subject> {
+        let path = &self.file;
+        if !path.is_dir() {
+            let path = path.clone();
+            return Ok(match is_description(&path) {
+                true => Subject::Described(path),
+                false => Subject::Bare(path),
+            });
+        }
+        let shown = path.display();
+        let found = FolderContents::of(path).with_context(|| format!("{shown}: cannot be read"))?;
+        match (&found.descriptions[..], &found.recordings[..]) {
+            ([only], _) => Ok(Subject::Described(only.clone())),
+            ([], [only]) => Ok(Subject::Bare(only.clone())),
+            ([], []) => bail!(
+                "{shown}: a folder without a description (.toml) and without recordings ({}); name a recording, or \
+                 write a description: `tapjoint init` prints one",
+                RECORDINGS.map(|ending| format!(".{ending}")).join(", ")
+            ),
+            ([], files) if files.len() > MOST_FILES => bail!(
+                "{shown}: a folder with {} recordings; allowed: up to {MOST_FILES}; write a description, which names \
+                 those of one test",
+                files.len()
+            ),
+            ([], files) => Ok(Subject::Folder(path.clone(), files.to_vec())),
+            (several, _) => {
+                let count = several.len();
+                let names = several.iter().take(MOST_NAMES).map(|file| file_name(file));
+                let mut names = names.collect::<Vec<_>>().join(", ");
+                if count > MOST_NAMES {
+                    names.push_str(", ...");
+                }
+                bail!("{shown}: a folder with {count} descriptions: {names}; name one")
+            }
         }
     }
 
-    /// Returns the files that a report may consist of.
-    pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
-        let name = test.map_or_else(|| stem(&self.file), |test| test.name.clone());
-        let recordings: Vec<PathBuf> = match test {
-            Some(test) => test
+    /// Returns the report's folder, for a test of this name. Folders with the report of another file are passed over; the
+    /// last of them comes second, with the name of that file.
+    fn folder(&self, subject: &Subject, name: &str) -> (PathBuf, Option<(PathBuf, String)>) {
+        if let Some(out) = &self.out {
+            return (out.clone(), None);
+        }
+        let numbered = |number| match subject {
+            Subject::Described(file) | Subject::Bare(file) => {
+                file.with_file_name(report_folder(name, number))
+            }
+            Subject::Folder(folder, _) => folder.join(report_folder(name, number)),
+        };
+        let own = match subject {
+            Subject::Described(file) | Subject::Bare(file) => file_name(file),
+            Subject::Folder(..) => name.to_owned(),
+        };
+        let (mut number, mut passed) = (1, None);
+        while let Some(other) = reported_file(&numbered(number)).filter(|other| *other != own) {
+            passed = Some((numbered(number), other));
+            number += 1;
+        }
+        (numbered(number), passed)
+    }
+
+    /// Returns the files that a report may consist of, also one that is watched.
+    pub(super) fn expanded(
+        &self,
+        test: Option<&TestDescription>,
+        is_watched: bool,
+    ) -> Vec<Expanded> {
+        // A folder that is no test is reported later.
+        let Ok(subject) = self.subject() else {
+            return Vec::new();
+        };
+        let name = test.map_or_else(|| subject.name(), |test| test.name.clone());
+        let recordings: Vec<PathBuf> = match (test, &subject) {
+            (Some(test), _) => test
                 .recordings
                 .iter()
                 .map(|one| one.name().into())
                 .collect(),
-            None => vec![self.file.clone()],
+            (None, Subject::Described(file) | Subject::Bare(file)) => vec![file.clone()],
+            (None, Subject::Folder(_, files)) => files.clone(),
         };
         let recordings: Vec<_> = recordings
             .into_iter()
@@ -90,17 +160,53 @@ impl RunArguments {
             "gap": { "updated_model": { "file": MODEL_FILE } },
             "warnings": [],
         });
-        let folder = self.folder(&name);
-        let files = earlier_files(&report.to_string());
+        let (folder, _) = self.folder(&subject, &name);
+        let mut files = earlier_files(&report.to_string());
+        files.retain(|file| is_watched || file != VERSION_FILE);
         vec![("out", files.iter().map(|file| folder.join(file)).collect())]
     }
 }
+
+/// What is run.
+#[derive(Debug)]
+pub(super) enum Subject {
+    /// A test that a description describes.
+    Described(PathBuf),
+    /// A recording, or a file of functions.
+    Bare(PathBuf),
+    /// A folder, all recordings in which are one test.
+    Folder(PathBuf, Vec<PathBuf>),
+}
+
+impl Subject {
+    /// Returns the description, or the recordings.
+    pub(super) fn files(&self) -> &[PathBuf] {
+        match self {
+            Self::Described(file) | Self::Bare(file) => from_ref(file),
+            Self::Folder(_, files) => files,
+        }
+    }
+
+    /// Returns the name of a test without a description: that of its recording, or of their folder.
+    fn name(&self) -> String {
+        match self {
+            Self::Described(file) | Self::Bare(file) => stem(file),
+            // The folder may be `.` or `..`.
+            Self::Folder(folder, _) => {
+                file_name(&fs::canonicalize(folder).unwrap_or_else(|_| folder.clone()))
+            }
+        }
+    }
+}
+
+/// Most descriptions that a message lists.
+const MOST_NAMES: usize = 10;
 
 /// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
 const SAMPLES: usize = 1000;
 
 /// Reads the description, and checks that options and recordings go with it.
-fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
+fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let bare = &arguments.recording;
     if bare.hammer.is_some()
         || bare.overload.is_some()
@@ -110,7 +216,7 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
             "--hammer, --sample-rate, --time-unit, --values, --variable and --overload are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
-    let mut file = read_test(&arguments.file, terminal)?;
+    let mut file = read_test(file, terminal)?;
     if let Some(reading) = arguments.reading {
         file.test.analysis.reading = reading;
     }
@@ -119,15 +225,17 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Test
     Ok(file)
 }
 
-/// Returns the description and the files that it names, or the bare recording, with their checksums.
-fn summed_files(path: &Path, described: Option<&TestFile>) -> anyhow::Result<Vec<FileSection>> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut paths = vec![path.to_owned()];
-    paths.extend(
-        described
-            .into_iter()
-            .flat_map(|file| files_of(path, &file.test)),
-    );
+/// Returns the description and the files that it names, or the bare recordings, with their checksums.
+fn summed_files(
+    given: &[PathBuf],
+    described: Option<&TestFile>,
+) -> anyhow::Result<Vec<FileSection>> {
+    let folder = given.first().and_then(|file| file.parent());
+    let folder = folder.unwrap_or(Path::new(""));
+    let mut paths = given.to_vec();
+    if let (Some(file), [path]) = (described, given) {
+        paths.extend(files_of(path, &file.test));
+    }
     let mut files: Vec<FileSection> = Vec::new();
     for path in paths {
         let file = path.strip_prefix(folder).unwrap_or(&path);
@@ -147,37 +255,15 @@ fn summed_files(path: &Path, described: Option<&TestFile>) -> anyhow::Result<Vec
     Ok(files)
 }
 
-/// Returns the parser of a file; a folder stands for the only description in it.
-fn file_or_folder() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| match path.is_dir() {
-        true => only_description(&path),
-        false => Ok(path),
-    })
+/// Returns the name of the file whose report a folder holds; `None` without a report, and of one that does not name it.
+fn reported_file(folder: &Path) -> Option<String> {
+    let report: serde_json::Value = serde_json::from_str(&report_in(folder)?).ok()?;
+    Some(report["test"]["file"].as_str()?.to_owned())
 }
 
-/// Returns the only description in a folder.
-///
-/// # Errors
-/// There is none, there are several, or the folder cannot be read.
-fn only_description(folder: &Path) -> Result<PathBuf, String> {
-    let entries = fs::read_dir(folder).map_err(|problem| problem.to_string())?;
-    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut found: Vec<PathBuf> = files.filter(|file| is_description(file)).collect();
-    found.sort();
-    let names = found.iter().map(|file| file_name(file));
-    let names = names.collect::<Vec<_>>().join(", ");
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        0 => Err(
-            "a folder without a description (.toml); `tapjoint init` prints one, or name a recording"
-                .to_owned(),
-        ),
-        count => Err(format!("a folder with {count} descriptions: {names}; name one")),
-    }
-}
-
-/// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens.
-fn report_folder(name: &str) -> String {
+/// Returns the folder name for a test's name. Blanks and characters that file systems refuse become hyphens. `number` tells
+/// the reports of one name apart, from 1.
+fn report_folder(name: &str, number: usize) -> String {
     let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
     let name: String = name
         .chars()
@@ -188,51 +274,65 @@ fn report_folder(name: &str) -> String {
         })
         .take(100)
         .collect();
-    match name.as_str() {
-        "" => "test-report".to_owned(),
-        name => format!("{name}-report"),
+    let name = if name.is_empty() { "test" } else { &name };
+    match number {
+        1 => format!("{name}-report"),
+        number => format!("{name}-{number}-report"),
     }
 }
 
+/// Runs a test. The page of one that is watched reloads itself.
 pub(super) fn run(
     arguments: &RunArguments,
+    is_watched: bool,
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    let described = match is_description(&arguments.file) {
-        true => Some(resolve(arguments, &terminal)?),
-        false => None,
+    let subject = arguments.subject()?;
+    let described = match &subject {
+        Subject::Described(file) => Some(resolve(arguments, file, &terminal)?),
+        Subject::Bare(file) => {
+            check_file(file)?;
+            None
+        }
+        Subject::Folder(..) => None,
     };
     let name = match &described {
         Some(file) => file.test.name.clone(),
-        None => {
-            check_file(&arguments.file)?;
-            stem(&arguments.file)
-        }
+        None => subject.name(),
     };
-    let output = OutputFolder::prepare(&arguments.folder(&name), terminal.files())?;
+    let (folder, passed) = arguments.folder(&subject, &name);
+    if let Some((earlier, other)) = passed {
+        terminal.warn(&format!(
+            "{} holds the report of {other}; this report goes to {}; --out names another folder",
+            earlier.display(),
+            folder.display()
+        ));
+    }
+    let output = OutputFolder::prepare(&folder, terminal.files())?;
     let progress = terminal.progress("measuring, fitting and estimating");
-    let analysis = match &described {
-        Some(file) => file.analyse(
+    let (bare, reading) = (&arguments.recording, arguments.reading.unwrap_or_default());
+    let analysis = match (&described, &subject) {
+        (Some(file), _) => file.analyse(
             &IdentifySettings {
                 monte_carlo: Some((SAMPLES, seed)),
                 ..perturbed_by(arguments.method)
             },
             terminal.watch(),
         )?,
-        None => analyse(
-            &arguments.file,
-            &arguments.recording,
-            &SpectrumSettings::default(),
-            arguments.reading.unwrap_or_default(),
-            terminal.watch(),
-        )?,
+        (None, Subject::Described(file) | Subject::Bare(file)) => {
+            let spectrum = SpectrumSettings::default();
+            analyse(file, bare, &spectrum, reading, terminal.watch())?
+        }
+        (None, Subject::Folder(_, files)) => {
+            analyse_together(name, files, bare, reading, terminal.watch())?
+        }
     };
     let mut document = document_of(&analysis);
     document.sheet = described.as_ref().map(|file| SheetSection::of(&file.test));
     if arguments.sheet {
         let sheet = document.sheet.get_or_insert_default();
-        sheet.files = summed_files(&arguments.file, described.as_ref())?;
+        sheet.files = summed_files(subject.files(), described.as_ref())?;
     }
     let mut model = None;
     if let Some(file) = &described {
@@ -255,7 +355,11 @@ pub(super) fn run(
     if let Some(model) = model {
         output.add(MODEL_FILE, model.as_bytes())?;
     }
-    for file in run_files(&document, drawn)? {
+    let files = match is_watched {
+        true => watched_files(&document, drawn)?,
+        false => run_files(&document, drawn)?,
+    };
+    for file in files {
         output.add(&file.name, &file.bytes)?;
     }
     let (folder, left) = output.publish_report()?;
@@ -282,8 +386,9 @@ mod tests {
             ("x\ny", "x-y-report"),
         ];
         for (name, expected) in cases {
-            assert_eq!(report_folder(name), expected, "{name:?}");
+            assert_eq!(report_folder(name, 1), expected, "{name:?}");
             assert_eq!(Path::new(expected).components().count(), 1, "{expected:?}");
         }
+        assert_eq!(report_folder("x", 2), "x-2-report");
     }
 }

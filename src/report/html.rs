@@ -1,6 +1,7 @@
 //! The report as one HTML page that needs nothing else.
 
 use askama::Template;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::ReportError;
 use super::document::{Document, SheetSection, WarningSection};
@@ -38,6 +39,7 @@ const PLOT_LICENSE: &str = include_str!("assets/uPlot-LICENSE.txt");
 const SCRIPT: &str = include_str!("templates/report.js");
 const POINTS: &str = include_str!("templates/report_points.js");
 const VIEWS: &str = include_str!("templates/report_views.js");
+const RELOAD: &str = include_str!("templates/report_reload.js");
 
 /// Warnings of one code that a page on several tests lists: those of two tests with two recordings each.
 const MOST_ALIKE: usize = 4;
@@ -72,6 +74,8 @@ struct Page<'a> {
     sections: Vec<Section<'a>>,
     method: Method,
     live: Option<Live>,
+    /// Version of the page, if it reloads itself when there is another.
+    reload: Option<String>,
     version: &'static str,
 }
 
@@ -109,6 +113,37 @@ struct Section<'a> {
 /// # Errors
 /// [`ReportError::Html`] if the template cannot be filled.
 pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<String, ReportError> {
+    let answer = Answer::of(document);
+    let page = page_of(document, &answer, figures);
+    page.render().map_err(ReportError::Html)
+}
+
+/// Returns the whole page as one that reloads itself, and its version. It loads the script [`VERSION_FILE`] beside it every
+/// second, and reloads when that states another version.
+///
+/// # Errors
+/// [`ReportError::Html`] if the template cannot be filled.
+///
+/// [`VERSION_FILE`]: crate::VERSION_FILE
+pub(crate) fn render_reloading_html(
+    document: &Document,
+    figures: &[InlineFigure],
+) -> Result<(String, String), ReportError> {
+    let answer = Answer::of(document);
+    let mut page = page_of(document, &answer, figures);
+    let mut sum = DefaultHasher::new();
+    page.render().map_err(ReportError::Html)?.hash(&mut sum);
+    let version = format!("{:016x}", sum.finish());
+    page.reload = Some(version.clone());
+    Ok((page.render().map_err(ReportError::Html)?, version))
+}
+
+/// Fills the template of the page.
+fn page_of<'a>(
+    document: &'a Document,
+    answer: &'a Answer,
+    figures: &'a [InlineFigure],
+) -> Page<'a> {
     let mut sections = match is_comparison(document) {
         true => comparison_sections(document),
         false => {
@@ -128,19 +163,18 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     let name = name.filter(|name| !name.is_empty());
     let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
     let (warnings, hidden_warnings) = listed_warnings(document);
-    let answer = Answer::of(document);
     let first_figure = figures.iter().find(|figure| figure.section == "answer");
     let filed = document.sheet.iter().flat_map(SheetSection::facts);
     let filed = filed.map(|(_, text)| text).filter(|text| !text.is_empty());
-    let page = Page {
+    Page {
         title: match (&document.series, &document.compare) {
             (Some(_), _) => format!("{name}: a series of tests"),
             (None, Some(_)) => format!("{name}: before and after"),
             (None, None) => name.clone(),
         },
         facts: facts(document),
-        answer: &answer,
-        sheet: Sheet::of(document, &answer, first_figure),
+        answer,
+        sheet: Sheet::of(document, answer, first_figure),
         filed: filed.collect(),
         running: running_head(document, &name),
         first_figure,
@@ -162,9 +196,9 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
             points: POINTS,
             views: VIEWS,
         }),
+        reload: None,
         version: env!("CARGO_PKG_VERSION"),
-    };
-    page.render().map_err(ReportError::Html)
+    }
 }
 
 /// Returns the warnings that are listed, the worst first, and the number of others. Many tests have many doubts of one

@@ -14,7 +14,7 @@ use crate::charts::modes::{amplitude, stabilisation};
 use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
-use crate::html::{InlineFigure, render_html};
+use crate::html::{InlineFigure, render_html, render_reloading_html};
 use crate::picture::{Block, Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
 use crate::sheet::render_sheet;
 use crate::short_names::{ends_of_paths, stems};
@@ -83,7 +83,26 @@ pub fn run_files(
     document: &Document,
     drawn: DrawnPictures,
 ) -> Result<Vec<ReportFile>, ReportError> {
-    let mut files = render_page(document, drawn)?;
+    files_of_run(document, drawn, false)
+}
+
+/// All files of [`run_files`], with a page that reloads itself when a later run has written another, and [`VERSION_FILE`].
+///
+/// # Errors
+/// The first [`ReportError`] of any file.
+pub fn watched_files(
+    document: &Document,
+    drawn: DrawnPictures,
+) -> Result<Vec<ReportFile>, ReportError> {
+    files_of_run(document, drawn, true)
+}
+
+fn files_of_run(
+    document: &Document,
+    drawn: DrawnPictures,
+    is_watched: bool,
+) -> Result<Vec<ReportFile>, ReportError> {
+    let mut files = render_page(document, drawn, is_watched)?;
     files.extend([
         ReportFile::of("parameters.csv", render_parameters_csv(document)?),
         ReportFile::of("modes.csv", render_modes_csv(document)?),
@@ -137,7 +156,7 @@ pub fn compared_files(
     document: &Document,
     drawn: DrawnPictures,
 ) -> Result<Vec<ReportFile>, ReportError> {
-    let mut files = render_page(document, drawn)?;
+    let mut files = render_page(document, drawn, false)?;
     if document.series.is_some() {
         files.push(ReportFile::of("series.csv", render_series_csv(document)?));
     }
@@ -169,16 +188,29 @@ impl DrawnPictures {
     }
 }
 
-/// Returns the pictures, the page with them, and `report.json`.
-fn render_page(document: &Document, drawn: DrawnPictures) -> Result<Vec<ReportFile>, ReportError> {
+/// Returns the pictures, the page with them, and `report.json`; the version of a page that reloads itself as well.
+fn render_page(
+    document: &Document,
+    drawn: DrawnPictures,
+    reloads: bool,
+) -> Result<Vec<ReportFile>, ReportError> {
     let DrawnPictures { mut files, figures } = drawn;
     let sheet = render_sheet(document, &figures)?;
     files.extend(sheet.map(|sheet| ReportFile::of(SHEET, sheet)));
-    let (page, json) = rayon::join(|| render_html(document, &figures), || render_json(document));
+    let page = || match reloads {
+        true => render_reloading_html(document, &figures).map(|(page, own)| (page, Some(own))),
+        false => render_html(document, &figures).map(|page| (page, None)),
+    };
+    let (page, json) = rayon::join(page, || render_json(document));
+    let (page, version) = page?;
     files.extend([
-        ReportFile::of("report.html", page?),
+        ReportFile::of("report.html", page),
         ReportFile::of("report.json", json?),
     ]);
+    files.extend(version.map(|version| {
+        let text = format!("{VERSION_HEAD}\ntapjointReport = \"{version}\";\n");
+        ReportFile::of(VERSION_FILE, text)
+    }));
     Ok(files)
 }
 
@@ -341,6 +373,10 @@ pub fn render_schema() -> String {
 pub const MODEL_FILE: &str = "updated-model.toml";
 /// The sheet, where one was asked for.
 const SHEET: &str = "sheet.html";
+/// Script with the version of a page that reloads itself.
+pub const VERSION_FILE: &str = "report-version.js";
+/// First line of that script.
+pub const VERSION_HEAD: &str = "// Version of report.html, written by tapjoint.";
 /// Files of every report.
 const OF_ALL: [&str; 3] = ["report.html", "report.json", SHEET];
 /// Tables of a test.
@@ -411,6 +447,7 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     OF_ALL
         .into_iter()
         .chain(TABLES)
+        .chain([VERSION_FILE])
         .map(str::to_owned)
         .chain(model)
         .chain(pictures)

@@ -98,6 +98,7 @@ fn observed(recordings: Vec<RecordingResult>) -> Observations {
     let description = TestDescription::parse(&text, "test.toml").unwrap();
     observations(&Analysis {
         name: "virtual".to_string(),
+        file: None,
         structure: Some(tested_structure(&description)),
         aside: vec![None; recordings.len()],
         recordings,

@@ -162,7 +162,7 @@ const FRAME: &str = r#"<!DOCTYPE html><meta name="color-scheme" content="light d
 });</script>"#;
 
 /// A Chromium: the one that TAPJOINT_CHROMIUM names, or the first known name on the path.
-fn chromium() -> Option<PathBuf> {
+pub fn chromium() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("TAPJOINT_CHROMIUM") {
         return Some(named.into());
     }

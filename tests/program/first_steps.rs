@@ -159,6 +159,88 @@ fn limit_a_folder_stands_for_its_only_description() {
 }
 
 #[test]
+fn recover_recordings_in_a_folder_are_one_test() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
+    let own = folder.path().join("taps.2026");
+    std::fs::create_dir(&own).unwrap();
+    let copy = |from: &str, to: &str| std::fs::copy(root.join(from), own.join(to)).unwrap();
+    copy("cantilever/low.wav", "low.wav");
+    // One recording is itself, and its report stands beside it.
+    let (text, _) = told(folder.path(), &["run", "taps.2026", "--hammer", "1"], 0);
+    assert!(text.contains("taps.2026/low-report/report.html"), "{text}");
+    let report = |path: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(own.join(path)).unwrap()).unwrap()
+    };
+    let alone = report("low-report/report.json");
+    // Another of the same structure, and one of another rate and number of channels.
+    copy("cantilever/high.wav", "high.wav");
+    copy("nonlinear/soft.wav", "soft.WAV");
+    std::fs::write(own.join("notes.txt"), "no recording").unwrap();
+    std::fs::write(own.join("._low.wav"), "no recording").unwrap();
+    let run = ["run", "taps.2026", "--hammer", "1"];
+    let (text, error) = told(folder.path(), &run, 0);
+    let page = "taps.2026/taps.2026-report/report.html";
+    assert!(
+        text.contains(page) && text.contains("3 recordings"),
+        "{text}"
+    );
+    assert_eq!(error, "");
+    let whole = report("taps.2026-report/report.json");
+    assert_eq!(whole["test"]["name"], "taps.2026");
+    let recordings = whole["recordings"].as_array().unwrap();
+    let files: Vec<_> = recordings
+        .iter()
+        .map(|one| one["file"].as_str().unwrap())
+        .collect();
+    assert_eq!(files, ["high.wav", "low.wav", "soft.WAV"]);
+    // Each is measured as it would be alone.
+    let fitted = |recording: &serde_json::Value| -> Vec<f64> {
+        let modes = recording["modes"].as_array().unwrap().iter();
+        modes
+            .map(|mode| mode["frequency"].as_f64().unwrap())
+            .collect()
+    };
+    assert_eq!(fitted(&recordings[1]), fitted(&alone["recordings"][0]));
+    assert!(!fitted(&recordings[1]).is_empty());
+    // The report in the folder is none of its recordings.
+    let again = told(folder.path(), &run, 0);
+    assert_eq!(again, (text, error));
+    let inside = [&run[..], &["--out", "taps.2026"]].concat();
+    for _ in 0..2 {
+        told(folder.path(), &inside, 0);
+    }
+    let inside = report("report.json");
+    assert_eq!(inside["recordings"], whole["recordings"]);
+    // Recordings are inputs.
+    let json = ["run", "taps.2026", "--json", "taps.2026/high.wav"];
+    let (_, error) = told(folder.path(), &json, 2);
+    assert!(
+        error.contains("high.wav: is an input of this command"),
+        "{error}"
+    );
+}
+
+#[test]
+fn limit_a_folder_of_too_many_files_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..=200 {
+        std::fs::write(folder.path().join(format!("{number}.wav")), "").unwrap();
+    }
+    let (_, error) = told(folder.path(), &["run", "."], 2);
+    assert!(
+        error.contains("201 recordings; allowed: up to 200"),
+        "{error}"
+    );
+    for number in 0..12 {
+        std::fs::write(folder.path().join(format!("{number:02}.toml")), "").unwrap();
+    }
+    let (_, error) = told(folder.path(), &["run", "."], 2);
+    let wanted = "12 descriptions: 00.toml, 01.toml, 02.toml, 03.toml, 04.toml, 05.toml, 06.toml, 07.toml, 08.toml, 09.toml, ...; name one";
+    assert!(error.contains(wanted), "{error}");
+}
+
+#[test]
 fn prop_completions_of_every_shell_name_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let names = commands(folder.path());

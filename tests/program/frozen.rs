@@ -502,6 +502,7 @@ fn frozen_help() {
         "",
         "init",
         "run",
+        "watch",
         "inspect",
         "spectrum",
         "frf",

@@ -1,6 +1,6 @@
 //! A run into a folder that holds an earlier report.
 
-use super::{samples, tapjoint};
+use super::{program, samples, tapjoint};
 use std::collections::BTreeSet;
 use std::path::Path;
 use tapjoint::report::{MODEL_FILE, earlier_files};
@@ -55,6 +55,52 @@ fn regress_a_run_leaves_nothing_of_an_earlier_one() {
             "{name}"
         );
     }
+}
+
+#[test]
+fn regress_tests_of_one_name_have_reports_of_their_own() {
+    let folder = samples();
+    let test = folder.path().join("recordings/cantilever");
+    for other in ["a.toml", "b.toml"] {
+        std::fs::copy(test.join("test.toml"), test.join(other)).unwrap();
+    }
+    let run = |file: &str, more: &[&str]| {
+        let file = format!("recordings/cantilever/{file}");
+        let done = std::process::Command::new(program())
+            .current_dir(folder.path())
+            .args(["run", &file, "--json", "-"])
+            .args(more)
+            .output();
+        let done = done.unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        let written = report["test"]["file"].as_str().unwrap().to_owned();
+        (written, String::from_utf8(done.stderr).unwrap())
+    };
+    let report = |name: &str| std::fs::read_to_string(test.join(name).join("report.json")).unwrap();
+    let quiet = ("test.toml".to_owned(), String::new());
+    assert_eq!(run("test.toml", &[]), quiet);
+    let first = report("Cantilever-report");
+    for (file, number) in [("a.toml", 2), ("b.toml", 3), ("a.toml", 2)] {
+        let (written, error) = run(file, &[]);
+        let own = format!("Cantilever-{number}-report");
+        assert_eq!(written, file);
+        assert!(error.contains(&format!("this report goes to recordings/cantilever/{own}")));
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(report(&own).contains(&format!("\"file\": \"{file}\"")));
+    }
+    assert_eq!(report("Cantilever-report"), first);
+    assert!(!test.join("Cantilever-4-report").exists());
+    // The folder that was asked for is the folder.
+    let (written, error) = run(
+        "a.toml",
+        &["--out", "recordings/cantilever/Cantilever-report"],
+    );
+    assert_eq!((written.as_str(), error.as_str()), ("a.toml", ""));
+    // A report of an earlier version names no file.
+    let old = report("Cantilever-report").replace("\"file\": \"a.toml\",", "");
+    std::fs::write(test.join("Cantilever-report/report.json"), old).unwrap();
+    assert_eq!(run("test.toml", &["--force"]), quiet);
+    assert_eq!(report("Cantilever-report"), first);
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod outputs;
 mod schema;
 mod timings;
 mod updated_model;
+mod watch;
 
 use std::path::{Path, PathBuf};
 

@@ -64,6 +64,12 @@ const TABLE: &[Row] = &[
         &[folder("--out", "report.html", None)],
     ),
     row(
+        &["watch", "test.toml", "--runs", "1", "--interval", "0.1"],
+        &["test.toml", "taps.wav"],
+        &[],
+        &[folder("--out", "updated-model.toml", Some("test.toml"))],
+    ),
+    row(
         &["identify", "modes.toml"],
         &["modes.toml", "modes.unv"],
         &[],

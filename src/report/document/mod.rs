@@ -138,6 +138,9 @@ pub struct Document {
 pub struct TestSection {
     /// Name of the test.
     pub name: String,
+    /// Name of the description's file, or of the bare recording's; null where several tests are compared, and for a
+    /// prediction.
+    pub file: Option<String>,
     /// "cantilever", "lap" or "free"; null for a bare recording.
     pub kind: Option<Assembly>,
     /// "2p" or "3p"; null where there is no joint.
@@ -227,7 +230,10 @@ pub fn document_of(analysis: &Analysis) -> Document {
         warnings.map(|warning| WarningSection::of(warning, has_better && warning.of_pairs));
     let mut document = Document {
         version: VERSION,
-        test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
+        test: Some(TestSection {
+            file: analysis.file.clone(),
+            ..test_section(&analysis.name, analysis.structure.as_ref())
+        }),
         recordings: (!analysis.recordings.is_empty()).then(|| recordings.collect()),
         modes: Some(modes.collect()),
         lengths: lengths_of(analysis),
@@ -402,6 +408,7 @@ fn test_section(name: &str, structure: Option<&TestedStructure>) -> TestSection 
     };
     TestSection {
         name: name.to_string(),
+        file: None,
         kind: Some(structure.assembly),
         model: (structure.assembly != Assembly::Free).then_some(model),
         beam_theory: Some(structure.theory),

@@ -103,6 +103,7 @@ fn quality() -> Vec<QualityVerdict> {
 fn test() -> TestSection {
     TestSection {
         name: "Cantilever, one-bolt clamp".into(),
+        file: Some("test.toml".into()),
         kind: Some(Assembly::Cantilever),
         model: Some(JointModel::TwoParameter),
         beam_theory: Some(BeamTheory::Timoshenko),

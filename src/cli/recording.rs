@@ -21,7 +21,9 @@ use tapjoint::pipeline::{
 use tapjoint::recording::{
     RecordingError, is_universal_file, list_datasets, open_frequency_responses,
 };
-use tapjoint::report::{datasets_of, document_of, inspection_of, render_spectrum_picture};
+use tapjoint::report::{
+    datasets_of, document_of, inspection_of, render_spectrum_csv, render_spectrum_picture,
+};
 
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
 ///
@@ -257,6 +259,9 @@ pub(super) struct SpectrumArguments {
     /// Draw the spectrum into this file (PNG, or SVG if its name ends in .svg)
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Write the spectra into this CSV file, a column for each channel
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordingArguments,
     #[command(flatten)]
@@ -271,6 +276,7 @@ pub(super) fn spectrum(
 ) -> anyhow::Result<Outcome> {
     check_file(&arguments.file)?;
     let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
+    let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
     let analysis = analyse(
         &arguments.file,
         &arguments.recording,
@@ -290,6 +296,16 @@ pub(super) fn spectrum(
         match picture {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn("no tap was accepted, so there is no spectrum to draw"),
+        }
+    }
+    if let Some(file) = csv {
+        let recording = analysis.recordings.first();
+        match recording.map(render_spectrum_csv).transpose()?.flatten() {
+            Some(text) => file.write(text.as_bytes())?,
+            None => terminal.warn(
+                "there is no spectrum to write: no tap was accepted, or the file holds functions, which `tapjoint frf --csv` \
+                 writes",
+            ),
         }
     }
     terminal.answer(&document, None, &arguments.full)?;

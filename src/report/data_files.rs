@@ -1,11 +1,13 @@
 //! Results as comma separated values, one row each, numbers in full precision; frequency response functions also as
 //! universal file.
 
+use std::iter::once;
+
 use crate::ReportError;
 use crate::document::{Document, EstimateMethod, Uncertain, method_name};
 use crate::tables::estimated;
 use crate::words::series::quantity;
-use tapjoint_analysis::Frf;
+use tapjoint_analysis::{Frf, RecordingResult};
 use tapjoint_signal::recording::{
     FrequencyResponse, FrequencyResponses, Point, RecordingError, UffFormat,
     encode_frequency_responses_uff,
@@ -329,6 +331,44 @@ pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
     write(FUNCTIONS, rows)
 }
 
+/// Returns the averaged spectra of a recording: root mean square of the transforms of the taps (unit of the signal times
+/// s), a row for each line and a column for each channel. `None` when no tap was accepted, and of functions.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_spectrum_csv(recording: &RecordingResult) -> Result<Option<String>, ReportError> {
+    let Some(spectra) = recording.measurement.spectra.as_ref() else {
+        return Ok(None);
+    };
+    let averages = &spectra.averages;
+    if averages.responses.is_empty() {
+        return Ok(None);
+    }
+    let unit = |unit: &Option<String>| match unit {
+        Some(unit) => format!("{unit} s"),
+        None => "unit of the file x s".to_owned(),
+    };
+    let mut heads = vec!["line".to_owned(), "frequency_Hz".to_owned()];
+    let mut columns: Vec<&[f64]> = Vec::new();
+    if let Some(force) = &averages.force {
+        heads.push(format!("force ({})", unit(&recording.tap_unit)));
+        columns.push(force);
+    }
+    for (response, values) in recording.responses.iter().zip(&averages.responses) {
+        heads.push(format!("{} ({})", response.name, unit(&response.unit)));
+        columns.push(values);
+    }
+    let rows = (0..averages.lines.points()).map(|line| {
+        let mut row = vec![line.to_string(), averages.lines.frequency(line).to_string()];
+        let values = columns
+            .iter()
+            .map(|values| number(values.get(line).copied()));
+        row.extend(values);
+        row
+    });
+    write_below(heads, rows).map(Some)
+}
+
 /// Returns the shortest digits that give the same number back; empty where there is none.
 pub(super) fn number(value: Option<f64>) -> String {
     value
@@ -342,15 +382,21 @@ fn is_formula(cell: &str) -> bool {
     cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err()
 }
 
-/// Returns rows below a line of heads. A text that a spreadsheet would take for a formula gets an apostrophe before it.
+/// Returns rows below a line of heads, which are joined by commas.
 pub(super) fn write(
     heads: &str,
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<String, ReportError> {
+    write_below(heads.split(',').map(str::to_owned).collect(), rows)
+}
+
+/// Returns rows below a line of heads. A text that a spreadsheet would take for a formula gets an apostrophe before it.
+fn write_below(
+    heads: Vec<String>,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let heads = heads.split(',');
-    writer.write_record(heads).map_err(ReportError::Csv)?;
-    for row in rows {
+    for row in once(heads).chain(rows) {
         let row = row.into_iter().map(|cell| match is_formula(&cell) {
             true => format!("'{cell}"),
             false => cell,

@@ -44,7 +44,7 @@ pub use brief::{MOST_LINES, render_answer};
 pub use charts::comparison_spectra::ComparedRecordings;
 pub use data_files::{
     render_changes_csv, render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
-    render_perturbation_csv, render_series_csv, render_taps_csv,
+    render_perturbation_csv, render_series_csv, render_spectrum_csv, render_taps_csv,
 };
 pub use document::{
     comparison_of, datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of,

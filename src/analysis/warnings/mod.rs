@@ -1,6 +1,6 @@
 //! Warnings: every doubt of the analysis. Each is a sentence with event, likely cause and remedy. The type, the list of
 //! codes and what joins warnings stand here, the sentences in two files: doubts about the measurement and about the
-//! estimate. A new warning is a code in [`WARNING_CODES`], a row of the guide's table, and a constructor.
+//! estimate. A new warning is a code in [`WARNING_CODES`], a row of the table in docs/reference.md, and a constructor.
 
 mod estimate;
 mod measurement;
@@ -11,7 +11,7 @@ pub(super) use measurement::{of_amplitude, of_quality, of_recording};
 use std::fmt;
 use std::mem::{swap, take};
 
-/// The code of every warning, and when it is given. docs/guide.md shows the same table.
+/// The code of every warning, and when it is given. docs/reference.md shows the same table.
 pub const WARNING_CODES: [(&str, &str); 77] = [
     // Of the description and of files, by their readers.
     (

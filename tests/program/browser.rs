@@ -42,6 +42,8 @@ const VISITOR: &str = r#"
     for (var y = 10; y < over.clientHeight; y += 20)
       for (var x = 5; x < over.clientWidth; x += 12) {
         mouse(over, "mousemove", x, y);
+        met.x = x;
+        met.y = y;
         if (tip.style.display === "block") return tip.textContent;
       }
     return "";
@@ -66,6 +68,9 @@ const VISITOR: &str = r#"
     if (this.textBaseline === "middle" && this.textAlign === "center") seen.numbers[words] = true;
     return draw.apply(this, arguments);
   };
+  function button(figure, name) {
+    return Array.from(figure.querySelectorAll("button")).filter(function (one) { return one.textContent === name; })[0];
+  }
   async function visit() {
     // The page unpacks its curves before they are drawn.
     for (var turn = 0; turn < 100 && !document.querySelector("figure.live"); turn++) await wait(50);
@@ -134,6 +139,28 @@ const VISITOR: &str = r#"
       one.again = met(points[i]);
       seen.points.push(one);
     }
+    var views = Array.from(figures).filter(function (figure) { return button(figure, "Nyquist"); })[0];
+    button(views, "Nyquist").click();
+    await wait(100);
+    seen.circles = views.querySelectorAll(".host.square canvas").length;
+    seen.circle = met(views);
+    button(views, "real and imaginary").click();
+    button(views, "log frequency").click();
+    await wait(100);
+    seen.parts = Array.from(views.querySelectorAll(".u-legend")).length;
+    mouse(views.querySelector(".u-over"), "mousemove", 0.5 * views.querySelector(".u-over").clientWidth, 40);
+    await wait(100);
+    seen.middle = words(views)[0];
+    var diagram = Array.from(figures).filter(function (figure) { return figure.querySelector(".poles code"); })[0];
+    seen.poles = diagram.querySelector(".poles code").textContent;
+    met(diagram);
+    ["mousedown", "mouseup", "click"].forEach(function (type) { mouse(diagram.querySelector(".u-over"), type, met.x, met.y); });
+    seen.fewer = diagram.querySelector(".poles code").textContent;
+    var shapes = Array.from(figures).filter(function (figure) { return button(figure, "move"); })[0];
+    button(shapes, "move").click();
+    await wait(300);
+    seen.moving = !!button(shapes, "stop");
+    button(shapes, "stop").click();
     var taps = Array.from(figures).filter(function (figure) { return /● tap 1/.test(figure.textContent); })[0];
     Array.from(taps.querySelectorAll(".chips button")).filter(function (b) { return /tap 2/.test(b.textContent); })[0].click();
     seen.tap = taps.querySelector(".said").textContent;
@@ -225,7 +252,7 @@ fn visited(chromium: &Path, page: &Path, width: u32, dark: bool) -> (Value, Stri
 }
 
 /// The curves of a figure as the page holds them: JSON, deflated, in base 64.
-fn unpacked(text: &str) -> Value {
+pub(crate) fn unpacked(text: &str) -> Value {
     let bytes = BASE64_STANDARD.decode(text).unwrap();
     serde_json::from_reader(ZlibDecoder::new(bytes.as_slice())).unwrap()
 }
@@ -347,6 +374,7 @@ fn regress_the_page_works_in_a_browser() {
         let moved = number(seen["moved"].as_str().unwrap());
         assert!((moved - 50.0).abs() < 2.0, "{case}: moved to {moved}");
         points_answer(&seen["points"], &case);
+        views_answer(&seen, &case);
         titles_say_values(&seen["titles"], &case);
         assert!(
             seen["tap"].as_str().unwrap().starts_with("tap 2: used, "),
@@ -399,6 +427,32 @@ const ANSWERS: [(&str, usize, &[&str]); 6] = [
         &[" mm", "misfit explained ", " %"],
     ),
 ];
+
+/// Functions of the low recording as circles and parts, poles chosen by hand, and shapes in motion.
+fn views_answer(seen: &Value, case: &str) {
+    // A circle for each of the two modes.
+    assert_eq!(seen["circles"], 2, "{case}");
+    let circle = seen["circle"].as_str().unwrap();
+    assert!(
+        circle.contains(" Hz") && circle.contains("real part"),
+        "{case}: {circle}"
+    );
+    assert_eq!(seen["parts"], 2, "{case}: real and imaginary part");
+    // The middle of a logarithmic axis from the first line above 0 Hz to 200 Hz.
+    let middle = number(seen["middle"].as_str().unwrap());
+    assert!((5.0..40.0).contains(&middle), "{case}: {middle}");
+    let [poles, fewer] = ["poles", "fewer"].map(|key| seen[key].as_str().unwrap());
+    assert_eq!(
+        poles, "poles = [16.55239, 116.7578, 330.8602, 620.4509, 975.6601]",
+        "{case}"
+    );
+    assert_eq!(
+        poles.matches(',').count(),
+        fewer.matches(',').count() + 1,
+        "{case}: {fewer}"
+    );
+    assert_eq!(seen["moving"], true, "{case}");
+}
 
 /// Every figure of points says what a point is, and zooms in both directions; diagrams change views.
 fn points_answer(points: &Value, case: &str) {
@@ -454,7 +508,7 @@ fn titles_say_values(titles: &Value, case: &str) {
         .iter()
         .filter_map(Value::as_str)
         .collect();
-    let kinds: [&[&str]; 6] = [
+    let kinds: [&[&str]; 7] = [
         &[
             "mode used in the estimate, mode 1, measured 16.55",
             " Hz, predicted ",
@@ -463,7 +517,11 @@ fn titles_say_values(titles: &Value, case: &str) {
             " %",
         ],
         &["mode shape \u{b7} position ", " mm", " of its largest"],
-        &["sensor, A: mode 1 \u{b7} position 338 mm"],
+        &[
+            "sensor, A: mode 1 \u{b7} position 338 mm \u{b7} displacement 0.7",
+            " predicted",
+        ],
+        &["measured, sensor B \u{b7} position 205 mm \u{b7} displacement 0.391 \u{b1} 0.001"],
         &[
             "with sensor-mass, mode 2 in low.wav \u{b7} error of the frequency ",
             " % \u{b7} that is ",

@@ -16,6 +16,7 @@ mod leftovers;
 mod outputs;
 mod schema;
 mod timings;
+mod trace;
 mod updated_model;
 mod watch;
 

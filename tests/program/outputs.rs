@@ -85,7 +85,7 @@ const TABLE: &[Row] = &[
     row(
         &["spectrum", "taps.wav", "--hammer", "1"],
         &["taps.wav"],
-        &["--png"],
+        &["--png", "--csv"],
         &[],
     ),
     row(

@@ -481,19 +481,21 @@ fn shape_panel(
         Mark::Square(5.0),
         joint,
     ));
+    // Both stand on the axis, and say how much of the mode their places see.
+    let predicted = |place: f64| format!("{} predicted", significant(shape.at(place), 2));
     let mut tapped = Series::new("tap", Color::Vermilion, Mark::Cross(5.0));
     for place in taps {
         tapped.push(1e3 * place, 0.0);
-        tapped
-            .words
-            .push(format!("at {} mm", significant(1e3 * place, 4)));
+        tapped.words.push(format!("mode {}", shape.mode));
+        tapped.said.push(predicted(*place));
     }
     series.push(tapped);
     for (name, places) in sensors {
         let mut sensed = Series::new("sensor", Color::Orange, Mark::Ring(4.0));
         for place in places {
             sensed.push(1e3 * place, 0.0);
-            sensed.words.push((*name).to_owned());
+            sensed.words.push(format!("{name}: mode {}", shape.mode));
+            sensed.said.push(predicted(*place));
             sensed.labels.push((*name).to_owned());
         }
         series.push(sensed);

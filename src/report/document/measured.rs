@@ -70,6 +70,9 @@ pub struct RecordingSection {
     pub conditions: Conditions,
     /// Band (Hz).
     pub band: Option<[f64; 2]>,
+    /// Bands about groups of peaks (Hz), in each of which poles were looked for beside the whole band.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pole_bands: Vec<[f64; 2]>,
     /// "rectangular", "hann" or "exponential".
     pub window: Option<String>,
     /// Decay the window adds (1/s).
@@ -241,7 +244,10 @@ impl RecordingSection {
                 );
             }
         }
+        let searches = spectra.map_or(&[][..], |spectra| &spectra.stabilisation.searches);
+        let narrow = searches.iter().skip(1).map(|search| search.band.core);
         RecordingSection {
+            pole_bands: narrow.map(|(low, high)| [low, high]).collect(),
             fitted_functions,
             aside,
             file: recording.file.clone(),

@@ -259,13 +259,13 @@ function chips(figure) {
     figure.bar.appendChild(button);
   }
   figure.views.forEach(function (view) {
-    chip(view[0], view[1] === figure.plot ? "reset chosen" : "reset", function () {
+    chip(view[0], view[1] === figure.plot ? "view chosen" : "view", function () {
       adopt(figure, view[1]);
       chips(figure);
       build(figure);
     });
   });
-  if (!figure.points && figure.plot.kind !== "taps") chip(figure.log ? "linear frequency" : "log frequency", "reset", function () {
+  if (!figure.points && figure.plot.kind !== "taps") chip(figure.log ? "linear frequency" : "log frequency", "view", function () {
     figure.log = !figure.log;
     chips(figure);
     build(figure);
@@ -344,7 +344,8 @@ function start(node, index, plot) {
   figure.said.setAttribute("aria-live", "polite");
   figure.nearHost = element("div", "host near");
   var note = "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + plot.blocks[0].panels[0].note;
-  [figure.bar, figure.host, figure.said, figure.nearHost, element("p", "note", note)].forEach(function (part) { live.appendChild(part); });
+  figure.poleLine = element("p", "poles");
+  [figure.bar, figure.host, figure.said, figure.poleLine, figure.nearHost, element("p", "note", note)].forEach(function (part) { live.appendChild(part); });
   node.insertBefore(live, node.firstChild);
   node.classList.add("live");
   adopt(figure, plot);

@@ -179,7 +179,7 @@ function hover(figure, panel) {
 function look(figure, u, panel, x, y) {
   function range(axis, ends) { return axis.label + " " + digits(ends[0]) + " to " + digits(ends[1]) + unit(axis.unit); }
   var all = x === panel.x.range && y === panel.y.range;
-  if (!choosesPoles(figure)) figure.said.textContent = all ? "" : "shown: " + range(panel.x, x) + ", " + range(panel.y, y);
+  figure.said.textContent = all ? "" : "shown: " + range(panel.x, x) + ", " + range(panel.y, y);
   panel.view = { x: x, y: y };
   u.batch(function () {
     u.setScale("x", { min: x[0], max: x[1] });
@@ -274,7 +274,7 @@ function buildPoints(figure) {
 
 function pointChips(figure, chip) {
   var views = figure.plot.blocks;
-  if (swings(figure)) chip("move", "reset", function (button) { swing(figure, button); });
+  if (swings(figure)) chip("move", "view", function (button) { swing(figure, button); });
   chip("whole range", "reset", function () { buildPoints(figure); });
   if (views.length > 1) views.forEach(function (view, index) {
     chip(view.name, index === figure.shown ? "mode chosen" : "mode", function (button) {

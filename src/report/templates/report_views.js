@@ -148,8 +148,8 @@ function togglePole(figure, frequency, near) {
 
 function showPoles(figure) {
   var line = "poles = [" + allPoles(figure).map(poleWords).join(", ") + "]";
-  figure.said.textContent = "Click poles to choose modes by hand, then write this line under [analysis] of the description: ";
-  figure.said.appendChild(element("code", "", line));
+  figure.poleLine.textContent = "Click poles to choose modes by hand, then write this line under [analysis] of the description: ";
+  figure.poleLine.appendChild(element("code", "", line));
   figure.panels.forEach(function (u) { u.redraw(false); });
 }
 

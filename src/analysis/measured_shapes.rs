@@ -132,7 +132,8 @@ fn at_sensors(number: usize, configuration: &Configuration, mode: &ObservedMode)
     for value in &mode.shape {
         let sensor = &configuration.sensors[value.sensor];
         if let Some(position) = sensor.position {
-            let limits = limits(value.value, value.std, mode.freedom);
+            // Its scatter is inflated for few taps already.
+            let limits = limits(value.value, value.std, None);
             shape.add(&sensor.name, position, value.value, limits);
         }
     }

@@ -33,6 +33,7 @@ mod joint_law;
 mod laboratory;
 mod mains;
 mod many_taps;
+mod measured_shapes;
 mod modal_fit;
 mod mode_file;
 mod moved_clamp;

@@ -30,6 +30,7 @@ pub fn document() -> Document {
     Document {
         mode_shapes: None,
         measured_shapes: None,
+        sheet: None,
         shape_agreement: None,
         lengths: None,
         free_test: None,
@@ -121,6 +122,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        pole_bands: Vec::new(),
         fitted_functions: Vec::new(),
         files: Vec::new(),
         hammer: None,

@@ -3,8 +3,8 @@
 use super::reader::{DescriptionError, Entry, Table};
 
 /// Longest text of a sheet (characters), so that the sheet stays one page; remarks may be [`LONGEST_REMARKS`].
-const LONGEST: usize = 120;
-const LONGEST_REMARKS: usize = 600;
+const LONGEST: usize = 80;
+const LONGEST_REMARKS: usize = 400;
 
 /// Who tested what, and when. All of it is carried to the outputs as it is written.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

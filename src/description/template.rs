@@ -118,7 +118,7 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 "#;
 
 const SHEET: &str = r#"
-# [sheet]                      # texts for the sheet of `run --sheet`, all of them optional
+[sheet]                        # texts for the sheet of `run --sheet`, all of them optional
 # number = "2024-017"
 # date = 2024-05-17
 # operator = "name"

@@ -15,6 +15,7 @@ mod golden;
 mod leftovers;
 mod outputs;
 mod schema;
+mod sheet;
 mod timings;
 mod trace;
 mod updated_model;

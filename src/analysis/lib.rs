@@ -23,6 +23,7 @@ mod function_file;
 mod function_fits;
 mod identification;
 mod lengths;
+mod measured_shapes;
 mod measurement;
 mod mode_file;
 mod modes;
@@ -48,6 +49,9 @@ pub use function_file::{FunctionSettings, measure_functions_watched};
 use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
+pub use measured_shapes::{
+    MeasuredDisplacement, MeasuredPoints, MeasuredShape, MeasuredShapes, measured_shapes,
+};
 pub use measurement::{
     ForceWindow, MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure,
 };

@@ -29,6 +29,7 @@ mod mode_file;
 mod modes;
 mod observations;
 mod observed_mode;
+mod point_shapes;
 mod pulse_window;
 mod quiet;
 mod recording_result;
@@ -58,6 +59,7 @@ pub use measurement::{
 use modes::{modes_of_bare, set_aside};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
+pub use point_shapes::{NumberedPoints, PointDisplacement, PointShape, PointShapes, point_shapes};
 use recording_result::amplitude_changes;
 pub use recording_result::{CloseUp, Conditions, Overview, RecordingResult, Response};
 pub use results::{

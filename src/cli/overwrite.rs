@@ -252,9 +252,10 @@ const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
     NONE                         0         0         0\n    -1\n";
 
 /// First words of the CSV files that the program writes.
-const CSV_HEADS: [&str; 10] = [
+const CSV_HEADS: [&str; 11] = [
     "parameter,method,unit,value,std,low,high,",
     "mode,label,recording,method,frequency_Hz,std_Hz,",
+    "mode,frequency_Hz,frequency_std_Hz,damping_ratio,node,",
     "method,kind,percent,mode,statistic,kx,ky,kz\n",
     "test,file,quantity,change_percent,score,",
     "pair,mode,before_Hz,after_Hz,change_percent,",

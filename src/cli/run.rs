@@ -23,8 +23,8 @@ use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose
 use tapjoint::recording::{MOST_FILES, ReadSettings};
 use tapjoint::report::document::{FileSection, SheetSection};
 use tapjoint::report::{
-    MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, gap_section, run_files,
-    watched_files,
+    EXCHANGED, MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, exchange_files,
+    gap_section, run_files, watched_files,
 };
 
 /// Analyse a test, from recordings to joint, and write a report.
@@ -52,6 +52,10 @@ pub(super) struct RunArguments {
     /// Estimate to perturb. With `pairs` the pair regression is the only estimate
     #[arg(long, value_name = "M", default_value = "both", value_parser = perturbed_methods())]
     method: &'static [EstimateMethod],
+    /// Also write mode shapes and functions for other programs into the report's folder: modes.uff (datasets 15 and 55) and
+    /// shapes.csv; with a hammer frfs.uff (datasets 58) and frfs.csv
+    #[arg(long)]
+    export: bool,
     #[command(flatten)]
     recording: RecordingArguments,
     /// Also write sheet.html, one page to sign and file, with the checksums of all files read. Texts for it stand under
@@ -158,6 +162,7 @@ impl RunArguments {
             "version": 1,
             "recordings": recordings,
             "gap": { "updated_model": { "file": MODEL_FILE } },
+            "exported": if self.export { &EXCHANGED[..] } else { &[] },
             "warnings": [],
         });
         let (folder, _) = self.folder(&subject, &name);
@@ -351,6 +356,12 @@ pub(super) fn run(
     let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     let drawn = draw_run(&document, &analysis.recordings)?;
     work.go_on(Stage::Files);
+    let exchange = arguments.export.then(|| exchange_files(&analysis));
+    let exchange = exchange.transpose()?;
+    document.exported = exchange.as_ref().map(|exchange| {
+        let files = exchange.files.iter();
+        files.map(|file| file.name.clone()).collect()
+    });
     document.timings = terminal.timings();
     if let Some(model) = model {
         output.add(MODEL_FILE, model.as_bytes())?;
@@ -359,13 +370,17 @@ pub(super) fn run(
         true => watched_files(&document, drawn)?,
         false => run_files(&document, drawn)?,
     };
-    for file in files {
+    let exchange = exchange.unwrap_or_default();
+    for file in files.iter().chain(&exchange.files) {
         output.add(&file.name, &file.bytes)?;
     }
     let (folder, left) = output.publish_report()?;
     drop(work);
     let page = folder.join("report.html");
     terminal.answer(&document, Some(&page), &arguments.full)?;
+    for doubt in &exchange.doubts {
+        terminal.warn(doubt);
+    }
     terminal.write_document(&document)?;
     left.map_or_else(|| Ok(Outcome::of_analysis(&analysis)), Err)
 }

@@ -420,30 +420,43 @@ fn write_below(
 pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = Vec::new();
     for (number, group) in (1..).zip(frfs.chunk_by(|a, b| a.recording == b.recording)) {
-        let Some(first) = group.first() else { continue };
         let numbered = (1..).zip(group);
-        let responses = FrequencyResponses {
-            file: first.recording.clone(),
-            first_frequency: first.lines.low,
-            spacing: first.lines.spacing,
-            lines: first.lines.points(),
-            has_phase: true,
-            responses: numbered
-                .map(|(node, frf)| FrequencyResponse {
-                    name: frf.response.clone(),
-                    response: point(&frf.response, node),
-                    reference: point("hammer", 1000 + number),
-                    unit: Some(frf.unit.clone()),
-                    form: frf.form,
-                    values: existing(frf.values()),
-                    coherence: frf.coherence.as_deref().map(existing),
-                })
-                .collect(),
-            warnings: Vec::new(),
-        };
+        let points = numbered.map(|(node, frf)| point(&frf.response, node));
+        let responses = functions_of(group, points.collect(), &point("hammer", 1000 + number));
         bytes.extend(encode_frequency_responses_uff(&responses, format)?);
     }
     Ok(bytes)
+}
+
+/// Returns the functions of one recording, by the estimator that each is shown by, between these points.
+pub(crate) fn functions_of(
+    frfs: &[Frf],
+    points: Vec<Point>,
+    reference: &Point,
+) -> FrequencyResponses {
+    let lines = frfs.first().map(|frf| frf.lines);
+    let responses = frfs.iter().zip(points);
+    FrequencyResponses {
+        file: frfs
+            .first()
+            .map_or(String::new(), |frf| frf.recording.clone()),
+        first_frequency: lines.map_or(0.0, |lines| lines.low),
+        spacing: lines.map_or(0.0, |lines| lines.spacing),
+        lines: lines.map_or(0, |lines| lines.points()),
+        has_phase: true,
+        responses: responses
+            .map(|(frf, response)| FrequencyResponse {
+                name: frf.response.clone(),
+                response,
+                reference: reference.clone(),
+                unit: Some(frf.unit.clone()),
+                form: frf.form,
+                values: existing(frf.values()),
+                coherence: frf.coherence.as_deref().map(existing),
+            })
+            .collect(),
+        warnings: Vec::new(),
+    }
 }
 
 /// Returns values with 0 for what does not exist.

@@ -8,6 +8,7 @@ pub mod change_check;
 mod data_files;
 pub mod deck;
 pub mod document;
+mod exchange;
 pub mod format;
 mod html;
 pub mod picture;
@@ -50,6 +51,7 @@ pub use document::{
     comparison_of, datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of,
     prediction_of, series_of,
 };
+pub use exchange::{EXCHANGED, ExchangeFiles, exchange_files};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     DrawnPictures, MODEL_FILE, VERSION_FILE, VERSION_HEAD, compared_files, draw_compared, draw_run,
@@ -100,6 +102,9 @@ pub enum ReportError {
     /// A table cannot be written.
     #[error("the table cannot be written as CSV: {0}")]
     Csv(::csv::Error),
+    /// A universal file cannot be written.
+    #[error(transparent)]
+    Universal(#[from] tapjoint_signal::recording::RecordingError),
     /// The page cannot be written.
     #[error("report.html cannot be written: {0}")]
     Html(askama::Error),

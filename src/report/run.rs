@@ -14,6 +14,7 @@ use crate::charts::modes::{amplitude, stabilisation};
 use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
+use crate::exchange::EXCHANGED;
 use crate::html::{InlineFigure, render_html, render_reloading_html};
 use crate::picture::{Block, Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
 use crate::sheet::render_sheet;
@@ -444,10 +445,15 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     // Where the earlier run wrote no model, one of that name is somebody else's.
     let model = report["gap"]["updated_model"]["file"].as_str();
     let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
+    // The same of files for other programs.
+    let exported = report["exported"].as_array();
+    let exported = exported.into_iter().flatten().filter_map(Value::as_str);
+    let exported = exported.filter(|file| EXCHANGED.contains(file));
     OF_ALL
         .into_iter()
         .chain(TABLES)
         .chain([VERSION_FILE])
+        .chain(exported)
         .map(str::to_owned)
         .chain(model)
         .chain(pictures)

@@ -6,6 +6,7 @@ mod browser;
 mod budgets;
 mod diagnose;
 mod documents;
+mod exchange;
 mod export;
 mod faults;
 mod first_steps;

@@ -64,6 +64,12 @@ const TABLE: &[Row] = &[
         &[folder("--out", "report.html", None)],
     ),
     row(
+        &["run", "test.toml", "--export"],
+        &["test.toml", "taps.wav"],
+        &[],
+        &[folder("--out", "modes.uff", None)],
+    ),
+    row(
         &["watch", "test.toml", "--runs", "1", "--interval", "0.1"],
         &["test.toml", "taps.wav"],
         &[],

@@ -41,6 +41,7 @@ fn prop_reports_keep_to_the_shipped_schema() {
     let virtual_test = "examples/five_recordings.toml";
     let commands: &[&[&str]] = &[
         &["run", cantilever],
+        &["run", cantilever, "--export"],
         &["run", "recordings/lap-joint/test.toml"],
         &["identify", cantilever],
         &["perturb", cantilever, "--samples", "20"],

@@ -123,6 +123,9 @@ pub struct Document {
     /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<QualityVerdict>>,
+    /// Files for other programs beside this document; only with `--export`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exported: Option<Vec<String>>,
     /// What each stage of the command took; only with `--timings`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timings: Option<TimingsSection>,

@@ -57,8 +57,8 @@ pub use uff::{
 };
 pub use units::{ResponseForm, TIME_UNITS, channel_unit};
 pub use write::{
-    UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff, encode_wav,
-    write_wav,
+    UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff,
+    encode_mode_shapes_uff, encode_nodes_uff, encode_wav, write_wav,
 };
 
 use error::unreadable;

@@ -1,5 +1,6 @@
 //! Writing recordings as WAV files, through hound, and frequency response functions as universal files.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -9,8 +10,8 @@ use super::error::RecordingError;
 use super::health::{check_finite, check_rate, check_samples};
 use super::responses::{FrequencyResponse, FrequencyResponses, not_finite};
 use super::uff::{
-    ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FREQUENCY, FunctionType, HEADER_LINES, Point,
-    UNKNOWN, VELOCITY,
+    ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FREQUENCY, FunctionType, HEADER_LINES, NodalMode,
+    Node, Point, UNKNOWN, VELOCITY,
 };
 use super::units::ResponseForm;
 
@@ -334,7 +335,8 @@ const SI_UNITS: &str = "    -1\n   164\n         1SI: Meter (newton)           2
      1.00000000000000000D+00  1.00000000000000000D+00  1.00000000000000000D+00\n  \
      2.73149999999999977D+02\n    -1\n";
 
-/// Ordinate data types of record 7.
+/// Ordinate data types of record 7 of a dataset 58, and of record 6 of a dataset 55.
+const REAL_SINGLE: u32 = 2;
 const REAL_DOUBLE: u32 = 4;
 const COMPLEX_DOUBLE: u32 = 6;
 /// Numbers of byte order and number format in the first line of dataset 58b.
@@ -400,6 +402,70 @@ pub fn encode_frequency_responses_uff(
         }
     }
     Ok(bytes)
+}
+
+/// Encodes the places of nodes as a universal file: units (dataset 164), and the nodes (dataset 15) where there are any.
+pub fn encode_nodes_uff(nodes: &BTreeMap<i64, Node>) -> Vec<u8> {
+    let mut text = SI_UNITS.to_owned();
+    if !nodes.is_empty() {
+        text.push_str("    -1\n    15\n");
+    }
+    // Format(4I10,1P3E13.5): number, coordinate systems of place and displacements, colour, X, Y, Z.
+    for (number, node) in nodes {
+        let place = node.place.map(short);
+        let (own, of_displacements) = (node.system, node.displacement_system);
+        let _ = writeln!(
+            text,
+            "{number:10}{own:10}{of_displacements:10}{:10}{}",
+            1,
+            place.concat()
+        );
+    }
+    if !nodes.is_empty() {
+        text.push_str("    -1\n");
+    }
+    text.into_bytes()
+}
+
+/// Encodes mode shapes with their numbers as datasets 55: normal modes, displacements along X, Y and Z, real single
+/// precision. Imaginary parts are left out. `name` is that of the test.
+///
+/// # Errors
+/// Values that are not finite.
+pub fn encode_mode_shapes_uff(
+    name: &str,
+    modes: &[(i64, NodalMode)],
+) -> Result<Vec<u8>, RecordingError> {
+    let mut text = String::new();
+    for (number, mode) in modes {
+        let frequency = (mode.frequency, mode.damping.unwrap_or(0.0));
+        let values = mode.shape.values().flatten().map(|value| value.re);
+        let damaged = [frequency.0, frequency.1].into_iter().chain(values);
+        if let Some(value) = damaged.into_iter().find(|value| !value.is_finite()) {
+            let problem = format!("mode {number} holds {value}; allowed: finite numbers");
+            return Err(RecordingError::new(name, problem));
+        }
+        let _ = writeln!(text, "    -1\n    55\n{}", field(name, ID_LINE));
+        let _ = writeln!(text, "Mode {number}\nNONE\nNONE\nNONE");
+        // Structural, normal mode, translations, displacement, real, three values of each node.
+        let kind = [1, 2, 2, DISPLACEMENT, REAL_SINGLE, 3].map(|field| format!("{field:10}"));
+        let _ = writeln!(text, "{}", kind.concat());
+        // Two whole numbers and four others follow: load case and mode; frequency, modal mass, viscous and hysteretic damping.
+        let _ = writeln!(text, "{:10}{:10}{:10}{number:10}", 2, 4, 1);
+        let reals = [frequency.0, 0.0, frequency.1, 0.0];
+        let _ = writeln!(text, "{}", reals.map(short).concat());
+        for (node, value) in &mode.shape {
+            let value = value.map(|part| short(part.re));
+            let _ = writeln!(text, "{node:10}\n{}", value.concat());
+        }
+        text.push_str("    -1\n");
+    }
+    Ok(text.into_bytes())
+}
+
+/// A number of six digits in a field of thirteen, Format(E13.5).
+fn short(value: f64) -> String {
+    format!("{:>13}", exponential(value, 5))
 }
 
 /// Checks the values of a response (1-based) with `width` numbers a line.

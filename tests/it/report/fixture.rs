@@ -55,6 +55,7 @@ pub fn document() -> Document {
         compare: None,
         series: None,
         quality: Some(quality()),
+        exported: None,
         timings: None,
         warnings: vec![
             WarningSection {

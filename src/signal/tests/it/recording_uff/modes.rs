@@ -1,8 +1,10 @@
 //! Modes of universal files: files that the tests write, and two that pyuff wrote (`pyuff_modes.py` beside them).
 
 use num_complex::Complex64;
+use std::collections::BTreeMap;
 use tapjoint_signal::recording::{
-    ModeShapes, NoLine, ReadSettings, RecordingError, open_frequency_responses, read_mode_shapes,
+    ModeShapes, NoLine, NodalMode, Node, ReadSettings, RecordingError, encode_mode_shapes_uff,
+    encode_nodes_uff, open_frequency_responses, read_mode_shapes,
 };
 
 use super::open;
@@ -589,4 +591,48 @@ fn regress_modes_where_samples_are_wanted_name_the_key_that_reads_them() {
             "{message}"
         );
     }
+}
+
+#[test]
+fn prop_modes_that_were_written_are_read_back() {
+    let node = |x: f64| Node {
+        place: [x, 0.0, 0.0],
+        system: 0,
+        displacement_system: 0,
+    };
+    let nodes: BTreeMap<i64, Node> = [(1, node(0.205)), (2, node(0.338))].into();
+    let mode = |frequency: f64, damping: Option<f64>, values: [f64; 2]| NodalMode {
+        frequency,
+        damping,
+        shape: (1..)
+            .zip(values.map(|z| [0.0, 0.0, z].map(Complex64::from)))
+            .collect(),
+    };
+    let modes = [
+        (1, mode(17.003, Some(0.0031), [0.25, 1.0])),
+        (3, mode(335.63, None, [-1.0, 0.125])),
+    ];
+    let written = |modes: &[(i64, NodalMode)]| encode_mode_shapes_uff("A \n test", modes);
+    let mut bytes = encode_nodes_uff(&nodes);
+    bytes.extend(written(&modes).unwrap());
+    let read = read(&file("modes.unv", std::str::from_utf8(&bytes).unwrap()));
+    assert_eq!(read.nodes, nodes);
+    assert_eq!(read.modes, modes.map(|(_, mode)| mode));
+    assert!(read.warnings.is_empty(), "{:?}", read.warnings);
+    let line = read.along_line(Some(1)).unwrap();
+    assert_eq!((line.direction.as_str(), line.shapes[0].len()), ("Z", 2));
+    for damaged in [
+        mode(f64::NAN, None, [0.0; 2]),
+        mode(1.0, Some(f64::INFINITY), [0.0; 2]),
+        mode(1.0, None, [f64::NAN, 0.0]),
+    ] {
+        let error = written(&[(1, damaged)]).expect_err("no number");
+        assert!(error.to_string().contains("finite numbers"), "{error}");
+    }
+    // Without nodes only the units are left.
+    let text = String::from_utf8(encode_nodes_uff(&BTreeMap::new())).unwrap();
+    assert!(
+        text.contains("   164\n") && !text.contains("    15\n"),
+        "{text}"
+    );
 }

@@ -48,14 +48,14 @@ pub(super) fn analyse_together(
     name: String,
     files: &[PathBuf],
     recording: &RecordingArguments,
+    spectrum: &SpectrumSettings,
     reading: ReadBy,
     watch: &dyn Watch,
 ) -> anyhow::Result<Analysis> {
-    let spectrum = SpectrumSettings::default();
     // In parallel, but collected in order, so that of several errors the first is reported.
     let results: Vec<anyhow::Result<_>> = files
         .par_iter()
-        .map(|file| measured(file, recording, &spectrum, reading, watch))
+        .map(|file| measured(file, recording, spectrum, reading, watch))
         .collect();
     let results = results.into_iter().collect::<anyhow::Result<_>>()?;
     Ok(analysis_of_bare(name, results))

@@ -57,6 +57,8 @@ pub(super) struct RunArguments {
     #[arg(long)]
     export: bool,
     #[command(flatten)]
+    spectrum: SpectrumSettings,
+    #[command(flatten)]
     recording: RecordingArguments,
     /// Also write sheet.html, one page to sign and file, with the checksums of all files read. Texts for it stand under
     /// [sheet] of the description. Print it for a PDF
@@ -221,6 +223,12 @@ fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow
             "--hammer, --sample-rate, --time-unit, --values, --variable and --overload are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
+    let spectrum = &arguments.spectrum;
+    if spectrum.zoom.is_some() || spectrum.block.is_some() || spectrum.window.is_some() {
+        bail!(
+            "--zoom, --block and --window are for bare recordings; a test description says `band` and `block` in [[recording]], and `window` in [analysis]"
+        );
+    }
     let mut file = read_test(file, terminal)?;
     if let Some(reading) = arguments.reading {
         file.test.analysis.reading = reading;
@@ -326,11 +334,11 @@ pub(super) fn run(
             terminal.watch(),
         )?,
         (None, Subject::Described(file) | Subject::Bare(file)) => {
-            let spectrum = SpectrumSettings::default();
-            analyse(file, bare, &spectrum, reading, terminal.watch())?
+            analyse(file, bare, &arguments.spectrum, reading, terminal.watch())?
         }
         (None, Subject::Folder(_, files)) => {
-            analyse_together(name, files, bare, reading, terminal.watch())?
+            let spectrum = &arguments.spectrum;
+            analyse_together(name, files, bare, spectrum, reading, terminal.watch())?
         }
     };
     let mut document = document_of(&analysis);

@@ -254,7 +254,9 @@ pub fn budget(document: &Document) -> Option<Table> {
             .map(|column| number(&format!("{} (%)", column.symbol), "")),
     );
     let assumed = estimate.assumed.as_ref();
-    let assumed = assumed.map_or(String::new(), |assumed| format!(" Assumed: {assumed}."));
+    let assumed = assumed.map_or(String::new(), |assumed| {
+        format!(" Assumed standard uncertainties: {assumed}.")
+    });
     let note = format!(
         "Part of each input in the standard deviation; the squares add up. Below: all together after one more \
          measurement.{assumed}"

@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use super::{Cell, Table, number, page_number, page_words, words};
+use super::{Cell, Place, Table, number, page_number, page_words, words};
 use crate::document::{Document, RecordingSection, TapSection};
 use crate::format::{
     MISSING, optional, or_missing, significant, trimmed, unit_words, with_minus_signs,
@@ -275,14 +275,17 @@ pub fn datasets(document: &Document) -> Option<Table> {
             (Some(above), Some(below)) => format!("({above})/({below})"),
             (above, _) => or_missing(above.as_ref()),
         };
+        // Where there is no room, names of files go before names of points.
+        let mut reference = words("Reference", or_missing(one.reference.as_ref()));
+        reference.column.place = Place::Spacious;
         [
             words("File", if several { one.file.as_str() } else { "" }),
             number("Number", one.dataset.to_string()),
-            words("Kind", &one.kind),
+            words("Kind", one.kind.replace("frequency response function", "FRF")),
             number("Points", or_missing(one.points)),
             number("Step", step),
             words("Response", or_missing(one.response.as_ref())),
-            words("Reference", or_missing(one.reference.as_ref())),
+            reference,
             words("Unit", unit),
             page_words("Values", or_missing(one.values.as_ref())),
             page_words("Stored as", or_missing(one.coding.as_ref())),

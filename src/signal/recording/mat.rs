@@ -493,7 +493,7 @@ impl MatFile {
         if let Some(one) = largest {
             let is_complex = matches!(&one.values, Some((_, Some(_))));
             let role = if is_complex { "frf" } else { "samples" };
-            parts.push(format!("{role} = \"{}\"", one.name));
+            parts.push((role, one.name.clone()));
         }
         let rate = named(&[
             "fs",
@@ -504,13 +504,20 @@ impl MatFile {
             "samplerate",
             "sr",
         ]);
-        parts.extend(rate.map(|name| format!("rate = \"{name}\"")));
+        parts.extend(rate.map(|name| ("rate", name)));
         let points = named(&["npts", "nfft", "points", "n"]);
-        parts.extend(points.map(|name| format!("points = \"{name}\"")));
+        parts.extend(points.map(|name| ("points", name)));
         let roles: Vec<&str> = VariableRole::WORDS.iter().map(|(word, _)| *word).collect();
+        let options = parts
+            .iter()
+            .map(|(role, name)| format!("--variable {role}={name}"));
+        let keys = parts
+            .iter()
+            .map(|(role, name)| format!("{role} = \"{name}\""));
         format!(
-            "perhaps `variables = {{ {} }}` (--variable ROLE=NAME); roles: {}",
-            parts.join(", "),
+            "perhaps `{}`, in a test description `variables = {{ {} }}`; roles: {}",
+            options.collect::<Vec<_>>().join(" "),
+            keys.collect::<Vec<_>>().join(", "),
             roles.join(", ")
         )
     }

@@ -16,7 +16,9 @@ use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::exchange::EXCHANGED;
 use crate::html::{InlineFigure, render_html, render_reloading_html};
-use crate::picture::{Block, Chart, Drawing, PictureFormat, packed, render_picture, render_svg};
+use crate::picture::{
+    Block, Chart, Color, Drawing, PictureFormat, packed, render_picture, render_svg,
+};
 use crate::sheet::render_sheet;
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
@@ -60,19 +62,30 @@ fn leading(recordings: &[RecordingResult]) -> Option<Chart> {
     let (file, frfs) = (&recording.file, given_frfs(recording));
     let chart = frf(recording, file, &frfs, &[]);
     let what = match (&chart, frfs.iter().any(|frf| frf.fitted.is_some())) {
-        (Some(_), true) => "measured, and the fitted modes as thin lines",
+        (Some(_), true) => "measured; the fitted modes as thin lines",
         (Some(_), false) => "measured",
         (None, _) => "averaged spectra",
     };
     let mut chart = chart.or_else(|| spectrum(recording, file))?;
+    let mut first = chart.blocks.swap_remove(0).panels.swap_remove(0);
+    // There is room for what was measured and what explains it.
+    first.series.retain(|series| series.opacity == 1.0);
+    let names = recording.responses.iter().enumerate().take(MOST_NAMED);
+    let names = names.map(|(index, one)| format!("{} {}", one.name, Color::curve(index).word()));
+    let names: Vec<String> = names.collect();
+    let names = match recording.responses.len() {
+        2..=MOST_NAMED => format!(" ({})", names.join(", ")),
+        _ => String::new(),
+    };
     chart.kind = "answer";
-    chart.caption = format!("{file}: {what}.");
+    chart.caption = format!("{file}{names}: {what}.");
     chart.width = LEADING_WIDTH;
-    let first = chart.blocks.swap_remove(0);
-    chart.blocks = vec![Block::new(1, first.panels.into_iter().take(1).collect())];
+    chart.blocks = vec![Block::new(1, vec![first])];
     Some(chart)
 }
 
+/// Most responses that the caption of the first screen's picture names.
+const MOST_NAMED: usize = 4;
 /// Width of the first screen's picture (pixels).
 const LEADING_WIDTH: u32 = 720;
 

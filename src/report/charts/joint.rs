@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::document::{Document, EstimateMethod, PredictionSection};
+use crate::document::{Document, EstimateMethod, PredictionSection, Uncertain};
 use crate::format::{rounded_to, signed, signed_percent, significant};
 use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
 use crate::tables::{patterns_in_words, reading_bound};
@@ -20,6 +20,8 @@ const MOST_LABELS: usize = 14;
 /// The axis reaches at least this far to either side of zero (%): differences of thousandths of a percent mean
 /// nothing in practice, and magnified they would mislead.
 const LEAST_SPAN: f64 = 0.02;
+/// Share of an axis within which points count as one place.
+const CROWDED: f64 = 0.05;
 /// Ratio of the largest to the smallest stiffness above which an axis is logarithmic.
 const WIDE: f64 = 20.0;
 /// chi-squared with two degrees of freedom is below this with 95 % probability.
@@ -153,6 +155,8 @@ struct Cloud {
     estimate: Option<(f64, f64)>,
     /// The 95 % region by the covariance; empty where there is none.
     ellipse: Vec<(f64, f64)>,
+    /// Stated 95 % limits of Kx and of Ky, as lines through the estimate; empty where there are none.
+    limits: Vec<[(f64, f64); 2]>,
     /// True if the ellipse holds the scatter of the joint between recordings, which the random errors do not.
     of_set_ups: bool,
 }
@@ -246,6 +250,14 @@ impl Cloud {
                 let region = covariance.map(|((kx, ky), covariance)| ellipse(kx, ky, covariance));
                 cloud.ellipse = region.unwrap_or_default();
                 cloud.of_set_ups = estimate.set_ups.is_some();
+                if let (Some((x, y)), Some(kx), Some(ky)) =
+                    (cloud.estimate, &estimate.kx, &estimate.ky)
+                {
+                    let ends = |one: &Uncertain| Some([one.low?, one.high?]);
+                    let across = ends(&kx.uncertain).map(|ends| ends.map(|end| (end, y)));
+                    let upright = ends(&ky.uncertain).map(|ends| ends.map(|end| (x, end)));
+                    cloud.limits.extend([across, upright].into_iter().flatten());
+                }
             }
         }
         cloud
@@ -258,6 +270,7 @@ impl Cloud {
             .iter()
             .chain(&self.estimate)
             .chain(&self.ellipse)
+            .chain(self.limits.iter().flatten())
             .chain(shifted);
         let shown: Vec<(f64, f64)> = shown.copied().collect();
         let random_x = inner(self.random.iter().map(|place| place.0));
@@ -275,6 +288,16 @@ impl Cloud {
             alike.words.push(words.clone());
             alike.labels.push(words);
         }
+        // Words about points that lie on the estimate would hide it.
+        let crowd = |values: Vec<f64>, axis: &Axis| {
+            let (low, high) = extent(values).unwrap_or((0.0, 0.0));
+            high - low < CROWDED * (axis.high - axis.low)
+        };
+        let [across, upright] = [|place: &(f64, f64)| place.0, |place: &(f64, f64)| place.1]
+            .map(|of| self.shifted.iter().map(|(_, place)| of(place)).collect());
+        if crowd(across, &x) && crowd(upright, &y) {
+            alike.labels.clear();
+        }
         let patterns = "every mode at an end of its bound";
         let ellipse = match self.of_set_ups {
             true => "95 % ellipse (covariance, with the scatter of the joint)",
@@ -284,10 +307,16 @@ impl Cloud {
             x.of("Kx = Kt L\u{b3}/(EI)", "1"),
             y.of("Ky = Kr L/(EI)", "1"),
         );
-        Panel::new(440.0, x, y).with([
+        let limits = self.limits.into_iter();
+        let limits = limits
+            .map(|ends| Series::points("stated 95 % limits", Color::Blue, Mark::Line(2.0), ends));
+        let panel = Panel::new(440.0, x, y).with([
             Series::points("random errors", Color::Data, Mark::Dot(1.7), self.random),
             Series::points(patterns, Color::Sky, Mark::Dot(3.2), self.patterns),
             Series::points(ellipse, Color::Vermilion, Mark::Line(2.0), self.ellipse),
+        ]);
+        let panel = panel.with(limits);
+        panel.with([
             alike,
             Series::points("estimate", Color::Blue, Mark::Dot(5.5), self.estimate),
         ])

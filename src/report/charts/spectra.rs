@@ -35,6 +35,8 @@ const OVER: f64 = 1.0;
 const MOST_CLOSE_UPS: usize = 6;
 /// Lines shown on each side of a close-up's peak.
 const SIDE: f64 = 6.0;
+/// The same in half-power widths, where that is more: there a mode is 15 dB below its peak.
+const SIDE_WIDTHS: f64 = 3.0;
 /// Depth shown below a close-up's peak (dB).
 const DEPTH: f64 = 30.0;
 
@@ -493,7 +495,15 @@ fn close_ups(spectra: &MeasuredSpectra, rules: &[Rule]) -> Option<Block> {
 fn close_up(spectra: &MeasuredSpectra, rule: &Rule) -> Panel {
     let center = rule.line;
     let lines = &spectra.averages.lines;
-    let reach = (SIDE * lines.spacing).max(2.0 * rule.half);
+    let own = spectra
+        .readings
+        .iter()
+        .find(|reading| reading.frequency == rule.at);
+    let damping = own.and_then(|reading| reading.damping_ratio).unwrap_or(0.0);
+    let width = 2.0 * damping * rule.at;
+    let reach = (SIDE * lines.spacing)
+        .max(2.0 * rule.half)
+        .max(SIDE_WIDTHS * width);
     let decimals = if rule.half < 0.05 { 3 } else { 2 };
     let side = significant(reach, 2);
     let x = Axis::linear(center - reach, center + reach);

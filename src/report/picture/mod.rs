@@ -250,6 +250,20 @@ impl Color {
         [Blue, Vermilion, Green, Purple, Orange, Sky][index % 6]
     }
 
+    /// Its name in a sentence.
+    pub fn word(self) -> &'static str {
+        match self {
+            Color::Blue => "blue",
+            Color::Vermilion => "red",
+            Color::Green => "green",
+            Color::Purple => "purple",
+            Color::Orange => "orange",
+            Color::Sky => "light blue",
+            Color::Ink => "black",
+            Color::Soft | Color::Data => "grey",
+        }
+    }
+
     /// On white paper.
     pub fn rgb(self) -> Rgb {
         match self {

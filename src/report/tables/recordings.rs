@@ -281,7 +281,10 @@ pub fn datasets(document: &Document) -> Option<Table> {
         [
             words("File", if several { one.file.as_str() } else { "" }),
             number("Number", one.dataset.to_string()),
-            words("Kind", one.kind.replace("frequency response function", "FRF")),
+            words(
+                "Kind",
+                one.kind.replace("frequency response function", "FRF"),
+            ),
             number("Points", or_missing(one.points)),
             number("Step", step),
             words("Response", or_missing(one.response.as_ref())),

@@ -627,6 +627,6 @@ fn prop_the_page_of_a_test_stays_small() {
     let size = std::fs::metadata(folder.path().join("report/report.html"))
         .unwrap()
         .len();
-    // Two recordings; five have to stay below 3 MB.
+    // Two recordings; five have to stay below 2 MB.
     assert!(size < 1_200_000, "{size} bytes");
 }

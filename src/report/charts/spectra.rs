@@ -135,7 +135,10 @@ pub fn frf(
         panels.push(Panel::new(120.0, x, axis).with(coherences));
     }
     let faint = frfs.first().into_iter().flat_map(|frf| beside(frf, others));
-    let faint: Vec<&str> = faint.map(FrfEstimator::name).collect();
+    let mut faint: Vec<&str> = faint.map(FrfEstimator::name).collect();
+    if frfs.iter().any(|frf| frf.fitted.is_some()) {
+        faint.push("residual");
+    }
     if !faint.is_empty() {
         below.push_str(&format!(" \u{b7} faint: {}", faint.join(", ")));
     }
@@ -146,8 +149,8 @@ pub fn frf(
     let mut caption = format!("Response per force (H1) of {name}, magnitude, phase and coherence.");
     if frfs.iter().any(|frf| frf.fitted.is_some()) {
         caption.push_str(
-            " Thin dark line: what the fitted modes explain, with a term each for modes below and above the band. Broken \
-             line: the residual. Where it has a peak, a mode may be missing.",
+            " Thin dark line: what the fitted modes explain, with a term each for modes below and above the band. Faint \
+             line: the residual, measured less fitted. Where it has a peak, a mode may be missing.",
         );
     }
     Some(Chart {
@@ -221,7 +224,7 @@ fn magnitude_panels(
         };
         let series = panel_of(&mut panels, &x, frf.form_words, &unit_words(&frf.unit));
         series.push(Series {
-            mark: Mark::Dashed(OVER),
+            mark: Mark::Line(OVER),
             opacity: FAINT,
             ..over_lines(lines, &name, Color::curve(index), magnitudes(&residual))
         });

@@ -290,25 +290,34 @@ fn view(name: &str, panels: &[Panel]) -> Block {
     }
 }
 
-/// Most points of a curve beside those about modes: two for each pixel of the page's width. Zooming then finds
-/// more than the whole view shows, and five long recordings stay below the page's limit of 3 MB.
-const MOST_POINTS: usize = 2000;
+/// Most points of a curve beside those about modes: more than one for each pixel of the page's width. Five long
+/// recordings stay below 2 MB.
+const MOST_POINTS: usize = 1400;
+/// Width of a column of a curve (pixels), and points in it up to which all are drawn.
+const COLUMN: f64 = 2.0;
+const FEW_IN_COLUMN: usize = 4;
 /// Lines kept on either side of a mode: what zooming to it shows.
 const ABOUT_MODES: usize = 40;
 /// Most points of a curve behind single points: it is faint, and the spectra have all of it.
 const BEHIND: usize = 400;
 
-/// Reduces a curve, ascending in x (pixels), to at most four points for each column of pixels: the
-/// first, the lowest, the highest and the last, in their order.
+/// Reduces a curve, ascending in x (pixels): of [`COLUMN`] pixels with many points the lowest and the highest stay, in
+/// their order.
 ///
-/// The picture is the same; a peak of one sample stays. Points that are not finite are left out.
+/// The picture looks the same; a peak of one sample stays. Points that are not finite are left out.
 pub fn decimate(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let finite = points
         .into_iter()
         .filter(|(x, y)| x.is_finite() && y.is_finite());
     let finite: Vec<Point> = finite.collect();
     let mut reduced = Vec::new();
-    for column in finite.chunk_by(|before, after| before.0.floor() == after.0.floor()) {
+    for column in
+        finite.chunk_by(|before, after| (before.0 / COLUMN).floor() == (after.0 / COLUMN).floor())
+    {
+        if column.len() <= FEW_IN_COLUMN {
+            reduced.extend(column);
+            continue;
+        }
         let (mut low, mut high) = (0, 0);
         for (index, point) in column.iter().enumerate() {
             if point.1 < column[low].1 {
@@ -318,9 +327,8 @@ pub fn decimate(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
                 high = index;
             }
         }
-        let mut kept = [0, low.min(high), low.max(high), column.len() - 1].to_vec();
-        kept.dedup();
-        reduced.extend(kept.into_iter().map(|index| column[index]));
+        reduced.push(column[low.min(high)]);
+        reduced.push(column[low.max(high)]);
     }
     reduced
 }

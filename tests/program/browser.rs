@@ -628,5 +628,5 @@ fn prop_the_page_of_a_test_stays_small() {
         .unwrap()
         .len();
     // Two recordings; five have to stay below 2 MB.
-    assert!(size < 1_200_000, "{size} bytes");
+    assert!(size < 800_000, "{size} bytes");
 }

@@ -392,6 +392,8 @@ fn frozen_five_simulated_recordings() {
     ];
     assert_eq!(put_out(folder.path(), &simulate), "");
     assert_frozen("five_recordings", folder.path(), "v/test.toml");
+    let page = fs::metadata(folder.path().join("report/report.html")).unwrap();
+    assert!(page.len() < 2_000_000, "{} bytes", page.len());
 }
 
 /// A joint that is retightened: 8 % less rotational stiffness, as another person would record it.

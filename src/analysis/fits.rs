@@ -42,6 +42,8 @@ pub(super) const CLEAR_AMPLITUDE: f64 = 5.0;
 pub struct Stabilisation {
     /// The whole band, then the bands about groups of peaks; empty where nothing could be fitted.
     pub searches: Vec<BandSearch>,
+    /// Frequencies in the band (Hz) that were chosen by hand, and at which no mode was fitted.
+    pub without_mode: Vec<f64>,
 }
 
 /// The polyreference fit of `columns` on equally spaced lines, in narrow bands about `peaks` as well; nothing where the
@@ -65,6 +67,7 @@ pub(super) fn stabilisation(
     });
     Stabilisation {
         searches: found.unwrap_or_default(),
+        without_mode: Vec::new(),
     }
 }
 
@@ -83,8 +86,9 @@ pub(super) struct Candidates<'a> {
 }
 
 impl Candidates<'_> {
-    /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
-    pub fn fit(&self, readings: &mut Vec<ModeReading>) {
+    /// Puts the fits into the readings of the peaks, and adds the modes that make no peak. Returns the chosen frequencies
+    /// without a mode (Hz).
+    pub fn fit(&self, readings: &mut Vec<ModeReading>) -> Vec<f64> {
         if !self.chosen.is_empty() {
             return self.fit_chosen(readings);
         }
@@ -165,65 +169,89 @@ impl Candidates<'_> {
             readings.push(self.without_peak(fit, proposal.above_noise_db));
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        Vec::new()
     }
 
     /// Fits the modes that were chosen by hand and no others: each starts at the pole of any order nearest to its
-    /// frequency. Of the peaks only those of chosen modes stay.
-    pub fn fit_chosen(&self, readings: &mut Vec<ModeReading>) {
+    /// frequency. Of the peaks only those of chosen modes stay. Returns the chosen frequencies in the band without a mode (Hz).
+    pub fn fit_chosen(&self, readings: &mut Vec<ModeReading>) -> Vec<f64> {
         let settings = FitSettings {
             steady_lines: self.hum.clone(),
             ..FitSettings::default()
         };
-        let lines = self.data.frequencies();
-        let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
-            return;
-        };
-        let searches = self.stabilisation.searches.iter();
-        let poles = searches.flat_map(|search| &search.diagram);
-        let mut starts = Vec::new();
-        for &frequency in self
-            .chosen
-            .iter()
-            .filter(|one| (*first..=*last).contains(*one))
-        {
-            let distance = |pole: &&StabilisationPole| (pole.frequency - frequency).abs();
-            let nearest = |reach: f64, stable: bool| {
-                let known = poles.clone().filter(|pole| {
-                    distance(pole) <= reach && (!stable || pole.stability == PoleStability::All)
-                });
-                known.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        let (mut starts, mut wanted) = (Vec::new(), Vec::new());
+        for &frequency in &self.chosen_in_band() {
+            let start = match self.chosen_pole(frequency) {
+                Some(pole) => PoleStart {
+                    frequency: pole.frequency,
+                    damping_ratio: Some(pole.damping_ratio),
+                },
+                None => PoleStart {
+                    frequency,
+                    damping_ratio: None,
+                },
             };
-            // The pole may have been chosen in another recording, where its frequency differed somewhat.
-            let nearest = nearest(2.0 * self.lines.half_line(), false)
-                .or_else(|| nearest(CHOSEN_REACH * frequency, true));
-            starts.push(PoleStart {
-                frequency: nearest.map_or(frequency, |pole| pole.frequency),
-                damping_ratio: nearest.map(|pole| pole.damping_ratio),
-            });
+            // Two frequencies of one pole are one mode.
+            if !starts.contains(&start) {
+                starts.push(start);
+                wanted.push(frequency);
+            }
         }
         let (_, fits) = Accepted::new(self.data, &starts, &settings);
         let mut peaks = std::mem::take(readings);
-        for (start, fit) in starts.iter().zip(&fits) {
+        let mut without = Vec::new();
+        for (index, (start, fit)) in starts.iter().zip(fits).enumerate() {
             let width = start.damping_ratio.unwrap_or(0.0) * start.frequency;
             let reach = 2.0 * self.lines.half_line() + width;
+            // A fit that has left its start is another mode, or none.
+            let is_here = |fit: &ModeFit| (fit.frequency.value - start.frequency).abs() <= reach;
+            let Some(fit) = fit.ok().filter(is_here) else {
+                without.push(wanted[index]);
+                continue;
+            };
             let distance = |peak: &ModeReading| (peak.frequency - start.frequency).abs();
             let places = (0..peaks.len()).filter(|&place| distance(&peaks[place]) <= reach);
             let place = places.min_by(|&a, &b| distance(&peaks[a]).total_cmp(&distance(&peaks[b])));
-            match (place, fit) {
-                (Some(place), fit) => {
+            match place {
+                Some(place) => {
                     let mut reading = peaks.remove(place);
-                    // Whatever the program takes the peak for: it was chosen.
+                    // The choice counts, also where the program would not have taken the peak for a mode.
                     reading.label = None;
-                    if let Ok(fit) = fit {
-                        self.adopt(&mut reading, fit);
-                    }
+                    self.adopt(&mut reading, &fit);
                     readings.push(reading);
                 }
-                (None, Ok(fit)) => readings.push(self.without_peak(fit, 0.0)),
-                (None, Err(_)) => {}
+                None => readings.push(self.without_peak(&fit, 0.0)),
             }
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        without
+    }
+
+    /// Returns the chosen frequencies that the lines of the fit hold (Hz).
+    fn chosen_in_band(&self) -> Vec<f64> {
+        let lines = self.data.frequencies();
+        let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
+            return Vec::new();
+        };
+        let chosen = self.chosen.iter().copied();
+        chosen
+            .filter(|one| (*first..=*last).contains(one))
+            .collect()
+    }
+
+    /// Returns the pole that a chosen frequency (Hz) means: the nearest of any order within a line, else the nearest stable
+    /// one within [`CHOSEN_REACH`], since it may have been chosen in another recording.
+    fn chosen_pole(&self, frequency: f64) -> Option<&StabilisationPole> {
+        let distance = |pole: &&StabilisationPole| (pole.frequency - frequency).abs();
+        let searches = self.stabilisation.searches.iter();
+        let poles = searches.flat_map(|search| &search.diagram);
+        let line = 2.0 * self.lines.half_line();
+        let near = poles.clone().filter(|pole| distance(pole) <= line);
+        let stable = poles.filter(|pole| {
+            pole.stability == PoleStability::All && distance(pole) <= CHOSEN_REACH * frequency
+        });
+        near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .or_else(|| stable.min_by(|a, b| distance(a).total_cmp(&distance(b))))
     }
 
     /// The fit of all together. Beside the others an added mode may leave the band that it kept to when it
@@ -394,6 +422,30 @@ impl Candidates<'_> {
     }
 }
 
+/// Keeps the peaks at the frequencies that were chosen by hand (Hz), where nothing can be fitted; all without a choice.
+/// Returns the chosen frequencies in the band without a peak (Hz).
+pub(super) fn keep_chosen(
+    readings: &mut Vec<ModeReading>,
+    chosen: &[f64],
+    lines: &Lines,
+) -> Vec<f64> {
+    if chosen.is_empty() {
+        return Vec::new();
+    }
+    let is_at = |reading: &ModeReading, frequency: f64| {
+        let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
+        (reading.frequency - frequency).abs() <= 2.0 * lines.half_line() + width
+    };
+    let chosen = chosen.iter().copied();
+    let chosen = chosen.filter(|one| (lines.low..=lines.high).contains(one));
+    readings.retain(|reading| chosen.clone().any(|one| is_at(reading, one)));
+    for reading in readings.iter_mut() {
+        reading.label = None;
+    }
+    let without = chosen.filter(|one| !readings.iter().any(|reading| is_at(reading, *one)));
+    without.collect()
+}
+
 /// Half the half-power width below which a pole does not decay (lines): 27 % over the length of the signal.
 const STEADY_WIDTH: f64 = 0.05;
 
@@ -490,7 +542,7 @@ impl FreeDecays {
         let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
         let first = self.data.frequencies().first().copied().unwrap_or(0.0);
         let spacing = self.data.spacing();
-        let stabilisation = stabilisation(first, spacing, &columns, BandPeaks::Together);
+        let mut stabilisation = stabilisation(first, spacing, &columns, BandPeaks::Together);
         let steady: Vec<f64> = hum.iter().map(|line| line.frequency).collect();
         let candidates = Candidates {
             lines,
@@ -499,11 +551,12 @@ impl FreeDecays {
             hum,
             chosen,
         };
-        candidates.fit(readings);
+        let without_mode = candidates.fit(readings);
         let settings = FitSettings {
             steady_lines: candidates.hum,
             ..FitSettings::default()
         };
+        stabilisation.without_mode = without_mode;
         let unfitted: Vec<KnownMode> = readings
             .iter()
             .filter(|reading| reading.fit.is_none() && reading.label.is_none())

@@ -1,7 +1,7 @@
 //! Files of frequency response functions: their resonances, as a recording's.
 
 use super::explained::{explain, unlisted_peaks};
-use super::fits::{Candidates, Stabilisation, stabilisation};
+use super::fits::{Candidates, Stabilisation, keep_chosen, stabilisation};
 use super::function_fits::{FunctionModes, level_of_functions};
 use super::measurement::{MeasureError, MeasuredSpectra, Measurement};
 use super::recording_result::{Conditions, RecordingResult, Response};
@@ -82,7 +82,7 @@ pub(super) fn measure_functions(
         values.push(response.values[first..first + lines.points()].to_vec());
     }
     let mut spectra = match is_spectrum {
-        true => spectra_of_magnitudes(lines, &values, settings.reading),
+        true => spectra_of_magnitudes(lines, &values, settings),
         false => spectra_of_functions(lines, values, &forms, settings, work),
     };
     spectra.fitted = explain(
@@ -102,8 +102,8 @@ pub(super) fn measure_functions(
         band,
         spectra.fitted.is_some(),
     ));
-    let poles = Warning::poles_without_mode(file, &settings.poles, band, &spectra.readings);
-    warnings.extend(poles);
+    let without_mode = &spectra.stabilisation.without_mode;
+    warnings.extend(Warning::poles_without_mode(file, without_mode));
     Ok(RecordingResult {
         file: functions.file.clone(),
         files: Vec::new(),
@@ -170,7 +170,7 @@ fn axis(
 fn spectra_of_magnitudes(
     lines: Lines,
     values: &[Vec<Complex64>],
-    wanted: ReadBy,
+    settings: &FunctionSettings,
 ) -> MeasuredSpectra {
     let squares = |h: &Vec<Complex64>| h.iter().map(Complex64::norm_sqr).collect();
     let powers: Vec<Vec<f64>> = values.iter().map(squares).collect();
@@ -178,8 +178,12 @@ fn spectra_of_magnitudes(
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_magnitude_peaks(&level, &peaks);
     for reading in &mut readings {
-        reading.select_estimate(wanted);
+        reading.select_estimate(settings.reading);
     }
+    let stabilisation = Stabilisation {
+        without_mode: keep_chosen(&mut readings, &settings.poles, &lines),
+        ..Stabilisation::default()
+    };
     let roots = values
         .iter()
         .map(|h| h.iter().map(|value| value.norm()).collect());
@@ -197,7 +201,7 @@ fn spectra_of_magnitudes(
         readings,
         force_noise: None,
         force_window: None,
-        stabilisation: Stabilisation::default(),
+        stabilisation,
         taps_together: None,
     }
 }
@@ -216,7 +220,7 @@ fn spectra_of_functions(
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
     work.go_on(Stage::Fits);
     let peaks = BandPeaks::EveryFunction;
-    let stabilisation = stabilisation(lines.low, lines.spacing, &columns, peaks);
+    let mut stabilisation = stabilisation(lines.low, lines.spacing, &columns, peaks);
     // The fit takes the functions without the line at 0 Hz.
     let first_fitted = usize::from(lines.low <= 0.0);
     let basis = Basis::FrequencyResponse {
@@ -236,7 +240,7 @@ fn spectra_of_functions(
             hum: Vec::new(),
             chosen: &settings.poles,
         });
-        modes.fit(&mut readings);
+        stabilisation.without_mode = modes.fit(&mut readings);
         // There are modal constants where the form of every function is known.
         if let Some(forms) = forms.iter().copied().collect::<Option<Vec<ResponseForm>>>() {
             for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {

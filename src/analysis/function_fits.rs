@@ -57,8 +57,9 @@ struct Proposal {
 pub(super) struct FunctionModes<'a>(pub Candidates<'a>);
 
 impl FunctionModes<'_> {
-    /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
-    pub fn fit(&self, readings: &mut Vec<ModeReading>) {
+    /// Puts the fits into the readings of the peaks, and adds the modes that make no peak. Returns the chosen frequencies
+    /// without a mode (Hz).
+    pub fn fit(&self, readings: &mut Vec<ModeReading>) -> Vec<f64> {
         if !self.0.chosen.is_empty() {
             return self.0.fit_chosen(readings);
         }
@@ -111,6 +112,7 @@ impl FunctionModes<'_> {
         }
         self.read_coarse(readings, &proposals);
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+        Vec::new()
     }
 
     /// Turns a peak that was no clear resonance into one where its fit failed but coarser lines show a decaying

@@ -151,6 +151,12 @@ pub fn run_test_watched(
         warnings.extend_from_slice(&free.warnings);
     }
     warnings.extend(of_amplitude(amplitude_changes(&recordings)));
+    let mut outside = test.analysis.poles.clone();
+    outside.retain(|pole| {
+        let mut bands = recordings.iter().filter_map(RecordingResult::looked_at);
+        !bands.any(|(low, high)| (low..=high).contains(pole))
+    });
+    warnings.extend(Warning::poles_outside(&outside).filter(|_| !recordings.is_empty()));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
         lengths: found.lengths,

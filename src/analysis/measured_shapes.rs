@@ -1,15 +1,15 @@
 //! Mode shapes as they were measured, beside those of the model.
 //!
-//! A set-up sees a shape at the places of its sensors, relative to the sensor with the largest motion. Recordings that
-//! share this sensor's place and differ in that of the taps see it at the places of the taps, by their modal constants:
-//! the shape is the same from either side (reciprocity).
+//! A set-up sees a shape at the places of its sensors, relative to the sensor with the largest motion. Recordings with the
+//! same masses and places of sensors that differ in the place of the taps see it at these places, by their modal
+//! constants: the shape is the same from either side (reciprocity).
 
 use super::Analysis;
 use super::identification::SampledShape;
 use super::observations::observations;
 use schemars::JsonSchema;
 use serde::Serialize;
-use tapjoint_identify::observation::{Configuration, ObservedMode};
+use tapjoint_identify::observation::{Configuration, Observed, ObservedMode, ObservedSensor};
 use tapjoint_numerics::stats::student;
 
 /// Places that a comparison of shapes needs: two places agree with many shapes.
@@ -49,7 +49,7 @@ pub struct ShapePoint {
     /// Displacement relative to the largest of the predicted shape (1).
     pub displacement: f64,
     /// Lower 95 % limit (1), by noise and the scatter of the taps; null at the sensor that the others are relative to.
-    /// An error of a sensor's scale is no part of it.
+    /// An error of a sensor's scale or place is no part of it.
     pub low: Option<f64>,
     /// Upper 95 % limit (1).
     pub high: Option<f64>,
@@ -72,11 +72,14 @@ pub struct ShapeAgreement {
     pub values: Vec<Vec<f64>>,
 }
 
-/// Returns the measured shapes of all set-ups with two places or more, in the order of the modes.
+/// Returns the measured shapes of all set-ups with two places or more, in the order of the modes. A set-up with other
+/// fastened masses than the first one has other shapes, and is left out.
 pub fn measured_shapes(analysis: &Analysis, predicted: &[SampledShape]) -> Vec<MeasuredShape> {
     let mut configurations = observations(analysis).configurations;
-    // Of the levels of a recording the hardest stands first; a shape does not depend on the level.
+    // Shapes do not depend on the level of the taps: one level of a recording is enough.
     configurations.dedup_by_key(|one| one.recording);
+    let masses = configurations.first().map(|one| one.masses.clone());
+    configurations.retain(|one| Some(&one.masses) == masses.as_ref());
     let mut shapes = Vec::new();
     for shape in predicted {
         let seen = configurations.iter();
@@ -121,7 +124,7 @@ pub fn shape_agreement(
     Some(agreement)
 }
 
-/// Returns the shape at the sensors of a recording; an unscaled one, with no more than the places that are known.
+/// Returns the shape at the sensors of a recording whose places are known, relative to its strongest sensor.
 fn at_sensors(number: usize, configuration: &Configuration, mode: &ObservedMode) -> MeasuredShape {
     let mut shape = MeasuredShape {
         mode: number,
@@ -131,70 +134,70 @@ fn at_sensors(number: usize, configuration: &Configuration, mode: &ObservedMode)
     };
     for value in &mode.shape {
         let sensor = &configuration.sensors[value.sensor];
-        if let Some(position) = sensor.position {
-            // Its scatter is inflated for few taps already.
-            let limits = limits(value.value, value.std, None);
-            shape.add(&sensor.name, position, value.value, limits);
-        }
+        let read = Observed {
+            value: value.value,
+            std: value.std,
+            freedom: value.freedom,
+        };
+        shape.add(sensor, sensor.position, read);
     }
     shape
 }
 
-/// Returns the shapes at the taps of recordings whose strongest sensor had one place.
+/// Returns the shapes at the taps of recordings with all sensors at the same places.
 fn at_taps(number: usize, seen: &[(&Configuration, &ObservedMode)]) -> Vec<MeasuredShape> {
-    let mut shapes: Vec<(f64, MeasuredShape)> = Vec::new();
+    let mut shapes: Vec<(&[ObservedSensor], usize, MeasuredShape)> = Vec::new();
     for (configuration, mode) in seen {
-        let sensor = mode.reference.map(|sensor| &configuration.sensors[sensor]);
-        let (Some(sensor), Some(tap), Some(constant), Some(file)) = (
-            sensor,
-            configuration.tap,
-            mode.constant,
-            &configuration.file,
-        ) else {
+        let (Some(reference), Some(constant), Some(file)) =
+            (mode.reference, mode.constant, &configuration.file)
+        else {
             continue;
         };
-        let Some(place) = sensor.position else {
+        let sensors = configuration.sensors.as_slice();
+        if sensors[reference].position.is_none() {
             continue;
-        };
-        let own = shapes.iter_mut().find(|(at, shape)| {
-            *at == place && shape.points.iter().all(|point| point.sensor == sensor.name)
-        });
-        let limits = limits(constant.value, constant.std, constant.freedom);
-        match own {
-            Some((_, shape)) => {
-                shape.add(&sensor.name, tap, constant.value, limits);
-                shape.recordings.push(file.clone());
-            }
-            None => {
-                let mut shape = MeasuredShape {
-                    mode: number,
-                    recordings: vec![file.clone()],
-                    by: ShapeBy::Taps,
-                    points: Vec::new(),
-                };
-                shape.add(&sensor.name, tap, constant.value, limits);
-                shapes.push((place, shape));
-            }
         }
+        let known = shapes
+            .iter()
+            .position(|(others, strongest, _)| *others == sensors && *strongest == reference);
+        let place = known.unwrap_or_else(|| {
+            let shape = MeasuredShape {
+                mode: number,
+                recordings: Vec::new(),
+                by: ShapeBy::Taps,
+                points: Vec::new(),
+            };
+            shapes.push((sensors, reference, shape));
+            shapes.len() - 1
+        });
+        // The scatter of the taps has one degree of freedom less than there are taps.
+        let scatter = (configuration.taps > 1).then(|| configuration.taps as f64 - 1.0);
+        let constant = Observed {
+            freedom: constant.freedom.or(scatter),
+            ..constant
+        };
+        let (_, _, shape) = &mut shapes[place];
+        shape.add(&sensors[reference], configuration.tap, constant);
+        shape.recordings.push(file.clone());
     }
-    shapes.into_iter().map(|(_, shape)| shape).collect()
-}
-
-/// 95 % limits by Student's t; `None` without an uncertainty.
-fn limits(value: f64, std: f64, freedom: Option<f64>) -> Option<(f64, f64)> {
-    let factor = freedom.map_or(1.96, |freedom| student::quantile(0.05, freedom));
-    let half = factor * std;
-    (half > 0.0 && half.is_finite()).then_some((value - half, value + half))
+    shapes.into_iter().map(|(_, _, shape)| shape).collect()
 }
 
 impl MeasuredShape {
-    fn add(&mut self, sensor: &str, position: f64, value: f64, limits: Option<(f64, f64)>) {
+    /// Adds a point, if its place is known, with 95 % limits by Student's t.
+    fn add(&mut self, sensor: &ObservedSensor, position: Option<f64>, read: Observed) {
+        let Some(position) = position else { return };
+        let factor = read
+            .freedom
+            .map_or(1.96, |freedom| student::quantile(0.05, freedom));
+        let half = factor * read.std;
+        let is_known = half > 0.0 && half.is_finite();
         self.points.push(ShapePoint {
-            sensor: sensor.to_owned(),
+            sensor: sensor.name.clone(),
             position,
-            displacement: value,
-            low: limits.map(|limits| limits.0),
-            high: limits.map(|limits| limits.1),
+            displacement: read.value,
+            low: is_known.then_some(read.value - half),
+            high: is_known.then_some(read.value + half),
         });
     }
 
@@ -271,8 +274,16 @@ mod tests {
             points: Vec::new(),
         };
         for place in [0.2, 0.5, 1.0] {
-            let value = factor * place * place;
-            shape.add("A", place, value, limits(value, 0.01, None));
+            let sensor = ObservedSensor {
+                name: "A".to_owned(),
+                position: Some(place),
+            };
+            let read = Observed {
+                value: factor * place * place,
+                std: 0.01,
+                freedom: None,
+            };
+            shape.add(&sensor, sensor.position, read);
         }
         shape
     }

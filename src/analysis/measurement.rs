@@ -3,7 +3,7 @@
 use super::averages::{Averages, TapSums, WindowChange};
 use super::decays::{CollectedDecays, DecayCollector};
 use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
-use super::fits::{FreeDecays, Stabilisation};
+use super::fits::{FreeDecays, Stabilisation, keep_chosen};
 use super::pulse_window::PulseWindow;
 use super::quiet::PreTriggerNoise;
 use super::stages::{Stage, Work};
@@ -381,7 +381,10 @@ impl<'a> Inputs<'a> {
                     &settings.poles,
                 )
             }
-            None => Stabilisation::default(),
+            None => Stabilisation {
+                without_mode: keep_chosen(&mut readings, &self.settings.poles, &self.lines),
+                ..Stabilisation::default()
+            },
         };
         for reading in &mut readings {
             reading.select_estimate(self.settings.reading);

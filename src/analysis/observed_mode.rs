@@ -182,6 +182,7 @@ impl<'a> ModeSeen<'a> {
                 sensor,
                 value: ratio.value,
                 std: ratio.std,
+                freedom: ratio.freedom,
             }));
         }
         shape

@@ -62,20 +62,40 @@ pub struct PointShapes {
     pub modes: Vec<PointShape>,
     /// Numbers of the modes without a shape: no fit gave their amplitudes.
     pub without: Vec<usize>,
-    /// Files of recordings that cannot be joined with the others: they share neither a place nor a tap with them.
-    pub apart: BTreeSet<String>,
+    /// Recordings whose part of a mode cannot be joined with the others, with the numbers of these modes.
+    pub apart: BTreeMap<String, BTreeSet<usize>>,
+    /// Files of recordings with other fastened masses than the first one: their shapes are others.
+    pub loaded: BTreeSet<String>,
 }
 
-/// Returns the measured shapes of the numbered modes. Recordings of other free lengths show other modes and are left out.
+/// Returns the measured shapes of the numbered modes. Recordings of other free lengths or with other fastened masses show
+/// other shapes and are left out.
 pub fn point_shapes(analysis: &Analysis) -> PointShapes {
     let mut found = PointShapes {
         points: numbered_points(&analysis.recordings),
         ..PointShapes::default()
     };
+    let masses = analysis.recordings.iter();
+    let mut masses = masses.filter(|one| one.conditions.free_length.is_none());
+    let masses = masses.next().map(|one| one.conditions.masses.as_slice());
+    for recording in &analysis.recordings {
+        if Some(recording.conditions.masses.as_slice()) != masses {
+            found.loaded.insert(recording.file.clone());
+        }
+    }
     for mode in &analysis.modes {
         let Some(number) = mode.mode else { continue };
-        let parts = parts(mode, number, &analysis.recordings, &found.points);
-        let values = joined(parts, &mut found.apart);
+        let parts = parts(
+            mode,
+            number,
+            &analysis.recordings,
+            &found.points,
+            &found.loaded,
+        );
+        let (values, apart) = joined(parts);
+        for file in apart {
+            found.apart.entry(file).or_default().insert(number);
+        }
         if values.is_empty() {
             found.without.push(number);
             continue;
@@ -102,7 +122,8 @@ fn numbered_points(recordings: &[RecordingResult]) -> NumberedPoints {
         for response in &recording.responses {
             match place_of(recording, response) {
                 Some(place) => _ = placed.insert(key(place)),
-                None => _ = named.insert(&response.name),
+                // Nothing says that a sensor of unknown place stood still between recordings.
+                None => _ = named.insert((&recording.file, &response.name)),
             }
         }
         if let Some(tap) = recording.conditions.tap.filter(|_| recording.has_hammer) {
@@ -110,7 +131,8 @@ fn numbered_points(recordings: &[RecordingResult]) -> NumberedPoints {
         }
     }
     let numbers: BTreeMap<i64, usize> = placed.iter().copied().zip(1..).collect();
-    let names: BTreeMap<&String, usize> = named.into_iter().zip(1 + placed.len()..).collect();
+    let names: BTreeMap<(&String, &String), usize> =
+        named.into_iter().zip(1 + placed.len()..).collect();
     let mut points = NumberedPoints::default();
     let places = placed.iter().map(|place| Some(*place as f64 / 1e6));
     points.places.extend(places);
@@ -119,7 +141,7 @@ fn numbered_points(recordings: &[RecordingResult]) -> NumberedPoints {
         let responses = recording.responses.iter();
         let responses = responses.map(|response| match place_of(recording, response) {
             Some(place) => numbers[&key(place)],
-            None => names[&response.name],
+            None => names[&(&recording.file, &response.name)],
         });
         points.responses.push(responses.collect());
         points.taps.push(match recording.conditions.tap {
@@ -158,6 +180,7 @@ fn parts(
     number: usize,
     recordings: &[RecordingResult],
     points: &NumberedPoints,
+    loaded: &BTreeSet<String>,
 ) -> Vec<Part> {
     let mut parts = Vec::new();
     for (index, recording) in recordings.iter().enumerate() {
@@ -166,7 +189,7 @@ fn parts(
         let Some((reading, _)) = own.next() else {
             continue;
         };
-        if recording.conditions.free_length.is_some() {
+        if recording.conditions.free_length.is_some() || loaded.contains(&recording.file) {
             continue;
         }
         let (shape, constant) = shape_of(reading, recording);
@@ -198,49 +221,91 @@ fn parts(
     parts
 }
 
-/// Joins the parts of a shape to the first of them, and makes its largest displacement 1.
-fn joined(parts: Vec<Part>, apart: &mut BTreeSet<String>) -> BTreeMap<usize, PointDisplacement> {
-    let mut parts = parts.into_iter();
-    let Some(first) = parts.next() else {
-        return BTreeMap::new();
-    };
+/// A part of a shape that has joined the others.
+struct Joined {
+    constant: Option<(f64, f64)>,
+    tap: Option<usize>,
+    /// Its values in the whole over its own, with the relative standard uncertainty.
+    factor: f64,
+    relative: f64,
+}
+
+/// Joins the parts of a shape to the first of them, and makes its largest displacement 1. Returns the files of the parts that
+/// share nothing with the others as well.
+fn joined(mut parts: Vec<Part>) -> (BTreeMap<usize, PointDisplacement>, Vec<String>) {
+    if parts.is_empty() {
+        return (BTreeMap::new(), Vec::new());
+    }
+    let first = parts.remove(0);
     let mut whole = first.values;
-    for part in parts {
-        // The common point that is farthest from a node of the mode.
-        let common = part.values.iter().filter_map(|(point, own)| {
-            let other = whole.get(point)?;
-            let least = own.value.abs().min(other.value.abs());
-            Some((least, [(other.value, other.std), (own.value, own.std)]))
-        });
-        let common = common.max_by(|a, b| a.0.total_cmp(&b.0));
-        let common = common.filter(|(least, _)| *least >= LEAST_SHARE);
-        let constants = part.constant.zip(first.constant);
-        let constants = constants.filter(|_| part.tap.is_some() && part.tap == first.tap);
-        let ratio = match (common, constants) {
-            (Some((_, values)), _) => Some(values),
-            (None, Some((own, other))) => Some([own, other]),
-            (None, None) => None,
-        };
-        let ratio = ratio.map(|[over, under]| {
-            let relative = (over.1 / over.0).hypot(under.1 / under.0);
-            (over.0 / under.0, relative)
-        });
-        let Some((factor, relative)) = ratio.filter(|(factor, _)| factor.is_finite()) else {
-            apart.insert(part.recording);
-            continue;
-        };
+    let mut done = vec![Joined {
+        constant: first.constant,
+        tap: first.tap,
+        factor: 1.0,
+        relative: 0.0,
+    }];
+    // A part may join by one that has joined after it was looked at.
+    while let Some((index, (factor, relative))) = (parts.iter().enumerate())
+        .find_map(|(index, part)| Some((index, part.ratio(&whole, &done)?)))
+    {
+        let part = parts.remove(index);
         for (point, mut own) in part.values {
             own.value *= factor;
             own.std = (own.std * factor).hypot(own.value * relative);
             whole.entry(point).or_insert(own);
         }
+        done.push(Joined {
+            constant: part.constant,
+            tap: part.tap,
+            factor,
+            relative,
+        });
     }
+    let apart = parts.into_iter().map(|part| part.recording).collect();
+    make_largest_one(&mut whole);
+    (whole, apart)
+}
+
+impl Part {
+    /// Returns the factor from its values to those of the whole, with its relative standard uncertainty; `None` where they
+    /// share neither a place away from a node nor a tap.
+    fn ratio(
+        &self,
+        whole: &BTreeMap<usize, PointDisplacement>,
+        done: &[Joined],
+    ) -> Option<(f64, f64)> {
+        // The common point that is farthest from a node of the mode.
+        let common = self.values.iter().filter_map(|(point, own)| {
+            let other = whole.get(point)?;
+            let least = own.value.abs().min(other.value.abs());
+            Some((least, own, other))
+        });
+        let common = common.max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, own, other)) = common.filter(|(least, ..)| *least >= LEAST_SHARE) {
+            let relative = (own.std / own.value).hypot(other.std / other.value);
+            return Some((other.value / own.value, relative));
+        }
+        let (own, own_std) = self.constant?;
+        let tapped = done
+            .iter()
+            .find(|one| one.constant.is_some() && one.tap.is_some() && one.tap == self.tap)?;
+        let (other, other_std) = tapped.constant?;
+        let relative = (own_std / own)
+            .hypot(other_std / other)
+            .hypot(tapped.relative);
+        let factor = tapped.factor * own / other;
+        factor.is_finite().then_some((factor, relative))
+    }
+}
+
+/// Makes the largest displacement 1.
+fn make_largest_one(whole: &mut BTreeMap<usize, PointDisplacement>) {
     let largest = whole
         .values()
         .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
     let largest = largest.map(|largest| (largest.value, largest.std));
     let Some((value, std)) = largest.filter(|(value, _)| *value != 0.0) else {
-        return whole;
+        return;
     };
     for own in whole.values_mut() {
         let is_largest = own.value == value;
@@ -250,7 +315,6 @@ fn joined(parts: Vec<Part>, apart: &mut BTreeSet<String>) -> BTreeMap<usize, Poi
             false => (own.std / value).hypot(own.value * std / value),
         };
     }
-    whole
 }
 
 #[cfg(test)]
@@ -276,10 +340,8 @@ mod tests {
     }
 
     fn values(parts: Vec<Part>) -> (Vec<f64>, Vec<String>) {
-        let mut apart = BTreeSet::new();
-        let whole = joined(parts, &mut apart);
-        let values = whole.values().map(|own| own.value).collect();
-        (values, apart.into_iter().collect())
+        let (whole, apart) = joined(parts);
+        (whole.values().map(|own| own.value).collect(), apart)
     }
 
     #[test]
@@ -302,9 +364,14 @@ mod tests {
         let at_node = part("b", &[(2, 0.01), (3, 1.0)], None);
         assert_eq!(values(vec![first(), at_node]), alone);
         assert_eq!(values(vec![]), (vec![], vec![]));
+        // A part joins by one that comes after it.
+        let bridge = part("c", &[(2, -0.5), (3, 1.0)], None);
+        let beyond = part("b", &[(3, 1.0), (4, 0.4)], None);
+        let (found, apart) = values(vec![first(), beyond, bridge]);
+        assert_eq!((found.len(), apart.len()), (4, 0));
         // The uncertainty of the common place is that of all that joins by it.
         let far = part("b", &[(2, 0.5), (3, 0.1)], None);
-        let whole = joined(vec![first(), far], &mut BTreeSet::new());
+        let whole = joined(vec![first(), far]).0;
         let stds = whole.values().map(|own| own.std).collect::<Vec<_>>();
         let relative = (0.01_f64.hypot(0.02) * 0.2).hypot(0.02);
         assert!(

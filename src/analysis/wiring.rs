@@ -89,7 +89,7 @@ fn measure_described(
             sensor,
             band: description.band,
             reading: test.analysis.reading,
-            poles: test.analysis.poles.clone(),
+            poles: poles_of(test, description),
         };
         let mut result = measure_functions(&functions, &settings, work)?;
         result.conditions = conditions(test, description);
@@ -112,7 +112,7 @@ fn measure_described(
     settings.taps.keep_overload = description.keep_overload;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
-    settings.poles.clone_from(&test.analysis.poles);
+    settings.poles = poles_of(test, description);
     let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
     settings.kinds = kinds.collect();
     let finished = finish(recording.renamed(file), settings, &wiring, work);
@@ -130,6 +130,12 @@ fn measure_described(
         }
     }
     Ok(result)
+}
+
+/// Returns the frequencies (Hz) of the modes that were chosen by hand for a recording, else for the test.
+fn poles_of(test: &TestDescription, description: &RecordingDescription) -> Vec<f64> {
+    let own = description.poles.as_ref();
+    own.unwrap_or(&test.analysis.poles).clone()
 }
 
 /// Opens the files of a recording and joins them, each under its described name.
@@ -362,8 +368,8 @@ fn result(
             spectra.fitted.is_some(),
         );
         measurement.warnings.extend(unlisted);
-        let poles =
-            Warning::poles_without_mode(recording.name(), &settings.poles, band, &spectra.readings);
+        let without_mode = &spectra.stabilisation.without_mode;
+        let poles = Warning::poles_without_mode(recording.name(), without_mode);
         measurement.warnings.extend(poles);
     }
     // What is shown of the recording is read again.

@@ -260,7 +260,7 @@ const CSV_HEADS: [&str; 11] = [
     "test,file,quantity,change_percent,score,",
     "pair,mode,before_Hz,after_Hz,change_percent,",
     "recording,response,form,unit,frequency_Hz,h1_real,",
-    "line,frequency_Hz,",
+    "spectral_line,frequency_Hz,",
     "quantity,name,method,unit,block,lines,window,reading,",
     "name,planted,detectable,refutable,verdict,named,",
     "name,changed,item,visible,repeatability,verdict,named,",

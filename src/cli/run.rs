@@ -6,7 +6,7 @@ use super::arguments::{
 };
 use super::diagnose::add_model;
 use super::input::{TestFile, check_file, file_name, read_test, stem};
-use super::overwrite::{Expanded, checksum, files_of};
+use super::overwrite::{Expanded, carries_mark, checksum, files_of};
 use super::place::{FolderContents, RECORDINGS, is_description, report_in};
 use super::publication::OutputFolder;
 use super::recording::{analyse, analyse_together};
@@ -85,7 +85,12 @@ impl RunArguments {
             });
         }
         let shown = path.display();
-        let found = FolderContents::of(path).with_context(|| format!("{shown}: cannot be read"))?;
+        let mut found =
+            FolderContents::of(path).with_context(|| format!("{shown}: cannot be read"))?;
+        // Tables and functions that the program has written are no recordings.
+        found
+            .recordings
+            .retain(|file| !carries_mark(file).unwrap_or(false));
         match (&found.descriptions[..], &found.recordings[..]) {
             ([only], _) => Ok(Subject::Described(only.clone())),
             ([], [only]) => Ok(Subject::Bare(only.clone())),
@@ -165,6 +170,7 @@ impl RunArguments {
             "recordings": recordings,
             "gap": { "updated_model": { "file": MODEL_FILE } },
             "exported": if self.export { &EXCHANGED[..] } else { &[] },
+            "sheet": { "files": if self.sheet { &["any"][..] } else { &[] } },
             "warnings": [],
         });
         let (folder, _) = self.folder(&subject, &name);
@@ -323,6 +329,10 @@ pub(super) fn run(
         ));
     }
     let output = OutputFolder::prepare(&folder, terminal.files())?;
+    let summed = match arguments.sheet {
+        true => Some(summed_files(subject.files(), described.as_ref())?),
+        false => None,
+    };
     let progress = terminal.progress("measuring, fitting and estimating");
     let (bare, reading) = (&arguments.recording, arguments.reading.unwrap_or_default());
     let analysis = match (&described, &subject) {
@@ -343,9 +353,14 @@ pub(super) fn run(
     };
     let mut document = document_of(&analysis);
     document.sheet = described.as_ref().map(|file| SheetSection::of(&file.test));
-    if arguments.sheet {
-        let sheet = document.sheet.get_or_insert_default();
-        sheet.files = summed_files(subject.files(), described.as_ref())?;
+    if let Some(files) = summed {
+        // A file that a recorder still writes would have the checksum of other content than was analysed.
+        if summed_files(subject.files(), described.as_ref())? != files {
+            bail!(
+                "a file has changed while it was analysed, so --sheet has no checksum for it; run again"
+            );
+        }
+        document.sheet.get_or_insert_default().files = files;
     }
     let mut model = None;
     if let Some(file) = &described {

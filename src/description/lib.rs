@@ -21,7 +21,7 @@ pub use reader::DescriptionError;
 pub use recordings::{FORMS, OVERLOADS, SENSOR_KINDS};
 use schemars::JsonSchema;
 use serde::Serialize;
-pub use sheet::Sheet;
+pub use sheet::SheetDescription;
 pub use structure::{ASSEMBLIES, coupling, described_beam, described_specimen, lap_layout};
 pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
@@ -57,7 +57,7 @@ pub struct TestDescription {
     /// Effects of the model, for predictions and virtual tests.
     pub effects: Vec<EffectDescription>,
     /// What is filed with the test.
-    pub sheet: Sheet,
+    pub sheet: SheetDescription,
     /// Doubtful values that can still be used, in the order of reading.
     pub warnings: Vec<DescriptionError>,
 }
@@ -272,6 +272,8 @@ pub struct SensorDescription {
 pub struct RecordingDescription {
     /// File as written in the description, relative to it.
     pub file: PathBuf,
+    /// Frequencies (Hz) of the modes that were chosen by hand for this recording, ascending; `None` = those of the analysis.
+    pub poles: Option<Vec<f64>>,
     /// Further files of the same set-up, which follow it.
     pub more_files: Vec<PathBuf>,
     /// Line of the description that names the file.

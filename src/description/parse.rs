@@ -6,15 +6,15 @@ use super::property::{
 };
 use super::reader::{DescriptionError, Entry, Limits, Source, Table, with_unit};
 use super::recordings::{
-    check_lengths, check_places, read_ascending, read_hammer, read_measured, read_recording,
+    check_lengths, check_places, read_hammer, read_measured, read_poles, read_recording,
     read_sensors,
 };
 use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
 use super::{
     AnalysisDescription, Assembly, BeamDescription, ChannelRef, FitParameter, JointDescription,
-    JointModel, ModeFile, RecordingDescription, SensorDescription, Sheet, TestDescription, Weights,
-    WindowKind, keys,
+    JointModel, ModeFile, RecordingDescription, SensorDescription, SheetDescription,
+    TestDescription, Weights, WindowKind, keys,
 };
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -82,7 +82,9 @@ impl TestDescription {
             .iter()
             .map(read_effect)
             .collect::<Result<Vec<_>, _>>()?;
-        let sheet = top.optional("sheet", |entry| Sheet::read(&entry.table(&keys::SHEET)?))?;
+        let sheet = top.optional("sheet", |entry| {
+            SheetDescription::read(&entry.table(&keys::SHEET)?)
+        })?;
         // A test without a name is called like its file, without the ending.
         let stem = Path::new(file_name).file_stem();
         let stem = stem.map(|stem| stem.to_string_lossy().into_owned());
@@ -267,7 +269,7 @@ fn read_analysis(
         analysis.window = table.choice("window", &WINDOWS)?;
         analysis.reading = table.choice("reading", &READINGS)?.unwrap_or_default();
         analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
-        let poles = table.optional("poles", read_ascending)?;
+        let poles = table.optional("poles", read_poles)?;
         analysis.poles = poles.unwrap_or_default();
         analysis.weights = table.choice("weights", &WEIGHTS)?;
         let sensor_mass = table.optional("sensor_mass", Entry::boolean)?;

@@ -334,6 +334,7 @@ pub(super) fn read_recording(
         ));
     }
     Ok(RecordingDescription {
+        poles: table.optional("poles", read_poles)?,
         file: files.remove(0),
         more_files: files,
         line: named.line,
@@ -641,8 +642,26 @@ pub(super) fn read_free_frequencies(
     Ok((frequencies, stds))
 }
 
+/// Most modes that may be chosen by hand.
+const MOST_POLES: usize = 100;
+
+/// Reads the frequencies (Hz) of the modes that were chosen by hand, the lowest first.
+pub(super) fn read_poles(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+    let items = entry.list("a list of frequencies such as [16.55, 116.8] (Hz)")?;
+    if items.is_empty() || items.len() > MOST_POLES {
+        let remedy = "list the modes of interest, or leave `poles` out";
+        return Err(entry.wrong_count(items.len(), &format!("1 to {MOST_POLES}"), remedy));
+    }
+    let frequencies = items
+        .iter()
+        .map(|item| item.within(Dimension::Frequency, &FREQUENCY))
+        .collect::<Result<Vec<_>, _>>()?;
+    check_ascending(&items, &frequencies)?;
+    Ok(frequencies)
+}
+
 /// Reads natural frequencies (Hz), the lowest first.
-pub(super) fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
     if items.is_empty() {
         let remedy = "list the natural frequencies in Hz, lowest first";

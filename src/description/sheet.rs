@@ -3,12 +3,12 @@
 use super::reader::{DescriptionError, Entry, Table};
 
 /// Longest text of a sheet (characters), so that the sheet stays one page; remarks may be [`LONGEST_REMARKS`].
-const LONGEST: usize = 80;
-const LONGEST_REMARKS: usize = 400;
+const LONGEST: usize = 60;
+const LONGEST_REMARKS: usize = 300;
 
 /// Who tested what, and when. All of it is carried to the outputs as it is written.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Sheet {
+pub struct SheetDescription {
     /// Number of the test.
     pub number: Option<String>,
     /// Day of the test.
@@ -23,10 +23,10 @@ pub struct Sheet {
     pub remarks: Option<String>,
 }
 
-impl Sheet {
+impl SheetDescription {
     pub(super) fn read(table: &Table<'_>) -> Result<Self, DescriptionError> {
         let text = |key, wanted| table.optional(key, |entry| short_text(entry, wanted, LONGEST));
-        Ok(Sheet {
+        Ok(SheetDescription {
             number: text("number", "a number such as \"2024-017\"")?,
             date: table.optional("date", Entry::date)?,
             operator: text("operator", "the name of who tests")?,
@@ -39,7 +39,7 @@ impl Sheet {
     }
 }
 
-/// Returns a text of one line's length.
+/// Reads make, type and serial number of an instrument.
 pub(super) fn instrument(table: &Table<'_>) -> Result<Option<String>, DescriptionError> {
     table.optional("instrument", |entry| {
         let wanted = "make, type and serial number, such as \"PCB 352C33, 12345\"";
@@ -47,6 +47,7 @@ pub(super) fn instrument(table: &Table<'_>) -> Result<Option<String>, Descriptio
     })
 }
 
+/// Returns a text of so many characters at most.
 fn short_text(entry: &Entry<'_>, wanted: &str, longest: usize) -> Result<String, DescriptionError> {
     let text = entry.text(wanted)?;
     match text.chars().count() {

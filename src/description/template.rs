@@ -93,6 +93,7 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none
+# poles = [16.55, 116.8]       # Hz, the modes chosen by hand in this recording, default: those of [analysis]
 # time_unit = "ms"             # "s" (default) | "ms" | "us" | "ns", for a CSV file whose time has no unit
 #   form = "accelerance" | "mobility" | "receptance" and sensor = "A" where the file holds a frequency response function,
 #   form = "spectrum" where it holds magnitudes without a phase: frequencies and half-power damping

@@ -288,6 +288,7 @@ impl VirtualTest<'_> {
                     sensor,
                     value: displacement / at_sensors[reference] + std * self.normal(),
                     std,
+                    freedom: None,
                 });
             }
         }

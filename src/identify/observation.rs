@@ -111,6 +111,8 @@ pub struct ShapeValue {
     pub value: f64,
     /// Its standard uncertainty (1); 0 of the reference itself.
     pub std: f64,
+    /// Degrees of freedom of that uncertainty, for Student's t; `None` where it counts as known.
+    pub freedom: Option<f64>,
 }
 
 /// Frequency and damping along the decays of all taps of a configuration.

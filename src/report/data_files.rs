@@ -348,7 +348,7 @@ pub fn render_spectrum_csv(recording: &RecordingResult) -> Result<Option<String>
         Some(unit) => format!("{unit} s"),
         None => "unit of the file x s".to_owned(),
     };
-    let mut heads = vec!["line".to_owned(), "frequency_Hz".to_owned()];
+    let mut heads = vec!["spectral_line".to_owned(), "frequency_Hz".to_owned()];
     let mut columns: Vec<&[f64]> = Vec::new();
     if let Some(force) = &averages.force {
         heads.push(format!("force ({})", unit(&recording.tap_unit)));

@@ -177,9 +177,25 @@ fn doubts(analysis: &Analysis, shapes: &PointShapes) -> Vec<String> {
             numbers.join(", ")
         )),
     }
-    for file in &shapes.apart {
+    for (file, modes) in &shapes.apart {
+        let modes: Vec<String> = modes.iter().map(usize::to_string).collect();
         doubts.push(format!(
-            "modes.uff lacks the shapes of {file}: it shares no sensor place and no tap place with the others; state `position` and `tap`"
+            "modes.uff lacks what {file} shows of mode {}: it shares no sensor place away from a node and no tap place with the others; state `position` and `tap`",
+            modes.join(", ")
+        ));
+    }
+    for file in &shapes.loaded {
+        doubts.push(format!(
+            "modes.uff lacks the shapes of {file}: it has other fastened masses than the first recording"
+        ));
+    }
+    let unknown = analysis.recordings.iter().filter(|one| {
+        one.has_hammer && (one.tap_unit.is_none() || one.responses.iter().any(|r| r.unit.is_none()))
+    });
+    for recording in unknown {
+        doubts.push(format!(
+            "frfs.uff has the functions of {} in units of the file, not in SI units: state `scale` or `sensitivity`",
+            recording.file
         ));
     }
     if !analysis.lengths.is_empty() {

@@ -392,7 +392,7 @@ pub const VERSION_FILE: &str = "report-version.js";
 /// First line of that script.
 pub const VERSION_HEAD: &str = "// Version of report.html, written by tapjoint.";
 /// Files of every report.
-const OF_ALL: [&str; 3] = ["report.html", "report.json", SHEET];
+const OF_ALL: [&str; 2] = ["report.html", "report.json"];
 /// Tables of a test.
 const TABLES: [&str; 4] = [
     "parameters.csv",
@@ -459,6 +459,8 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     let model = report["gap"]["updated_model"]["file"].as_str();
     let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
     // The same of files for other programs.
+    let summed = report["sheet"]["files"].as_array();
+    let signed = summed.is_some_and(|files| !files.is_empty());
     let exported = report["exported"].as_array();
     let exported = exported.into_iter().flatten().filter_map(Value::as_str);
     let exported = exported.filter(|file| EXCHANGED.contains(file));
@@ -466,6 +468,7 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
         .into_iter()
         .chain(TABLES)
         .chain([VERSION_FILE])
+        .chain(signed.then_some(SHEET))
         .chain(exported)
         .map(str::to_owned)
         .chain(model)

@@ -10,6 +10,8 @@ use crate::words::answer::Answer;
 
 /// Most files and instruments on the sheet; report.json has all.
 const MOST_LISTED: usize = 6;
+/// Longest name on it (characters).
+const LONGEST_NAME: usize = 28;
 /// Most doubts on it.
 const MOST_DOUBTS: usize = 4;
 
@@ -68,6 +70,18 @@ impl InstrumentSection {
     }
 }
 
+/// A name with its middle left out where it is longer than its place.
+fn short(name: &str) -> String {
+    let count = name.chars().count();
+    if count <= LONGEST_NAME {
+        return name.to_owned();
+    }
+    let half = LONGEST_NAME / 2;
+    let begin: String = name.chars().take(half).collect();
+    let end: String = name.chars().skip(count - half).collect();
+    format!("{begin}\u{2026}{end}")
+}
+
 /// Returns the sheet as a page; `None` where none was asked for.
 ///
 /// # Errors
@@ -94,7 +108,8 @@ pub fn running_head(document: &Document, name: &str) -> String {
     let sheet = document.sheet.as_ref();
     let number = sheet.and_then(|sheet| sheet.number.as_deref());
     let date = sheet.and_then(|sheet| sheet.date.as_deref());
-    let parts = [Some(name), number, date].into_iter().flatten();
+    let name = short(name);
+    let parts = [Some(name.as_str()), number, date].into_iter().flatten();
     let text = parts.collect::<Vec<_>>().join(" \u{b7} ");
     // Whatever could end the string, or the style, is written as a code.
     let mut escaped = String::new();

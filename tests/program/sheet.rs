@@ -80,12 +80,21 @@ fn limit_the_fullest_sheet_is_one_page() {
     let mut text = fs::read_to_string(&path).unwrap();
     text = text.replace(
         "remarks = \"12 N m\"",
-        &format!("remarks = \"{}\"", "long ".repeat(79)),
+        &format!("remarks = \"{}\"", "long ".repeat(59)),
     );
-    text = text.replace("A. Tester", &"T ".repeat(40));
+    text = text.replace("A. Tester", &"W".repeat(60));
+    text = text.replace(
+        "name = \"Cantilever\"",
+        &format!("name = \"{}\"", "W".repeat(150)),
+    );
+    text = text.replace(
+        "specimen = '</style><b>\"no. 12\" \\5'",
+        &format!("specimen = '{}'", "W".repeat(60)),
+    );
+    text = text.replace("Hammer <5>", &"W".repeat(60));
     // The same recording in other bands, each a file of its own for the list.
     for copy in 0..9 {
-        let file = format!("copy-{copy}.wav");
+        let file = format!("{}-{copy}.wav", "W".repeat(120));
         fs::copy(path.with_file_name("low.wav"), path.with_file_name(&file)).unwrap();
         let table = format!(
             "[[recording]]\nfile = \"{file}\"\ntap = \"385 mm\"\nband = [0, 200]\n\n[sheet]"

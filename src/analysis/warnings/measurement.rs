@@ -132,33 +132,24 @@ impl Warning {
         })
     }
 
-    /// Frequencies (Hz) of `poles` in the band at which no mode was found; `None` where there are none.
-    pub(crate) fn poles_without_mode(
-        file: &str,
-        poles: &[f64],
-        band: (f64, f64),
-        readings: &[ModeReading],
-    ) -> Option<Self> {
-        let found = |pole: f64| {
-            let mut near = readings.iter();
-            near.any(|reading| {
-                let width = reading.damping_ratio.unwrap_or(0.0) * reading.frequency;
-                (reading.frequency - pole).abs() <= 2.0 * (reading.half_line + width)
-            })
-        };
-        let without = poles
-            .iter()
-            .filter(|pole| (band.0..=band.1).contains(*pole) && !found(**pole));
-        let without: Vec<String> = without.map(|pole| frequency_words(*pole)).collect();
-        if without.is_empty() {
-            return None;
-        }
+    /// Frequencies of `poles` (Hz) at which no mode was found; `None` where there are none.
+    pub(crate) fn poles_without_mode(file: &str, without: &[f64]) -> Option<Self> {
+        let listed = frequencies(without)?;
         let text = format!(
-            "`poles` in [analysis] names {} Hz, and no mode could be fitted there; choose poles that return at order after \
-             order in the stabilisation diagram",
-            without.join(", ")
+            "`poles` names {listed} Hz, and no mode could be fitted there; choose poles that return at order after order \
+             in the stabilisation diagram"
         );
         Some(Warning::about(file, "pole-without-mode", text))
+    }
+
+    /// Frequencies of `poles` (Hz) that no recording was analysed at; `None` where there are none.
+    pub(crate) fn poles_outside(outside: &[f64]) -> Option<Self> {
+        let listed = frequencies(outside)?;
+        let text = format!(
+            "`poles` in [analysis] names {listed} Hz, which the band of no recording holds; widen a `band`, or leave the \
+             frequency out"
+        );
+        Some(Warning::new("pole-without-mode", text))
     }
 
     /// Strong peaks, the strongest first, that are no listed modes; `None` where there are none. `band` was analysed (Hz);
@@ -366,6 +357,12 @@ pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
         warnings.push(Warning::single_tap(file));
     }
     warnings
+}
+
+/// "16.55, 500.0"; `None` of an empty list.
+fn frequencies(all: &[f64]) -> Option<String> {
+    let words: Vec<String> = all.iter().map(|one| frequency_words(*one)).collect();
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 /// Places that are listed after the worst one.

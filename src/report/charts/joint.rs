@@ -407,7 +407,8 @@ pub fn shapes(document: &Document) -> Option<Chart> {
         Some(_) => {
             "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. Points: \
              measured at sensors, or at taps by reciprocity, and scaled to fit each curve best. Bars: 95 % by noise and the \
-             scatter of the taps. Where points of all modes lie off at one sensor, its scale or its place is wrong."
+             scatter of the taps. Two points cannot tell which of them is wrong. With three or more, a sensor whose points \
+             lie off in all modes has another scale or place than described."
         }
         None => {
             "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. They are not \

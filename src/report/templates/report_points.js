@@ -246,6 +246,8 @@ function key(panel) {
 function buildPoints(figure) {
   figure.panels.forEach(function (u) { u.destroy(); });
   figure.panels = [];
+  figure.moves = null;
+  figure.element.querySelectorAll(".chips .moving").forEach(function (button) { button.textContent = "move"; });
   figure.host.textContent = figure.said.textContent = "";
   figure.host.classList.add("points");
   figure.host.classList.toggle("square", figure.plot.kind === "circles");
@@ -256,6 +258,7 @@ function buildPoints(figure) {
     holder.appendChild(key(panel));
     figure.host.appendChild(holder);
     panel.view = { x: panel.x.range, y: panel.y.range };
+    panel.swing = 1;
     panel.lit = null;
     var data = [panel.x.range.slice(), [null, null]];
     var u = new uPlot(pointOptions(figure, panel, holder), data, holder);
@@ -274,7 +277,7 @@ function buildPoints(figure) {
 
 function pointChips(figure, chip) {
   var views = figure.plot.blocks;
-  if (swings(figure)) chip("move", "view", function (button) { swing(figure, button); });
+  if (swings(figure)) chip("move", "view moving", function (button) { swing(figure, button); });
   chip("whole range", "reset", function () { buildPoints(figure); });
   if (views.length > 1) views.forEach(function (view, index) {
     chip(view.name, index === figure.shown ? "mode chosen" : "mode", function (button) {

@@ -6,15 +6,18 @@ var circlesAtOnce = 12;
 
 function isPhase(panel) { return panel.y.period === 360; }
 
-// The functions of a plot as complex numbers; none where magnitudes have several units, whose order the phases do not tell.
+// The functions of a plot as complex numbers, where all lines are drawn: of thinned ones magnitude and phase are those of
+// different lines. None where magnitudes have several units, whose order the phases do not tell.
 function complexCurves(plot) {
   var panels = plot.blocks[0].panels, phase = panels.filter(isPhase)[0];
   var sized = panels.slice(0, panels.indexOf(phase));
   if (!phase || sized.length !== 1) return [];
+  var runs = phase.series[0].x, step = Math.min.apply(null, runs.map(function (run) { return run.step; })), whole = [];
+  runs.forEach(function (run) { for (var i = 0; i < run.count; i++) whole.push(run.step < 1.001 * step); });
   return phase.series.map(function (angles, at) {
     var sizes = sized[0].series[at], re = [], im = [];
     angles.y.forEach(function (degrees, i) {
-      var size = sizes.y[i], turn = degrees * Math.PI / 180, known = size != null && degrees != null;
+      var size = sizes.y[i], turn = degrees * Math.PI / 180, known = whole[i] && size != null && degrees != null;
       re.push(known ? size * Math.cos(turn) : null);
       im.push(known ? size * Math.sin(turn) : null);
     });
@@ -34,7 +37,7 @@ function cartesian(plot, functions) {
   return { kind: "frf", blocks: [{ name: "", panels: panels }] };
 }
 
-// The lines about a mode up to where another mode or the background begins.
+// The lines about a mode down to a share of its peak.
 function about(one, frequencies, at) {
   var size = function (i) { return one.re[i] == null ? -1 : Math.hypot(one.re[i], one.im[i]); };
   var peak = 0;
@@ -89,22 +92,25 @@ function viewsOf(plot) {
 function swings(figure) { return figure.plot.kind === "mode-shapes"; }
 
 function swing(figure, button) {
-  figure.moves = !figure.moves;
+  figure.moves = figure.moves ? null : {};
   button.textContent = figure.moves ? "stop" : "move";
-  var begin = performance.now();
+  var begin = performance.now(), own = figure.moves;
   function step(now) {
-    var factor = figure.moves ? Math.cos(Math.PI * (now - begin) / 1000) : 1;
+    // A later click has begun another motion, or another view has come.
+    if (figure.moves !== own) return;
     figure.panels.forEach(function (u, index) {
-      figure.plot.blocks[figure.shown].panels[index].swing = factor;
+      figure.plot.blocks[figure.shown].panels[index].swing = own ? Math.cos(Math.PI * (now - begin) / 1000) : 1;
       u.redraw(false);
     });
-    if (figure.moves) requestAnimationFrame(step);
+    if (own) requestAnimationFrame(step);
   }
   requestAnimationFrame(step);
 }
 
 // Poles chosen by hand in a stabilisation diagram, as the line that a test description takes.
 function choosesPoles(figure) { return figure.plot.kind === "stabilisation"; }
+
+var sameShare = 2e-3; // poles of two recordings within this share are one
 
 function poleWords(frequency) { return String(+frequency.toPrecision(7)); }
 
@@ -120,16 +126,17 @@ function chosenPoles(figure) {
   return Object.keys(figure.poles).map(function (key) { return figure.poles[key]; });
 }
 
-// The poles of all recordings, each mode once.
-function allPoles(figure) {
-  var found = [];
-  all.concat([figure]).forEach(function (one) {
-    if (one.poles) chosenPoles(one).forEach(function (pole) {
-      var known = found.some(function (other) { return pole.mode ? other.mode === pole.mode : Math.abs(other.at - pole.at) < 1e-3 * pole.at; });
+// The poles of all recordings, each mode once; null where a mode lies elsewhere in another recording.
+function commonPoles() {
+  var found = [], alike = true;
+  all.filter(choosesPoles).forEach(function (one) {
+    chosenPoles(one).forEach(function (pole) {
+      var known = found.filter(function (other) { return pole.mode ? other.mode === pole.mode : Math.abs(other.at - pole.at) < sameShare * pole.at; })[0];
       if (!known) found.push(pole);
+      else if (Math.abs(known.at - pole.at) > sameShare * pole.at) alike = false;
     });
   });
-  return found.map(function (pole) { return pole.at; }).sort(function (a, b) { return a - b; });
+  return alike ? found : null;
 }
 
 // A click on a pole chooses it; a click on one that is chosen, or beside it, leaves it out.
@@ -147,9 +154,10 @@ function togglePole(figure, frequency, near) {
 }
 
 function showPoles(figure) {
-  var line = "poles = [" + allPoles(figure).map(poleWords).join(", ") + "]";
-  figure.poleLine.textContent = "Click poles to choose modes by hand, then write this line under [analysis] of the description: ";
-  figure.poleLine.appendChild(element("code", "", line));
+  var common = commonPoles(), table = common ? "[analysis]" : "the [[recording]] of this recording";
+  var places = (common || chosenPoles(figure)).map(function (pole) { return pole.at; }).sort(function (a, b) { return a - b; });
+  figure.poleLine.textContent = "Click poles to choose modes by hand, then write this line under " + table + " of the description: ";
+  figure.poleLine.appendChild(element("code", "", "poles = [" + places.map(poleWords).join(", ") + "]"));
   figure.panels.forEach(function (u) { u.redraw(false); });
 }
 

@@ -32,6 +32,8 @@ pub(super) const UNLIKE: f64 = 0.9;
 /// Distance from the ends of the band within which a mode without a peak is none: lines, and a share of the frequency,
 /// whichever is more.
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
+/// Share of a chosen frequency by which its digits may differ from a pole's: the page writes seven.
+const THE_SAME: f64 = 1e-6;
 /// Share of a chosen frequency within which a stable pole is the one meant. 1 %: what a sensor moves that is moved.
 const CHOSEN_REACH: f64 = 0.01;
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
@@ -239,19 +241,24 @@ impl Candidates<'_> {
             .collect()
     }
 
-    /// Returns the pole that a chosen frequency (Hz) means: the nearest of any order within a line, else the nearest stable
-    /// one within [`CHOSEN_REACH`], since it may have been chosen in another recording.
+    /// Returns the pole that a chosen frequency (Hz) means: the very one, whatever its order. Else it was chosen in another
+    /// recording, or by eye: the nearest stable one within [`CHOSEN_REACH`], or the nearest within a line.
     fn chosen_pole(&self, frequency: f64) -> Option<&StabilisationPole> {
         let distance = |pole: &&StabilisationPole| (pole.frequency - frequency).abs();
         let searches = self.stabilisation.searches.iter();
         let poles = searches.flat_map(|search| &search.diagram);
-        let line = 2.0 * self.lines.half_line();
-        let near = poles.clone().filter(|pole| distance(pole) <= line);
-        let stable = poles.filter(|pole| {
+        let nearest = poles.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        if distance(&nearest) <= THE_SAME * frequency {
+            return Some(nearest);
+        }
+        let searches = self.stabilisation.searches.iter();
+        let stable = searches.flat_map(|search| &search.diagram).filter(|pole| {
             pole.stability == PoleStability::All && distance(pole) <= CHOSEN_REACH * frequency
         });
-        near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .or_else(|| stable.min_by(|a, b| distance(a).total_cmp(&distance(b))))
+        let line = 2.0 * self.lines.half_line();
+        stable
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .or_else(|| Some(nearest).filter(|pole| distance(pole) <= line))
     }
 
     /// The fit of all together. Beside the others an added mode may leave the band that it kept to when it

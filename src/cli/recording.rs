@@ -22,7 +22,8 @@ use tapjoint::recording::{
     RecordingError, is_universal_file, list_datasets, open_frequency_responses,
 };
 use tapjoint::report::{
-    datasets_of, document_of, inspection_of, render_spectrum_csv, render_spectrum_picture,
+    datasets_of, document_of, functions_of, inspection_of, render_spectrum_csv,
+    render_spectrum_picture,
 };
 
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
@@ -216,7 +217,19 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
             );
         }
         let _work = Work::begin(terminal.watch(), Stage::Taps);
-        let recording = arguments.recording.open(file)?;
+        let recording = match arguments.recording.open(file) {
+            Ok(recording) => recording,
+            Err(problem) if is_no_time_series(&problem) => {
+                let settings = arguments.recording.settings();
+                let functions = open_frequency_responses(file, &settings)?;
+                for doubt in &functions.warnings {
+                    terminal.warn(&format!("{shown}: {doubt}"));
+                }
+                datasets.extend(functions_of(&file_name(file), &functions));
+                continue;
+            }
+            Err(problem) => return Err(problem.into()),
+        };
         recordings.push(inspect_bare(
             recording,
             arguments.recording.hammer.as_ref(),

@@ -88,8 +88,8 @@ fn modes(document: &Document, answer: &Answer, lines: usize, screen: Screen) -> 
     let word = if described { "mode" } else { "resonance" };
     match others {
         0 => {}
-        1 => text.push_str(&format!("and 1 more {word} (--full)\n")),
-        others => text.push_str(&format!("and {others} more {word}s (--full)\n")),
+        1 => text.push_str(&format!("and 1 weaker {word} (--full)\n")),
+        others => text.push_str(&format!("and {others} weaker {word}s (--full)\n")),
     }
     text + "\n"
 }

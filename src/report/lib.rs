@@ -48,8 +48,8 @@ pub use data_files::{
     render_perturbation_csv, render_series_csv, render_spectrum_csv, render_taps_csv,
 };
 pub use document::{
-    comparison_of, datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of,
-    prediction_of, series_of,
+    comparison_of, datasets_of, document_of, frf_document, functions_of, gap_section,
+    inspection_of, lambdas_of, prediction_of, series_of,
 };
 pub use exchange::{EXCHANGED, ExchangeFiles, exchange_files};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};

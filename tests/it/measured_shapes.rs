@@ -2,8 +2,8 @@
 
 use crate::shared::{described, record, virtual_strip};
 use tapjoint::pipeline::{
-    Analysis, IdentifySettings, MeasuredShape, ShapeBy, measured_shapes, run_test, sampled_shapes,
-    shape_agreement,
+    Analysis, IdentifySettings, MeasuredShape, ShapeBy, measured_shapes, point_shapes, run_test,
+    sampled_shapes, shape_agreement,
 };
 use tapjoint::recording::WavFormat;
 use tapjoint::simulate::{Laboratory, TestPlan, nominal_description, plan_test};
@@ -160,5 +160,60 @@ fn prop_poles_chosen_by_hand_are_the_modes() {
     assert!(
         warned.unwrap().to_string().contains("500.0 Hz"),
         "{warned:?}"
+    );
+}
+
+/// A recording with a mass at the tip, beside those of the roving hammer, and its shape by itself.
+#[test]
+fn regress_a_recording_with_other_masses_has_other_shapes() {
+    let loaded = "[[recording]]\nfile = \"loaded.wav\"\ntap = 0.385\nband = [0, 1000]\n\
+                  mass = [{ position = 0.42, mass = 0.2 }]\n";
+    let analysis = analysed(&(roving_hammer() + loaded), |told| told);
+    for shape in shapes_of(&analysis) {
+        assert!(
+            !shape.recordings.contains(&"loaded.wav".to_owned()),
+            "{shape:?}"
+        );
+        assert_eq!(shape.points.len(), 5);
+    }
+    let exported = point_shapes(&analysis);
+    assert!(exported.loaded.contains("loaded.wav"));
+    for shape in &exported.modes {
+        let mut points = shape.values.values();
+        assert!(
+            points.all(|point| point.recording != "loaded.wav"),
+            "{shape:?}"
+        );
+    }
+}
+
+#[test]
+fn prop_poles_of_one_recording_are_its_own() {
+    let poles = |told: String| {
+        let places = "poles = [16.9, 116.7]\n[[recording]]\nfile = \"1.wav\"";
+        told.replacen("[[recording]]\nfile = \"1.wav\"", places, 1)
+            + "[analysis]\npoles = [332.4, 5000]\n"
+    };
+    let analysis = analysed(&roving_hammer(), poles);
+    for recording in &analysis.recordings {
+        let spectra = recording.measurement.spectra.as_ref().unwrap();
+        let found: Vec<i64> = spectra
+            .readings
+            .iter()
+            .map(|one| one.frequency.round() as i64)
+            .collect();
+        match recording.file.as_str() {
+            "0.wav" => assert_eq!(found, [17, 117]),
+            _ => assert_eq!(found, [332]),
+        }
+    }
+    let outside = analysis
+        .warnings
+        .iter()
+        .find(|one| one.code == "pole-without-mode");
+    let outside = outside.unwrap().to_string();
+    assert!(
+        outside.contains("5000") && outside.contains("no recording"),
+        "{outside}"
     );
 }

@@ -15,7 +15,7 @@ use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::quality::Check;
 use tapjoint_signal::recording::{
-    Abscissa, ChannelInfo, Ordinate, Precision, UffCoding, UniversalFile,
+    Abscissa, ChannelInfo, FrequencyResponses, Ordinate, Precision, UffCoding, UniversalFile,
 };
 use tapjoint_signal::spectral::Window;
 use tapjoint_signal::taps::Pulse;
@@ -165,7 +165,7 @@ pub struct DatasetSection {
     pub file: String,
     /// Place in the file, from 1.
     pub dataset: usize,
-    /// Type of the dataset: 58 for functions, 164 for units, ...
+    /// Type of the dataset: 58 for functions, 164 for units, ...; 0 of a function in a file that is no universal file.
     pub dataset_type: u32,
     /// Contents in words: "frequency response function".
     pub kind: String,
@@ -199,6 +199,28 @@ pub struct DatasetSection {
     pub date: Option<String>,
     /// Bytes of its values, of other datasets of all.
     pub bytes: u64,
+}
+
+/// Returns a section for each function of a file that is no universal file.
+pub fn functions_of(file: &str, functions: &FrequencyResponses) -> Vec<DatasetSection> {
+    let kind = match functions.has_phase {
+        true => "frequency response function",
+        false => "spectrum",
+    };
+    let sections = functions.responses.iter().enumerate();
+    let sections = sections.map(|(index, function)| DatasetSection {
+        file: file.to_owned(),
+        dataset: index + 1,
+        kind: kind.to_owned(),
+        points: Some(functions.lines as u64),
+        start: Some(functions.first_frequency),
+        spacing: Some(functions.spacing),
+        spacing_unit: Some("Hz".to_owned()),
+        response: Some(function.name.clone()),
+        unit: function.unit.clone(),
+        ..DatasetSection::default()
+    });
+    sections.collect()
 }
 
 impl RecordingSection {

@@ -18,7 +18,7 @@ pub(crate) use measured::is_strong;
 pub use measured::{
     AmplitudeSection, ChannelSection, DatasetSection, FitSection, FittedFunctionSection,
     FrfSection, HammerSection, ModeSection, RecordingSection, TapSection, datasets_of,
-    frf_document, method_name,
+    frf_document, functions_of, method_name,
 };
 pub use model::{
     BudgetRow, EstimateSection, EstimatedValue, FreeBeamSection, FreeTestSection, FromReadings,

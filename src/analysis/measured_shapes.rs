@@ -171,7 +171,7 @@ fn at_taps(number: usize, seen: &[(&Configuration, &ObservedMode)]) -> Vec<Measu
             shapes.len() - 1
         });
         // The scatter of the taps has one degree of freedom less than there are taps.
-        let scatter = (configuration.taps > 1).then(|| configuration.taps as f64 - 1.0);
+        let scatter = (configuration.taps > 1).then_some(configuration.taps as f64 - 1.0);
         let constant = Observed {
             freedom: constant.freedom.or(scatter),
             ..constant

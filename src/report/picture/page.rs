@@ -301,7 +301,7 @@ const ABOUT_MODES: usize = 40;
 /// Most points of a curve behind single points: it is faint, and the spectra have all of it.
 const BEHIND: usize = 400;
 
-/// Reduces a curve, ascending in x (pixels): of [`COLUMN`] pixels with many points the lowest and the highest stay, in
+/// Reduces a curve, ascending in x (pixels): of two pixels with many points the lowest and the highest stay, in
 /// their order.
 ///
 /// The picture looks the same; a peak of one sample stays. Points that are not finite are left out.

@@ -330,6 +330,15 @@ pub fn decimate(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
         reduced.push(column[low.min(high)]);
         reduced.push(column[low.max(high)]);
     }
+    // A curve reaches from its first to its last point.
+    if let [first, .., last] = finite.as_slice() {
+        if reduced.first() != Some(first) {
+            reduced.insert(0, *first);
+        }
+        if reduced.last() != Some(last) {
+            reduced.push(*last);
+        }
+    }
     reduced
 }
 

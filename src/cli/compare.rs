@@ -296,7 +296,10 @@ fn read_side(
     };
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
-    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
+    let analysis = file.analyse(
+        &IdentifySettings::unperturbed(),
+        &terminal.measuring(file.test.recordings.len()),
+    )?;
     let _work = Work::begin(terminal.watch(), Stage::Comparison);
     let compared = compared_test(&file.test, &analysis);
     let structure = analysis.structure;

@@ -50,7 +50,10 @@ pub(super) fn run(
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let output = OutputFile::prepare_optional(arguments.model.as_deref())?;
-    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
+    let analysis = file.analyse(
+        &IdentifySettings::unperturbed(),
+        &terminal.measuring(file.test.recordings.len()),
+    )?;
     let settings = GapSettings {
         seed,
         ..GapSettings::default()

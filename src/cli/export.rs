@@ -145,9 +145,10 @@ fn estimated(
 ) -> anyhow::Result<Result<DeckSource, DeckError>> {
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
-    let progress = terminal.progress("estimating the joint");
-    let analysis = file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?;
-    drop(progress);
+    let analysis = file.analyse(
+        &IdentifySettings::unperturbed(),
+        &terminal.measuring(file.test.recordings.len()),
+    )?;
     Ok(source_of(&file.test, &analysis).map(|source| DeckSource {
         doubts: doubts_of(&analysis),
         ..source

@@ -203,14 +203,17 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let analysis = match &subject {
-        Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed(), terminal.watch())?,
-        Subject::Recording(hammer) => analyse_recording(arguments, hammer, terminal.watch())?,
+        Subject::Test(file) => file.analyse(
+            &IdentifySettings::unperturbed(),
+            &terminal.measuring(file.test.recordings.len()),
+        )?,
+        Subject::Recording(hammer) => analyse_recording(arguments, hammer, &terminal.measuring(1))?,
         Subject::Functions => analyse(
             &arguments.file,
             &arguments.recording,
             &arguments.spectrum,
             ReadBy::default(),
-            terminal.watch(),
+            &terminal.measuring(1),
         )?,
     };
     let settings = FrfSettings {

@@ -116,7 +116,7 @@ pub(super) fn identify(
             method: arguments.method,
             ..IdentifySettings::unperturbed()
         },
-        terminal.watch(),
+        &terminal.measuring(file.test.recordings.len()),
     )?;
     let document = document_of(&analysis);
     terminal.answer(&document, None, &arguments.full)?;
@@ -174,7 +174,7 @@ pub(super) fn perturb(
         monte_carlo: Some((arguments.samples, seed)),
         ..perturbed_by(arguments.method)
     };
-    let analysis = file.analyse(&settings, terminal.watch())?;
+    let analysis = file.analyse(&settings, &terminal.measuring(file.test.recordings.len()))?;
     let document = document_of(&analysis);
     let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     if let Some(file) = png {

@@ -10,6 +10,7 @@ mod output;
 mod overwrite;
 mod place;
 mod program;
+mod progress;
 mod publication;
 mod staging;
 mod terminal;

@@ -295,7 +295,7 @@ pub(super) fn spectrum(
         &arguments.recording,
         &arguments.spectrum,
         arguments.reading,
-        terminal.watch(),
+        &terminal.measuring(1),
     )?;
     let document = document_of(&analysis);
     if let Some(file) = png {

@@ -333,7 +333,10 @@ pub(super) fn run(
         true => Some(summed_files(subject.files(), described.as_ref())?),
         false => None,
     };
-    let progress = terminal.progress("measuring, fitting and estimating");
+    let measuring = terminal.measuring(match &described {
+        Some(file) => file.test.recordings.len(),
+        None => subject.files().len(),
+    });
     let (bare, reading) = (&arguments.recording, arguments.reading.unwrap_or_default());
     let analysis = match (&described, &subject) {
         (Some(file), _) => file.analyse(
@@ -341,14 +344,14 @@ pub(super) fn run(
                 monte_carlo: Some((SAMPLES, seed)),
                 ..perturbed_by(arguments.method)
             },
-            terminal.watch(),
+            &measuring,
         )?,
         (None, Subject::Described(file) | Subject::Bare(file)) => {
-            analyse(file, bare, &arguments.spectrum, reading, terminal.watch())?
+            analyse(file, bare, &arguments.spectrum, reading, &measuring)?
         }
         (None, Subject::Folder(_, files)) => {
             let spectrum = &arguments.spectrum;
-            analyse_together(name, files, bare, spectrum, reading, terminal.watch())?
+            analyse_together(name, files, bare, spectrum, reading, &measuring)?
         }
     };
     let mut document = document_of(&analysis);
@@ -375,7 +378,7 @@ pub(super) fn run(
         model = add_model(&mut gap, file, name, &analysis, diagnosis.as_ref().ok());
         document.add_gap(gap);
     }
-    drop(progress);
+    drop(measuring);
     let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     let drawn = draw_run(&document, &analysis.recordings)?;
     work.go_on(Stage::Files);

@@ -3,15 +3,14 @@
 use super::arguments::{CommonArguments, FullAnswer, JsonDestination};
 use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
+use super::progress::{Measuring, time_left};
 use super::staging::ledger;
 use super::timings::Stopwatch;
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::{JoinHandle, spawn};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tapjoint::pipeline::Watch;
 use tapjoint::report::document::{Document, TimingsSection};
 use tapjoint::report::{
@@ -96,9 +95,10 @@ impl Terminal {
         self.say(text)
     }
 
-    /// Shows on a terminal that the work goes on, until the returned value is dropped.
-    pub(super) fn progress(&self, doing: &'static str) -> Option<Progress> {
-        (!self.quiet && io::stderr().is_terminal()).then(|| Progress::start(doing))
+    /// Receives the stages of so many recordings that are measured, and shows on a terminal the time that is left, until the
+    /// returned value is dropped.
+    pub(super) fn measuring(&self, recordings: usize) -> Measuring<'_> {
+        Measuring::begin(recordings, self.watch(), self.quiet)
     }
 
     /// Prints a warning on standard error, unless `--quiet` is given. If standard error cannot be written
@@ -125,7 +125,8 @@ impl Terminal {
         if self.quiet || now == before || !error.is_terminal() {
             return;
         }
-        let left = time_left(self.start.elapsed(), done, of);
+        let elapsed = self.start.elapsed();
+        let left = time_left(elapsed, done, of, elapsed);
         let end = if done == of { "\n" } else { "" };
         let _ = write!(error, "\r\u{1b}[K{done} of {of} {doing}{left}{end}");
     }
@@ -217,18 +218,6 @@ pub(super) fn screen() -> Screen {
     let own = terminal_size::terminal_size_of(io::stdout());
     let own = own.map(|(width, _)| usize::from(width.0));
     stated.or(own).map_or_else(Screen::default, Screen::of)
-}
-
-/// ", 2 min left": by what was done in this time; empty at the end, and in the first two seconds.
-fn time_left(elapsed: Duration, done: usize, of: usize) -> String {
-    let seconds = elapsed.as_secs_f64();
-    let left = seconds * of.saturating_sub(done) as f64 / done.max(1) as f64;
-    match left {
-        _ if done == 0 || done >= of || seconds < 2.0 => String::new(),
-        left if left < 90.0 => format!(", {left:.0} s left"),
-        left if left < 5400.0 => format!(", {:.0} min left", left / 60.0),
-        left => format!(", {:.1} h left", left / 3600.0),
-    }
 }
 
 /// Returns the text with bold headings and yellow warnings.
@@ -330,58 +319,6 @@ fn shortened(text: &str) -> String {
     short + rest
 }
 
-/// Time before the line appears: shorter work shows nothing.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// Time between two pictures of the line.
-const BEAT: Duration = Duration::from_millis(120);
-const TURN: [char; 10] = ['⠋', '⠙', '⠹', '⠸', '⠼', '⠴', '⠦', '⠧', '⠇', '⠏'];
-
-/// The line that shows progress. It disappears when this value is dropped.
-#[derive(Debug)]
-pub(super) struct Progress {
-    end: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Progress {
-    fn start(doing: &'static str) -> Self {
-        let (end, ended) = channel();
-        Self {
-            end: Some(end),
-            thread: Some(spawn(move || show(doing, &ended))),
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        // The thread ends when the channel is closed.
-        self.end.take();
-        if let Some(thread) = self.thread.take() {
-            // A failure to draw the line does not matter.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// Draws the line until the channel is closed.
-fn show(doing: &str, ended: &Receiver<()>) {
-    let start = Instant::now();
-    let mut error = io::stderr();
-    let mut signs = TURN.iter().cycle();
-    let mut pause = PATIENCE;
-    while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
-        let sign = signs.next().unwrap_or(&' ');
-        let seconds = start.elapsed().as_secs();
-        let _ = write!(error, "\r{sign} {doing}, {seconds} s");
-        let _ = error.flush();
-        pause = BEAT;
-    }
-    if pause == BEAT {
-        let _ = write!(error, "\r\u{1b}[K");
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -393,18 +330,6 @@ mod tests {
         let short = format!("a 99999999... (309 digits) b 1{} c 12", "0".repeat(39));
         assert_eq!(shortened(&text), short);
         assert_eq!(shortened("no number"), "no number");
-    }
-
-    #[test]
-    fn val_time_left_follows_from_what_was_done() {
-        let left = |seconds: f64, done| time_left(Duration::from_secs_f64(seconds), done, 100);
-        assert_eq!(left(40.0, 25), ", 2 min left");
-        assert_eq!(left(10.0, 50), ", 10 s left");
-        assert_eq!(left(3600.0, 10), ", 9.0 h left");
-        assert_eq!(
-            (left(1.0, 1), left(9.0, 100)),
-            (String::new(), String::new())
-        );
     }
 
     #[test]

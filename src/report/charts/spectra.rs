@@ -705,7 +705,12 @@ mod tests {
         let shown = series(&[function("A", Some(0.003))]);
         let names: Vec<&str> = shown.iter().map(|one| one.name.as_str()).collect();
         let fitted = "24 fitted modes leave 0.30 % of the power, 10 to 30 Hz";
-        assert_eq!(names, ["A, of the file", fitted]);
+        let residual = "residual: measured less fitted";
+        assert_eq!(names, ["A, of the file", fitted, residual]);
+        assert_eq!((shown[2].mark, shown[2].opacity), (Mark::Line(OVER), FAINT));
+        // The fit is exact, and the residual has no place outside its band.
+        assert!(shown[2].y[10..=30].iter().all(|value| *value == 0.0));
+        assert!(shown[2].y[..10].iter().all(|value| value.is_nan()));
         assert_eq!(shown[0].mark, Mark::Line(UNDER));
         assert_eq!(
             (shown[1].mark, shown[1].color),
@@ -735,6 +740,8 @@ mod tests {
             "C, of the file",
             "24 fitted modes leave 0.30 to 2.0 % of the power, 10 to 30 Hz",
             "24 fitted modes, B",
+            "residual, A",
+            "residual, B",
         ];
         assert_eq!(names, expected);
         assert_eq!(shown[2].mark, Mark::Line(1.5));

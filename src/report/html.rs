@@ -6,6 +6,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use super::ReportError;
 use super::document::{Document, SheetSection, WarningSection};
 use super::format::{capital, significant, trimmed};
+use super::picture::InlineFigure;
 use super::sheet::{Sheet, running_head};
 use super::tables::{self, Table};
 use super::words::answer::Answer;
@@ -15,21 +16,6 @@ use super::words::{comparison, series};
 use tapjoint_analysis::severity_of;
 use tapjoint_beam::{Assembly, BeamTheory};
 use tapjoint_description::JointModel;
-
-/// A picture inside the page.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InlineFigure {
-    /// Section that it stands in: "modes".
-    pub section: &'static str,
-    /// Contents, and what to look for.
-    pub caption: String,
-    /// An `<svg>` element that this crate made.
-    pub svg: String,
-    /// Its curves for the page's script, as [`crate::picture::packed`] makes them.
-    pub live: Option<String>,
-    /// True where it is so high that in print it takes a page of its own.
-    pub tall: bool,
-}
 
 /// The plotting library, its style and the page's own script, all inside the page: a report opens
 /// from a disk without a network.

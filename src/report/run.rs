@@ -15,7 +15,8 @@ use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::exchange::EXCHANGED;
-use crate::html::{InlineFigure, render_html, render_reloading_html};
+use crate::html::{render_html, render_reloading_html};
+use crate::picture::InlineFigure;
 use crate::picture::{
     Block, Chart, Color, Drawing, PictureFormat, packed, render_picture, render_svg,
 };

@@ -5,7 +5,7 @@ use askama::Template;
 use crate::ReportError;
 use crate::document::{Document, InstrumentSection, SheetSection};
 use crate::format::significant;
-use crate::html::InlineFigure;
+use crate::picture::InlineFigure;
 use crate::words::answer::Answer;
 
 /// Most files and instruments on the sheet; report.json has all.

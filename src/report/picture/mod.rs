@@ -17,7 +17,7 @@ use crate::ReportError;
 pub use drawing::Drawing;
 use drawing::Rgb;
 pub use files::{render_png, render_svg, render_svg_file};
-pub use page::{decimate, packed};
+pub use page::{InlineFigure, decimate, packed};
 
 /// A picture of one kind.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]

@@ -30,6 +30,21 @@ const FEW: usize = 3;
 /// Effort of deflating the page's curves: zlib's usual level 6 takes nearly three times as long and saves a tenth.
 const DEFLATION: Compression = Compression::new(3);
 
+/// A picture inside the page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InlineFigure {
+    /// Section that it stands in: "modes".
+    pub section: &'static str,
+    /// Contents, and what to look for.
+    pub caption: String,
+    /// An `<svg>` element that this crate made.
+    pub svg: String,
+    /// Its curves for the page's script, as [`packed`] makes them.
+    pub live: Option<String>,
+    /// True where it is so high that in print it takes a page of its own.
+    pub tall: bool,
+}
+
 /// Returns a chart as it stands in the page: JSON, deflated, since numbers take up most of it, and in base 64.
 /// Browsers inflate it by themselves; one that cannot shows the picture.
 ///

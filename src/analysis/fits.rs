@@ -34,7 +34,8 @@ pub(super) const UNLIKE: f64 = 0.9;
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// Share of a chosen frequency by which its digits may differ from a pole's: the page writes seven.
 const THE_SAME: f64 = 1e-6;
-/// Share of a chosen frequency within which a stable pole is the one meant. 1 %: what a sensor moves that is moved.
+/// Share of a chosen frequency within which a stable pole is the one meant. 1 %: a light sensor at another place shifts a
+/// mode by less.
 const CHOSEN_REACH: f64 = 0.01;
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 pub(super) const CLEAR_AMPLITUDE: f64 = 5.0;

@@ -624,7 +624,8 @@ pub(super) fn read_measured(
 
 fn read_frequencies(table: &Table<'_>) -> Result<Vec<f64>, DescriptionError> {
     let wanted = "a list of frequencies (Hz), or `file = \"modes.unv\"`,";
-    read_ascending(&table.need("frequencies", wanted, "frequencies = [17, 118]")?)
+    let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
+    read_ascending(&entry, MEASURED_LIMIT, MEASURED_REMEDY)
 }
 
 /// Reads the frequencies (Hz) of the free beam from this entry, and their standard uncertainties (Hz).
@@ -632,7 +633,7 @@ pub(super) fn read_free_frequencies(
     table: &Table<'_>,
     entry: &Entry<'_>,
 ) -> Result<(Vec<f64>, Vec<f64>), DescriptionError> {
-    let frequencies = read_ascending(entry)?;
+    let frequencies = read_ascending(entry, MEASURED_LIMIT, MEASURED_REMEDY)?;
     let stds = table.need(
         "free_std",
         "their standard uncertainty (Hz)",
@@ -642,34 +643,27 @@ pub(super) fn read_free_frequencies(
     Ok((frequencies, stds))
 }
 
+/// Remedy for another number of measured frequencies.
+const MEASURED_REMEDY: &str =
+    "list the natural frequencies in Hz, lowest first; a joint needs two to four";
 /// Most modes that may be chosen by hand.
 const MOST_POLES: usize = 100;
 
 /// Reads the frequencies (Hz) of the modes that were chosen by hand, the lowest first.
 pub(super) fn read_poles(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
-    let items = entry.list("a list of frequencies such as [16.55, 116.8] (Hz)")?;
-    if items.is_empty() || items.len() > MOST_POLES {
-        let remedy = "list the modes of interest, or leave `poles` out";
-        return Err(entry.wrong_count(items.len(), &format!("1 to {MOST_POLES}"), remedy));
-    }
-    let frequencies = items
-        .iter()
-        .map(|item| item.within(Dimension::Frequency, &FREQUENCY))
-        .collect::<Result<Vec<_>, _>>()?;
-    check_ascending(&items, &frequencies)?;
-    Ok(frequencies)
+    let remedy = "list the modes of interest, or leave `poles` out";
+    read_ascending(entry, MOST_POLES, remedy)
 }
 
-/// Reads natural frequencies (Hz), the lowest first.
-fn read_ascending(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+/// Reads natural frequencies (Hz), the lowest first, `most` of them. `remedy` goes with another number of them.
+fn read_ascending(
+    entry: &Entry<'_>,
+    most: usize,
+    remedy: &str,
+) -> Result<Vec<f64>, DescriptionError> {
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
-    if items.is_empty() {
-        let remedy = "list the natural frequencies in Hz, lowest first";
-        return Err(entry.wrong_count(0, "at least 1", remedy));
-    }
-    if items.len() > MEASURED_LIMIT {
-        let remedy = "leave the highest out: a joint needs two to four";
-        return Err(entry.wrong_count(items.len(), &format!("1 to {MEASURED_LIMIT}"), remedy));
+    if items.is_empty() || items.len() > most {
+        return Err(entry.wrong_count(items.len(), &format!("1 to {most}"), remedy));
     }
     let frequencies = items
         .iter()

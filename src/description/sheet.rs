@@ -1,13 +1,15 @@
 //! `[sheet]`: what is filed with a test beside its results.
 
 use super::reader::{DescriptionError, Entry, Table};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Longest text of a sheet (characters), so that the sheet stays one page; remarks may be [`LONGEST_REMARKS`].
 const LONGEST: usize = 60;
 const LONGEST_REMARKS: usize = 300;
 
 /// Who tested what, and when. All of it is carried to the outputs as it is written.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
 pub struct SheetDescription {
     /// Number of the test.
     pub number: Option<String>,

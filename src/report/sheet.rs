@@ -106,8 +106,8 @@ pub fn render_sheet(
 /// Returns name, number and date for the foot of every printed page, as a string of a style sheet.
 pub fn running_head(document: &Document, name: &str) -> String {
     let sheet = document.sheet.as_ref();
-    let number = sheet.and_then(|sheet| sheet.number.as_deref());
-    let date = sheet.and_then(|sheet| sheet.date.as_deref());
+    let number = sheet.and_then(|sheet| sheet.texts.number.as_deref());
+    let date = sheet.and_then(|sheet| sheet.texts.date.as_deref());
     let name = short(name);
     let parts = [Some(name.as_str()), number, date].into_iter().flatten();
     let text = parts.collect::<Vec<_>>().join(" \u{b7} ");

@@ -408,7 +408,7 @@ pub fn shapes(document: &Document) -> Option<Chart> {
             "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. Points: \
              measured at sensors, or at taps by reciprocity, and scaled to fit each curve best. Bars: 95 % by noise and the \
              scatter of the taps. Two points cannot tell which of them is wrong. With three or more, a sensor whose points \
-             lie off in all modes has another scale or place than described."
+             lie off in all modes has another scale, sign or place than described."
         }
         None => {
             "Shapes of the predicted modes, of the described beam on the estimated joint with what sits on it. They are not \

@@ -2,23 +2,14 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use tapjoint_description::TestDescription;
+use tapjoint_description::{SheetDescription, TestDescription};
 
 /// The sheet of a test. Texts are those of the description.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct SheetSection {
-    /// Number of the test.
-    pub number: Option<String>,
-    /// Day of the test; without one in the description that of the recordings, where all have one.
-    pub date: Option<String>,
-    /// Who tested.
-    pub operator: Option<String>,
-    /// What was tested.
-    pub specimen: Option<String>,
-    /// Where it was tested.
-    pub laboratory: Option<String>,
-    /// Anything else.
-    pub remarks: Option<String>,
+    /// Texts of the description. The date is that of the recordings, where the description has none and all of them agree.
+    #[serde(flatten)]
+    pub texts: SheetDescription,
     /// Hammer and sensors.
     pub instruments: Vec<InstrumentSection>,
     /// The description and the recordings; empty unless a sheet was asked for.
@@ -52,7 +43,7 @@ pub struct FileSection {
 impl SheetSection {
     /// Returns the sheet of a description, without files.
     pub fn of(test: &TestDescription) -> Self {
-        let sheet = test.sheet.clone();
+        let mut texts = test.sheet.clone();
         let hammer = test.hammer.iter().map(|hammer| InstrumentSection {
             name: "hammer".to_owned(),
             instrument: hammer.instrument.clone(),
@@ -67,13 +58,9 @@ impl SheetSection {
         let mut dates = test.recordings.iter().map(|one| one.date.clone());
         let date = dates.next().flatten();
         let date = date.filter(|first| dates.all(|other| other.as_ref() == Some(first)));
+        texts.date = texts.date.or(date);
         SheetSection {
-            number: sheet.number,
-            date: sheet.date.or(date),
-            operator: sheet.operator,
-            specimen: sheet.specimen,
-            laboratory: sheet.laboratory,
-            remarks: sheet.remarks,
+            texts,
             instruments: hammer.chain(sensors).collect(),
             files: Vec::new(),
         }
@@ -82,11 +69,11 @@ impl SheetSection {
     /// Returns number, date, operator, laboratory and specimen with their names; those that are not known are empty.
     pub fn facts(&self) -> [(&'static str, &str); 5] {
         [
-            ("Number", &self.number),
-            ("Date", &self.date),
-            ("Operator", &self.operator),
-            ("Laboratory", &self.laboratory),
-            ("Specimen", &self.specimen),
+            ("Number", &self.texts.number),
+            ("Date", &self.texts.date),
+            ("Operator", &self.texts.operator),
+            ("Laboratory", &self.texts.laboratory),
+            ("Specimen", &self.texts.specimen),
         ]
         .map(|(name, text)| (name, text.as_deref().unwrap_or_default()))
     }

@@ -1,8 +1,8 @@
 //! Mode shapes as they were measured, beside those of the model.
 //!
-//! A set-up sees a shape at the places of its sensors, relative to the sensor with the largest motion. Recordings with the
-//! same masses and places of sensors that differ in the place of the taps see it at these places, by their modal
-//! constants: the shape is the same from either side (reciprocity).
+//! A set-up sees a shape at the places of its sensors, relative to the sensor with the largest motion. Recordings with
+//! taps at several places see it at these places, by their modal constants. Their masses and sensors must be the same.
+//! Sensor and tap can change places without another answer (reciprocity).
 
 use super::Analysis;
 use super::identification::SampledShape;
@@ -38,8 +38,8 @@ pub struct MeasuredShape {
     pub points: Vec<ShapePoint>,
 }
 
-/// A measured shape at one place. The points of a shape are scaled by one factor, so that they fit the predicted shape
-/// best (modal scale factor: Allemang, "The modal assurance criterion: twenty years of use and abuse", 2003).
+/// A measured shape at one place. One factor scales the points of a shape, so that they fit the predicted one best
+/// (modal scale factor: Allemang, "The modal assurance criterion: twenty years of use and abuse", 2003).
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ShapePoint {
     /// Name of the sensor.

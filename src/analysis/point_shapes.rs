@@ -10,8 +10,8 @@ use super::{Analysis, Response};
 use std::collections::{BTreeMap, BTreeSet};
 use tapjoint_description::SensorKind;
 
-/// Least share (1) of the largest displacement of a shape at a place by which two parts of it are joined: nearer to a node of
-/// the mode the ratio is noise.
+/// Two parts of a shape join by a common place. There both have at least this share of their largest displacement (1): nearer
+/// to a node of the mode the ratio is noise.
 const LEAST_SHARE: f64 = 0.1;
 
 /// Points at which motion or force was measured. Their numbers count from 1, along the beam; points without a place follow.

@@ -95,8 +95,8 @@ impl Terminal {
         self.say(text)
     }
 
-    /// Receives the stages of so many recordings that are measured, and shows on a terminal the time that is left, until the
-    /// returned value is dropped.
+    /// Receives the stages of the recordings that are measured; `recordings` is their number. A terminal shows the time that
+    /// is left, until the returned value is dropped.
     pub(super) fn measuring(&self, recordings: usize) -> Measuring<'_> {
         Measuring::begin(recordings, self.watch(), self.quiet)
     }

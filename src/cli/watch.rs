@@ -19,7 +19,7 @@ use std::time::Duration;
 
 /// Run a test again whenever one of its files changes.
 ///
-/// Runs as `tapjoint run` does, and again when the description or a recording changes, or a new recording appears in
+/// Runs as `tapjoint run` does. Runs again when the description or a recording changes, or a new recording appears in
 /// the folder. Files are read once they have not changed for one interval, because a recorder may still be writing. The page
 /// report.html reloads itself in the browser. A run that fails prints its error, and the command goes on. Ctrl-C ends it.
 #[derive(Debug, Args)]

@@ -331,8 +331,8 @@ pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
     write(FUNCTIONS, rows)
 }
 
-/// Returns the averaged spectra of a recording: root mean square of the transforms of the taps (unit of the signal times
-/// s), a row for each line and a column for each channel. `None` when no tap was accepted, and of functions.
+/// Returns the averaged spectra of a recording, a row for each line and a column for each channel. Values are root mean
+/// squares of the taps' transforms (unit of the signal times s). `None` without an accepted tap, and for functions.
 ///
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.

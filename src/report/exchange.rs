@@ -31,8 +31,8 @@ pub struct ExchangeFiles {
     pub doubts: Vec<String>,
 }
 
-/// Returns the files for other programs: nodes (dataset 15), mode shapes at the sensors (dataset 55) and frequency response
-/// functions (dataset 58) in SI units (dataset 164), and tables of the same.
+/// Returns the files for other programs. Universal files have nodes (dataset 15), mode shapes at the sensors (55) and
+/// frequency response functions (58). Their units are SI (164), where the channels are calibrated. Tables hold the same.
 ///
 /// # Errors
 /// Values that are not finite; a table that cannot be written.

@@ -459,7 +459,7 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
     // Where the earlier run wrote no model, one of that name is somebody else's.
     let model = report["gap"]["updated_model"]["file"].as_str();
     let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
-    // The same of files for other programs.
+    // Files for other programs, where an earlier run has written some.
     let summed = report["sheet"]["files"].as_array();
     let signed = summed.is_some_and(|files| !files.is_empty());
     let exported = report["exported"].as_array();

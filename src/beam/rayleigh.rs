@@ -7,15 +7,13 @@
 //! The error e of a vector becomes about e^3 in each step (Parlett 1998, "The Symmetric Eigenvalue Problem", 4.6 and 4.7).
 //! The number of negative pivots of K - s M is that of the eigenvalues below s, so that no pair is missed or found twice.
 //!
-//! Rows of a banded matrix wait for each other. Several vectors are moved side by side, which costs hardly more than one.
+//! Rows of a banded matrix wait for each other. Several vectors are moved side by side, in lanes, which costs hardly more
+//! than one.
 
 use crate::eigen::BandedMatrix;
 
-/// Vectors that are moved side by side.
-const LANES: usize = 4;
-
-/// One value of each vector.
-type Lanes = [f64; LANES];
+/// Most vectors that are moved side by side.
+const MOST_LANES: usize = 8;
 
 /// Largest distance of a vector from an eigenvector (1): that of [`crate::eigen::lowest_pairs`].
 const DISTANCE: f64 = 1e-8;
@@ -41,44 +39,56 @@ pub(crate) struct Moved {
 
 /// Returns each vector after one step, in the order of the vectors. `None` where a step fails.
 pub(crate) fn moved<const N: usize>(
-    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    matrices: [&BandedMatrix<N>; 2],
     vectors: &[Vec<f64>],
 ) -> Option<Vec<Moved>> {
     let mut all = Vec::with_capacity(vectors.len());
-    for some in vectors.chunks(LANES) {
-        // Lanes without a vector repeat the last one.
-        let lane = |index: usize| &some[index.min(some.len() - 1)];
-        let mut before = vec![[0.0; LANES]; N - 1];
-        before.extend(
-            (0..mass.size()).map(|row| -> Lanes { std::array::from_fn(|index| lane(index)[row]) }),
-        );
-        let (pulled, strain) = product_and_square([stiffness, mass], &before);
-        let kinetic = inner(&before, &pulled);
-        let shifts: Lanes = std::array::from_fn(|index| strain[index] / kinetic[index]);
-        let (after, below) = solution([stiffness, mass], &shifts, &pulled);
-        let (squares, along) = (square(mass, &after), inner(&after, &pulled));
-        for index in 0..some.len() {
-            let (size, along) = (squares[index].sqrt(), along[index]);
-            if !size.is_finite() || size == 0.0 || along == 0.0 {
-                return None;
-            }
-            let unit = kinetic[index].sqrt();
-            let cosine = along / (size * unit);
-            all.push(Moved {
-                // Along the vector before: the matrix is near to singular, and of either sign.
-                vector: after[N - 1..]
-                    .iter()
-                    .map(|x| x[index] / size.copysign(along))
-                    .collect(),
-                shift: shifts[index],
-                turned: (1.0 - cosine * cosine).max(f64::EPSILON).sqrt(),
-                distance: unit / size,
-                below: below[index],
-                is_below: along < 0.0,
-            });
+    for some in vectors.chunks(MOST_LANES) {
+        match some.len() {
+            ..=2 => moved_in_lanes::<N, 2>(matrices, some, &mut all)?,
+            3..=4 => moved_in_lanes::<N, 4>(matrices, some, &mut all)?,
+            5..=6 => moved_in_lanes::<N, 6>(matrices, some, &mut all)?,
+            _ => moved_in_lanes::<N, MOST_LANES>(matrices, some, &mut all)?,
         }
     }
     Some(all)
+}
+
+/// Adds each vector after one step, a lane for each. Lanes without a vector repeat the last one.
+fn moved_in_lanes<const N: usize, const LANES: usize>(
+    [stiffness, mass]: [&BandedMatrix<N>; 2],
+    vectors: &[Vec<f64>],
+    all: &mut Vec<Moved>,
+) -> Option<()> {
+    let lane = |index: usize| &vectors[index.min(vectors.len() - 1)];
+    let mut before = vec![[0.0; LANES]; N - 1];
+    before.extend((0..mass.size()).map(|row| std::array::from_fn(|index| lane(index)[row])));
+    let (pulled, strain) = product_and_square([stiffness, mass], &before);
+    let kinetic = inner(&before, &pulled);
+    let shifts = std::array::from_fn(|index| strain[index] / kinetic[index]);
+    let (after, below) = solution([stiffness, mass], &shifts, &pulled);
+    let (squares, along) = (square(mass, &after), inner(&after, &pulled));
+    for index in 0..vectors.len() {
+        let (size, along) = (squares[index].sqrt(), along[index]);
+        if !size.is_finite() || size == 0.0 || along == 0.0 {
+            return None;
+        }
+        let unit = kinetic[index].sqrt();
+        let cosine = along / (size * unit);
+        all.push(Moved {
+            // Along the vector before: the matrix is near to singular, and of either sign.
+            vector: after[N - 1..]
+                .iter()
+                .map(|x| x[index] / size.copysign(along))
+                .collect(),
+            shift: shifts[index],
+            turned: (1.0 - cosine * cosine).max(f64::EPSILON).sqrt(),
+            distance: unit / size,
+            below: below[index],
+            is_below: along < 0.0,
+        });
+    }
+    Some(())
 }
 
 /// Returns the vectors of the lowest pairs, in ascending order, from vectors next to them. `None` where they do not
@@ -122,10 +132,10 @@ fn have_settled(steps: &[Moved]) -> Option<bool> {
 }
 
 /// Returns M x and x^T K x. Rows of zeros stand before the first of x and of M x.
-fn product_and_square<const N: usize>(
+fn product_and_square<const N: usize, const LANES: usize>(
     [stiffness, mass]: [&BandedMatrix<N>; 2],
-    x: &[Lanes],
-) -> (Vec<Lanes>, Lanes) {
+    x: &[[f64; LANES]],
+) -> (Vec<[f64; LANES]>, [f64; LANES]) {
     let band = N - 1;
     let (mut product, mut square) = (vec![[0.0; LANES]; x.len()], [0.0; LANES]);
     for (row, (k, m)) in stiffness.rows.iter().zip(&mass.rows).enumerate() {
@@ -149,7 +159,10 @@ fn product_and_square<const N: usize>(
 }
 
 /// Returns x^T A x. Rows of zeros stand before the first of x.
-fn square<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Lanes {
+fn square<const N: usize, const LANES: usize>(
+    matrix: &BandedMatrix<N>,
+    x: &[[f64; LANES]],
+) -> [f64; LANES] {
     let band = N - 1;
     let mut square = [0.0; LANES];
     for (row, entries) in matrix.rows.iter().enumerate() {
@@ -168,7 +181,7 @@ fn square<const N: usize>(matrix: &BandedMatrix<N>, x: &[Lanes]) -> Lanes {
 }
 
 /// Returns x^T y.
-fn inner(x: &[Lanes], y: &[Lanes]) -> Lanes {
+fn inner<const LANES: usize>(x: &[[f64; LANES]], y: &[[f64; LANES]]) -> [f64; LANES] {
     let mut inner = [0.0; LANES];
     for (a, b) in x.iter().zip(y) {
         for index in 0..LANES {
@@ -180,11 +193,11 @@ fn inner(x: &[Lanes], y: &[Lanes]) -> Lanes {
 
 /// Returns the solution of (K - s M) x = b for each lane, and the number of negative pivots, by L D L^T without exchange
 /// of rows. Rows of zeros stand before the first of b and of x.
-fn solution<const N: usize>(
+fn solution<const N: usize, const LANES: usize>(
     [stiffness, mass]: [&BandedMatrix<N>; 2],
-    shifts: &Lanes,
-    right: &[Lanes],
-) -> (Vec<Lanes>, [usize; LANES]) {
+    shifts: &[f64; LANES],
+    right: &[[f64; LANES]],
+) -> (Vec<[f64; LANES]>, [usize; LANES]) {
     let (band, size) = (N - 1, right.len() - (N - 1));
     // L left of the diagonal, 1/D on it. Rows of zeros before the first and behind the last spare the loops their ends.
     let mut factor = vec![[[0.0; LANES]; N]; size + 2 * band];

@@ -123,9 +123,14 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
         if (truly - found.optimum.objective).abs() < LINEAR_ENOUGH {
             return Some(found);
         }
-        // The linearised step may have crossed to another valley, as where a tap moves off the end of a beam.
         let before = &optimum.model.predicted;
         let kept = objective_at(&dataset.data, &own, &optimum.parameters, before);
+        // The linearised step leaves a bent valley, and promises next to nothing beyond the optimum that was searched.
+        if (kept - found.optimum.objective).abs() < LINEAR_ENOUGH {
+            found.optimum = optimum.under(&dataset.data, &own);
+            return Some(found);
+        }
+        // It may have crossed to another valley, as where a tap moves off the end of a beam.
         let start = if kept < truly {
             &optimum.parameters
         } else {
@@ -312,7 +317,7 @@ pub fn log_likelihood(data: &[Datum], optimum: &Optimum) -> f64 {
 }
 
 /// Points of the quadrature over a size.
-const POINTS: usize = 160;
+const POINTS: usize = 64;
 
 /// Returns the negative logarithm of a normal prior without its constant.
 fn regularisation(prior: &Prior, value: f64) -> f64 {

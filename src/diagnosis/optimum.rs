@@ -156,6 +156,23 @@ impl<M: Model> Problem for Maximisation<'_, M> {
         Some(linearised)
     }
 
+    fn linearise_by(
+        &self,
+        at: &Self::State,
+        parameters: &[f64],
+        point: &Self::State,
+    ) -> Option<least_squares::Linearised> {
+        let model = Linearised {
+            predicted: point.predicted.clone(),
+            slopes: at.optimum.as_ref()?.model.slopes.clone(),
+        };
+        let there = Optimum::new(self.data, self.priors, parameters.to_vec(), model);
+        Some(least_squares::Linearised::Normal {
+            curvature: there.curvature,
+            gradient: there.gradient,
+        })
+    }
+
     fn bounds(&self) -> &[[f64; 2]] {
         &self.bounds
     }

@@ -7,7 +7,8 @@
 //! units of the parameters do not matter. The first trial has the damping of the settings, by default
 //! mu = 0, which is Gauss-Newton's step. A step that does not lower the cost is tried again with ten times
 //! the damping (Levenberg 1944, Marquardt 1963), and the damping follows how much of its promise each step
-//! keeps.
+//! keeps. Along a bent valley the first trial leaves the ground. Where a problem offers it, a second step by the same
+//! slopes leads back to it, before the damping shortens the way.
 
 use crate::cholesky::Cholesky;
 use nalgebra::{DMatrix, DVector};
@@ -26,6 +27,17 @@ pub trait Problem {
 
     /// Returns gradient and curvature at a state. It is called once for each accepted state.
     fn linearise(&self, parameters: &[f64], state: &mut Self::State) -> Option<Linearised>;
+
+    /// Returns gradient and curvature at a state by the slopes of `at`, a linearised state next to it. `None` where a
+    /// problem does not offer that.
+    fn linearise_by(
+        &self,
+        _at: &Self::State,
+        _parameters: &[f64],
+        _state: &Self::State,
+    ) -> Option<Linearised> {
+        None
+    }
 
     /// Limits of each parameter, low and high; empty for none.
     fn bounds(&self) -> &[[f64; 2]] {
@@ -139,16 +151,18 @@ pub struct Minimum<S> {
 }
 
 /// Factor from one damping to the next. A rejected step raises the damping by it and an accepted one lowers
-/// it at most by it, so that a search has at most two trials for each step and some 14 more.
+/// it at most by it, so that a search has at most three trials for each step and some 15 more.
 const FACTOR: f64 = 10.0;
 /// Weakest damping that is not none.
-const WEAKEST: f64 = 1e-3;
+const WEAKEST: f64 = 1e-4;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;
 /// Share of the promised decrease below which the next step is damped more: with large residuals the curvature
 /// is larger than J'J, and Gauss-Newton's steps go too far.
 const POOR: f64 = 0.5;
-/// Least damping after such a step.
+/// Share of the promised decrease that a step and its way back to the valley have to keep.
+const BENT: f64 = 0.25;
+/// Least damping after a poor step.
 const FIRM: f64 = 0.1;
 /// Smallest diagonal of the damping matrix, relative to its largest: a parameter that nothing feels stays.
 const FLOOR: f64 = 1e-24;
@@ -179,10 +193,12 @@ pub fn minimise<P: Problem>(
             return Some(at.ended(StopReason::NothingFree));
         }
         if step.promises_at_most(tolerance) {
-            let last = settings
-                .polish
-                .then(|| step.move_from(problem, &at))
-                .flatten();
+            let last = match settings.polish {
+                true => step.trial(problem, &at),
+                false => None,
+            };
+            let lower = last.filter(|last| last.cost < at.cost);
+            let last = lower.and_then(|lower| lower.point(problem));
             return Some(last.unwrap_or(at).ended(StopReason::Minimum));
         }
         if damping > 0.0 {
@@ -194,13 +210,21 @@ pub fn minimise<P: Problem>(
                 step = damped;
             }
         }
+        let mut is_first = true;
         let next = loop {
             if step.promises_at_most(tolerance) {
                 return Some(at.ended(StopReason::Minimum));
             }
-            if let Some(next) = step.move_from(problem, &at) {
+            let mut trial = step.trial(problem, &at);
+            if is_first && let Some(above) = trial.take_if(|trial| trial.cost >= at.cost) {
+                let back = at.way_back(problem, above, &scales, damping);
+                trial = back.filter(|back| step.promises_at_most((at.cost - back.cost) / BENT));
+            }
+            let lower = trial.filter(|trial| trial.cost < at.cost);
+            if let Some(next) = lower.and_then(|lower| lower.point(problem)) {
                 break next;
             }
+            is_first = false;
             let is_short = matches!(&step, Step::To { step, .. } if step.amax() <= settings.step);
             if damping >= settings.damping || is_short {
                 return Some(at.ended(StopReason::NoBetterStep));
@@ -224,10 +248,10 @@ pub fn minimise<P: Problem>(
             return Some(at.ended(StopReason::Idle));
         }
         if step.promises_at_most(gain / KEPT) {
-            damping = if damping > WEAKEST {
-                damping / FACTOR
-            } else {
+            damping = if damping <= WEAKEST && is_first {
                 0.0
+            } else {
+                f64::max(WEAKEST, damping / FACTOR)
             };
         } else if !step.promises_at_most(gain / POOR) {
             damping = f64::max(FIRM, FACTOR * damping).min(settings.damping);
@@ -261,6 +285,26 @@ impl<S> Point<S> {
             state: self.state,
             stop,
         }
+    }
+
+    /// Returns the point that a second step by the slopes of this point reaches from one above; `None` where the problem
+    /// does not offer that.
+    fn way_back<P: Problem<State = S>>(
+        &self,
+        problem: &P,
+        above: Trial<S>,
+        scales: &[f64],
+        damping: f64,
+    ) -> Option<Trial<S>> {
+        let local = problem.linearise_by(&self.state, &above.parameters, &above.state)?;
+        let above = Self {
+            parameters: above.parameters,
+            state: above.state,
+            cost: above.cost,
+            local,
+        };
+        let step = above.step(problem.bounds(), scales, damping);
+        step.trial(problem, &above)
     }
 
     /// Returns the damped step on the parameters that no bound holds back.
@@ -304,18 +348,31 @@ impl Step {
         matches!(self, Self::To { promise, .. } if *promise <= gain)
     }
 
-    /// Takes the step; `None` where it does not lower the cost.
-    fn move_from<P: Problem>(&self, problem: &P, at: &Point<P::State>) -> Option<Point<P::State>> {
+    /// Returns the point behind the step; `None` where the model does not exist there.
+    fn trial<P: Problem>(&self, problem: &P, at: &Point<P::State>) -> Option<Trial<P::State>> {
         let Self::To { step, .. } = self else {
             return None;
         };
         let parameters = problem.moved(&at.parameters, step)?;
         let state = problem.evaluate(&parameters, Some(&at.state))?;
-        if problem.cost(&state) < at.cost {
-            Point::new(problem, parameters, state)
-        } else {
-            None
-        }
+        Some(Trial {
+            cost: problem.cost(&state),
+            parameters,
+            state,
+        })
+    }
+}
+
+/// A point behind a step, before its derivatives are computed.
+struct Trial<S> {
+    parameters: Vec<f64>,
+    state: S,
+    cost: f64,
+}
+
+impl<S> Trial<S> {
+    fn point<P: Problem<State = S>>(self, problem: &P) -> Option<Point<S>> {
+        Point::new(problem, self.parameters, self.state)
     }
 }
 
@@ -458,35 +515,57 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley, 10 (y - x^2) and 1 - x, in either form.
+    #[derive(Default)]
     struct Valley {
         rows: bool,
         bounds: Vec<[f64; 2]>,
+        has_way_back: bool,
+    }
+
+    impl Valley {
+        fn jacobian(at: &[f64]) -> DMatrix<f64> {
+            DMatrix::from_row_slice(2, 2, &[-20.0 * at[0], 10.0, -1.0, 0.0])
+        }
+
+        fn normal(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Linearised {
+            Linearised::Normal {
+                curvature: jacobian.tr_mul(jacobian),
+                gradient: jacobian.tr_mul(residuals),
+            }
+        }
     }
 
     impl Problem for Valley {
-        type State = DVector<f64>;
+        /// Residuals, the place where they were computed, and the number of slopes computed on the way.
+        type State = (DVector<f64>, Vec<f64>, usize);
 
-        fn evaluate(&self, at: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
-            Some(DVector::from_vec(vec![
-                10.0 * (at[1] - at[0] * at[0]),
-                1.0 - at[0],
-            ]))
+        fn evaluate(&self, at: &[f64], from: Option<&Self::State>) -> Option<Self::State> {
+            let residuals = DVector::from_vec(vec![10.0 * (at[1] - at[0] * at[0]), 1.0 - at[0]]);
+            Some((residuals, at.to_vec(), from.map_or(0, |from| from.2)))
         }
 
-        fn cost(&self, residuals: &Self::State) -> f64 {
-            0.5 * residuals.norm_squared()
+        fn cost(&self, state: &Self::State) -> f64 {
+            0.5 * state.0.norm_squared()
         }
 
-        fn linearise(&self, at: &[f64], residuals: &mut Self::State) -> Option<Linearised> {
-            let jacobian = DMatrix::from_row_slice(2, 2, &[-20.0 * at[0], 10.0, -1.0, 0.0]);
-            Some(if self.rows {
-                Linearised::of_rows(jacobian, residuals.as_slice())
-            } else {
-                Linearised::Normal {
-                    curvature: jacobian.tr_mul(&jacobian),
-                    gradient: jacobian.tr_mul(residuals),
-                }
+        fn linearise(&self, at: &[f64], state: &mut Self::State) -> Option<Linearised> {
+            let (residuals, _, slopes) = state;
+            *slopes += 1;
+            let jacobian = Self::jacobian(at);
+            Some(match self.rows {
+                true => Linearised::of_rows(jacobian, residuals.as_slice()),
+                false => Self::normal(&jacobian, residuals),
             })
+        }
+
+        fn linearise_by(
+            &self,
+            at: &Self::State,
+            _: &[f64],
+            state: &Self::State,
+        ) -> Option<Linearised> {
+            self.has_way_back
+                .then(|| Self::normal(&Self::jacobian(&at.1), &state.0))
         }
 
         fn bounds(&self) -> &[[f64; 2]] {
@@ -500,7 +579,7 @@ mod tests {
         for rows in [false, true] {
             let valley = Valley {
                 rows,
-                bounds: vec![],
+                ..Valley::default()
             };
             let found = minimise(&valley, &[-1.2, 1.0], &Settings::default()).unwrap();
             assert!(
@@ -516,8 +595,12 @@ mod tests {
     fn val_a_bound_is_kept_and_the_rest_is_minimal() {
         for rows in [false, true] {
             let bounds = vec![[-2.0, 0.5], [-2.0, 2.0]];
-            let found =
-                minimise(&Valley { rows, bounds }, &[-1.2, 1.0], &Settings::default()).unwrap();
+            let valley = Valley {
+                rows,
+                bounds,
+                ..Valley::default()
+            };
+            let found = minimise(&valley, &[-1.2, 1.0], &Settings::default()).unwrap();
             assert!(
                 (found.parameters[0] - 0.5).abs() < 1e-12,
                 "{:?}",
@@ -536,6 +619,7 @@ mod tests {
         let held = Valley {
             rows: true,
             bounds: vec![[0.3, 0.3], [-2.0, 2.0]],
+            ..Valley::default()
         };
         let found = minimise(&held, &[0.0, 0.0], &Settings::default()).unwrap();
         assert_eq!(found.parameters[0], 0.3);
@@ -547,9 +631,26 @@ mod tests {
         let none = Valley {
             rows: true,
             bounds: vec![[0.3, 0.3], [0.2, 0.2]],
+            ..Valley::default()
         };
         let found = minimise(&none, &[0.0, 0.0], &Settings::default()).unwrap();
         assert_eq!(found.stop, StopReason::NothingFree);
+    }
+
+    /// From (-1.2, 1) Gauss-Newton's step leads to x = 1 at once, and the way back to y = 1. Damped steps alone follow the
+    /// bend.
+    #[test]
+    fn prop_the_way_back_spares_slopes_in_a_bent_valley() {
+        let slopes = [false, true].map(|has_way_back| {
+            let valley = Valley {
+                has_way_back,
+                ..Valley::default()
+            };
+            let found = minimise(&valley, &[-1.2, 1.0], &Settings::default()).unwrap();
+            assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-7));
+            found.state.2
+        });
+        assert!(slopes[1] <= 4 && slopes[1] < slopes[0], "{slopes:?}");
     }
 
     /// Two parameters whose sum alone matters: the damped step is defined where Gauss-Newton's is not.

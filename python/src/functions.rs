@@ -93,7 +93,6 @@ pub fn average<'py>(
         responses,
     };
     let found = work::compute(py, threads, || {
-        signals.check()?;
         let windowed = signals.windowed(window, rate);
         let signals = windowed
             .as_ref()
@@ -103,9 +102,21 @@ pub fn average<'py>(
                 ..signals
             });
         let transformer = Transformer::new(rate, axis, samples);
-        average_records(&transformer, &signals.records()).ok_or("there are no records; give one")
+        average_records(&transformer, &signals.records())
     })?;
-    averaged_arrays(py, &found.map_err(refused)?, window)
+    let found = found.filter(are_finite).ok_or_else(|| {
+        refused(
+            "force is zero throughout, or force or response has a value that is not finite (NaN, infinite) or whose square is too large; leave such records out",
+        )
+    })?;
+    averaged_arrays(py, &found, window)
+}
+
+/// Returns true if there is a force and all powers are finite. A single value that is not finite spreads over all lines.
+fn are_finite(averages: &AveragedSpectra) -> bool {
+    let is_finite = |powers: &Vec<f64>| powers.iter().all(|power| power.is_finite());
+    averages.force_power.as_ref().is_some_and(is_finite)
+        && averages.response_power.iter().all(is_finite)
 }
 
 /// Reads the name of a window.
@@ -137,26 +148,6 @@ struct Signals<'a> {
 }
 
 impl<'a> Signals<'a> {
-    /// Refuses values that are not finite: they would spread over all lines.
-    fn check(&self) -> Result<(), &'static str> {
-        const BLOCK: usize = 1 << 16;
-        let is_finite = |values: &[f64]| {
-            let blocks = values.par_chunks(BLOCK);
-            // Without an early end, so that the processor can check several values at a time.
-            blocks.all(|block| {
-                block
-                    .iter()
-                    .fold(true, |all, value| all & value.is_finite())
-            })
-        };
-        match is_finite(self.force) && is_finite(self.response) {
-            true => Ok(()),
-            false => Err(
-                "force or response has a value that is not finite (NaN or infinite); leave that record out",
-            ),
-        }
-    }
-
     /// Returns windowed copies of force and response; `None` of a window that changes nothing.
     fn windowed(&self, window: Window, rate: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         if window == Window::Rectangular {
@@ -217,9 +208,11 @@ fn averaged_arrays<'py>(
         dict.set_item(name, rows)?;
     }
     dict.set_item("response_power", lines(py, &averages.response_power)?)?;
-    let none = vec![0.0; averages.lines.points()];
-    let force_power = averages.force_power.clone().unwrap_or(none);
-    dict.set_item("force_power", force_power.into_pyarray(py))?;
+    let force_power = averages.force_power.clone();
+    dict.set_item(
+        "force_power",
+        force_power.map(|power| power.into_pyarray(py)),
+    )?;
     dict.set_item("averages", averages.taps)?;
     dict.set_item("window", window.name())?;
     dict.set_item("window_decay", window.added_decay())?;

@@ -39,11 +39,14 @@ impl Recording {
             time_unit,
             ..ReadSettings::default()
         };
+        // Errors of opening name the whole path, results the file.
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        let name = name.to_string_lossy().into_owned();
         let opened = work::run(py, None, move |_| {
             recording::Recording::open(&path, &settings)
         })?;
         let opened = opened.map_err(|error| errors::of_recording(py, &error))?;
-        Ok(Self(opened))
+        Ok(Self(opened.renamed(name)))
     }
 
     /// A recording of arrays: name, unit and samples of each channel. The samples are copied once.
@@ -70,7 +73,7 @@ impl Recording {
         Ok(Self(made))
     }
 
-    /// The file as it was named, or the name of a recording of arrays.
+    /// Name of the file without its folder, or the name of a recording of arrays.
     #[getter]
     fn name(&self) -> &str {
         self.0.name()

@@ -83,6 +83,12 @@ fn pool_of(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> 
     Ok(pool)
 }
 
+/// Leaves a pool to the work that was given up, so that later calls do not wait for its threads.
+fn give_up(pool: &Arc<ThreadPool>) {
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    kept.take_if(|kept| Arc::ptr_eq(&kept.pool, pool));
+}
+
 /// Runs short work on borrowed data, without Python's lock.
 ///
 /// # Errors
@@ -109,7 +115,8 @@ pub fn run<T: Send + 'static>(
     let cancel = Arc::new(Cancel::default());
     let (sender, receiver) = channel::<Result<T, Box<dyn Any + Send>>>();
     let watched = cancel.clone();
-    pool_of(py, threads)?.spawn(move || {
+    let pool = pool_of(py, threads)?;
+    pool.spawn(move || {
         let result = catch_unwind(AssertUnwindSafe(|| work(&watched)));
         // A caller that has given up takes no result.
         let _ = sender.send(result);
@@ -129,6 +136,7 @@ pub fn run<T: Send + 'static>(
         }
         if let Err(signal) = py.check_signals() {
             cancel.0.store(true, Ordering::Relaxed);
+            give_up(&pool);
             return Err(signal);
         }
     }

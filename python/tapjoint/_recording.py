@@ -49,7 +49,7 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """The file as it was named, or the name of a recording of arrays."""
+        """Name of the file without its folder, or the name of a recording of arrays."""
         return self._native.name
 
     @property

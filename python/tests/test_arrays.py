@@ -106,6 +106,8 @@ def prop_a_zoomed_band_has_the_lines_of_its_block(taps):
         ({"force": np.ones((2, 2048)) * 1j}, "complex"),
         ({"force": np.ones((3, 2048))}, "same"),
         ({"force": np.full((10, 2048), np.nan)}, "finite"),
+        ({"force": np.zeros((10, 2048))}, "zero throughout"),
+        ({"response": np.full((10, 2048), np.inf)}, "finite"),
         ({"force": np.ones((0, 2048)), "response": np.ones((0, 2048))}, "no samples"),
         ({"rate": 0.0}, "rate"),
         ({"rate": float("nan")}, "rate"),

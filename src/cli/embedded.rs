@@ -1,7 +1,7 @@
 //! Commands inside another program: nothing is printed, and the results come back as values.
 
 use super::terminal::{error_text, usage_text};
-use super::{Command, CommandLine, Outcome, parse, run_command, staging};
+use super::{Command, Outcome, parse, run_command, staging};
 use crate::description::TestDescription;
 use crate::pipeline::{RecordingResult, Stage, Watch, Work};
 use crate::report::document::Document;
@@ -67,7 +67,10 @@ pub fn call(
     let name = OsString::from("tapjoint");
     let (line, matches) = parse([name].into_iter().chain(arguments))
         .map_err(|usage| CallError::Usage(usage_text(&usage)))?;
-    refuse_unending(&line)?;
+    if matches!(line.command, Command::Watch(_)) {
+        let text = "`watch` ends with a signal and needs a terminal; call `run` again where a file has changed";
+        return Err(CallError::Usage(text.to_owned()));
+    }
     staging::ledger().written.clear();
     let session = Arc::new(Session {
         host,
@@ -81,17 +84,6 @@ pub fn call(
     let mut answer = mem::take(&mut *session.answer());
     answer.is_answered = outcome == Outcome::Answered;
     Ok(answer)
-}
-
-/// Refuses commands that go on until a signal ends them.
-fn refuse_unending(line: &CommandLine) -> Result<(), CallError> {
-    match &line.command {
-        Command::Watch(_) => Err(CallError::Usage(
-            "`watch` ends with a signal and needs a terminal; call `run` again where a file has changed"
-                .to_owned(),
-        )),
-        _ => Ok(()),
-    }
 }
 
 /// One call of a command.

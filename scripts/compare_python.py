@@ -72,7 +72,7 @@ def by_fast_fft(force, response):
 def by_pyfrf(force, response):
     import pyFRF
 
-    frf = pyFRF.FRF(RATE, exc=force, resp=response, exc_type="f", resp_type="a", window="none")
+    frf = pyFRF.FRF(int(RATE), exc=force, resp=response, exc_type="f", resp_type="a", window="none")
     return frf.get_FRF("H1", frf_form="accelerance")[0, 0], frf.get_coherence()[0]
 
 
@@ -94,9 +94,9 @@ def modes_by_tapjoint(frequency, response):
 
 
 def modes_by_pyema(frequency, response):
-    import pyEMA
+    from sdypy import EMA
 
-    model = pyEMA.Model(
+    model = EMA.Model(
         frf=response, freq=frequency, lower=LOWER, upper=UPPER, pol_order_high=ORDER, frf_form="accelerance"
     )
     # Progress bars and messages do not belong to the output.
@@ -172,7 +172,7 @@ def main():
 
     frequency, functions = accelerances()
     ways = {"tapjoint": modes_by_tapjoint}
-    if installed("pyEMA"):
+    if installed("sdypy.EMA"):
         ways["pyEMA"] = modes_by_pyema
     for name, way in ways.items():
         found, damping = way(frequency, functions)

@@ -33,6 +33,11 @@ pub fn lines<'py, T: numpy::Element + Clone>(
     flat.to_pyarray(py).reshape([rows.len(), points])
 }
 
+/// Records up to this number are one share of the work, which other threads cannot speed up.
+const FEW_RECORDS: usize = 8;
+/// Samples of responses that take less time than to wake a thread.
+const FEW_SAMPLES: usize = 1 << 15;
+
 /// Averages over tap records: frequency response functions, coherence and powers.
 ///
 /// `force` has the shape (records, samples), `response` (records, responses, samples); both are contiguous. `rate` in Hz,
@@ -92,7 +97,8 @@ pub fn average<'py>(
         samples,
         responses,
     };
-    let found = work::compute(py, threads, || {
+    let is_small = records <= FEW_RECORDS && records * responses * samples <= FEW_SAMPLES;
+    let found = work::compute(py, threads, is_small, || {
         let windowed = signals.windowed(window, rate);
         let signals = windowed
             .as_ref()
@@ -236,7 +242,6 @@ pub fn find_modes<'py>(
     order: usize,
     decay: f64,
     sub_bands: bool,
-    threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let refused = |text: &str| exception(py, Kind::Input, text);
     const MOST_ORDER: usize = 200;
@@ -266,14 +271,14 @@ pub fn find_modes<'py>(
         added_decay: decay,
         peaks: BandPeaks::EveryFunction,
     };
-    let found = work::compute(py, threads, || {
+    let found = py.detach(|| {
         let rows: Vec<Vec<&[Complex64]>> = values
             .chunks_exact(inputs * points)
             .map(|output| output.chunks_exact(points).collect())
             .collect();
         let matrix = ResponseMatrix::new(first, spacing, &rows)?;
         searched(&matrix, &settings, sub_bands)
-    })?;
+    });
     let (modes, searches) = found.map_err(|error| refused(&error.to_string()))?;
     let dict = mode_arrays(py, &modes)?;
     dict.set_item("poles", pole_arrays(py, &searches)?)?;

@@ -46,12 +46,18 @@ struct KeptPool {
 
 static KEPT: Mutex<Option<KeptPool>> = Mutex::new(None);
 
-/// Returns a pool with so many threads; `None` = one for each processor, or as RAYON_NUM_THREADS says.
-fn pool_of(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
+/// Checks a number of threads.
+fn check(py: Python<'_>, threads: Option<usize>) -> PyResult<()> {
     if threads.is_some_and(|count| !(1..=MOST_THREADS).contains(&count)) {
         let text = format!("threads: give 1 to {MOST_THREADS}, or None for one to each processor");
         return Err(exception(py, Kind::Input, &text));
     }
+    Ok(())
+}
+
+/// Returns a pool with so many threads; `None` = one for each processor, or as RAYON_NUM_THREADS says.
+fn pool_of(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
+    check(py, threads)?;
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let process = process::id();
     if let Some(known) = kept.as_ref()
@@ -89,15 +95,20 @@ fn give_up(pool: &Arc<ThreadPool>) {
     kept.take_if(|kept| Arc::ptr_eq(&kept.pool, pool));
 }
 
-/// Runs short work on borrowed data, without Python's lock.
+/// Runs short work on borrowed data, without Python's lock. Small work stays on the thread of the caller.
 ///
 /// # Errors
 /// A number of threads that is not allowed.
 pub fn compute<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
+    is_small: bool,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
+    if is_small {
+        check(py, threads)?;
+        return Ok(py.detach(work));
+    }
     let pool = pool_of(py, threads)?;
     Ok(py.detach(|| pool.install(work)))
 }

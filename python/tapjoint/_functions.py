@@ -99,7 +99,6 @@ class FrequencyResponses:
         order: int = 40,
         band: tuple[float, float] | None = None,
         sub_bands: bool = True,
-        threads: int | None = None,
     ) -> Modes:
         """Finds the modes of H1: :func:`tapjoint.modes` of these functions. The window's decay is taken out."""
         return modes(
@@ -109,7 +108,6 @@ class FrequencyResponses:
             band=band,
             window_decay=self.window_decay,
             sub_bands=sub_bands,
-            threads=threads,
         )
 
     def to_pandas(self) -> Any:
@@ -263,7 +261,6 @@ def modes(
     band: tuple[float, float] | None = None,
     window_decay: float = 0.0,
     sub_bands: bool = True,
-    threads: int | None = None,
 ) -> Modes:
     """Finds the modes of frequency response functions by the polyreference estimator.
 
@@ -276,7 +273,6 @@ def modes(
         band: Lowest and highest frequency that is used (Hz); default: all lines.
         window_decay: Decay (1/s) of an exponential window, which is taken out.
         sub_bands: Search narrow bands about peaks as well; close modes need them.
-        threads: Number of threads; default: one for each processor.
 
     Raises:
         InputError: Shapes that differ, lines that are not equally spaced, values that are not finite, too few lines.
@@ -300,9 +296,7 @@ def modes(
     deviation = np.abs(axis - (axis[0] + spacing * np.arange(len(axis)))).max()
     if not deviation <= 1e-3 * abs(spacing):
         raise InputError("frequency: the lines are not equally spaced; give equally spaced ones")
-    found = _native.find_modes(
-        values, float(axis[0]), spacing, order, window_decay, sub_bands, threads
-    )
+    found = _native.find_modes(values, float(axis[0]), spacing, order, window_decay, sub_bands)
     return Modes(**found)
 
 

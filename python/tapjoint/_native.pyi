@@ -106,5 +106,4 @@ def find_modes(
     order: int,
     decay: float,
     sub_bands: bool,
-    threads: int | None,
 ) -> dict[str, Any]: ...

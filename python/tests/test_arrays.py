@@ -149,7 +149,7 @@ def recover_modes_of_functions(sub_bands):
     assert found.shape.shape == (5, 6) and found.participation.shape == (5, 1)
     assert set(found.poles) == {"order", "frequency", "damping", "stable"}
     strided = np.asfortranarray(response)
-    again = tapjoint.modes(list(axis), strided, sub_bands=sub_bands, threads=1)
+    again = tapjoint.modes(list(axis), strided, sub_bands=sub_bands)
     assert np.array_equal(again.pole, found.pole)
 
 

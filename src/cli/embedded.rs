@@ -158,7 +158,7 @@ half_line = 0.125
     fn recover_a_joint_from_a_description_in_memory() {
         let answer = called(&["identify", "bar.toml"]).unwrap();
         assert!(answer.is_answered);
-        let estimate = answer.document.unwrap().estimate.unwrap();
+        let estimate = answer.document.unwrap().estimate.flatten().unwrap();
         assert_eq!(estimate.modes_used, [1, 2, 3, 4, 5]);
         assert!(answer.text.contains("Kr"), "{}", answer.text);
     }

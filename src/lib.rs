@@ -66,6 +66,7 @@
 //! [`run_test`] analyses a test that a `test.toml` describes, with the uncertainties of the estimate.
 //! [`diagnose_test`] then finds such a missing mass.
 
+pub mod cli;
 pub mod notation;
 pub mod references;
 

@@ -1,8 +1,5 @@
-//! The command line of tapjoint: arguments in, exit code out. Everything else is in the library
-//! and in `cli`.
-
-mod cli;
+//! The command line of tapjoint: arguments in, exit code out. Everything else is in the library.
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    tapjoint::cli::run(std::env::args_os()).into()
 }

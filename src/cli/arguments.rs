@@ -1,23 +1,23 @@
 //! Arguments that several commands share, and the parsers of their values.
 
+use crate::compare::REPEATABILITY_LIMITS;
+use crate::description::{
+    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
+    SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
+};
+use crate::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
+use crate::quantity::{Dimension, parse_quantity};
+use crate::recording::{
+    ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns, VariableRole, Variables,
+};
+use crate::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
+use crate::structure::{JointStiffness, MEASURED_LIMIT};
+use crate::taps::TapSettings;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tapjoint::compare::REPEATABILITY_LIMITS;
-use tapjoint::description::{
-    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
-    SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
-};
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
-use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::recording::{
-    ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns, VariableRole, Variables,
-};
-use tapjoint::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
-use tapjoint::structure::{JointStiffness, MEASURED_LIMIT};
-use tapjoint::taps::TapSettings;
 
 /// Choice of how much is printed.
 #[derive(Debug, Args)]

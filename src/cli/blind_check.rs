@@ -7,6 +7,14 @@ use super::overwrite::{CHECKSUMS, Expanded};
 use super::publication::{OutputFolder, files_made_in};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::TestDescription;
+use crate::gap::{Diagnosis, GapSettings};
+use crate::pipeline::{IdentifySettings, Stage, Work, diagnose_test, run_test};
+use crate::report::blind_check::{render_blind_check, score_json};
+use crate::study::blind_check::{
+    Answer, Campaign, Case, Conduct, DrawnTest, Extent, RecordedTest, Truth, TruthFile, commitment,
+    parse_truths, render_rows, rows, score,
+};
 use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -15,14 +23,6 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tapjoint::description::TestDescription;
-use tapjoint::gap::{Diagnosis, GapSettings};
-use tapjoint::pipeline::{IdentifySettings, Stage, Work, diagnose_test, run_test};
-use tapjoint::report::blind_check::{render_blind_check, score_json};
-use tapjoint::study::blind_check::{
-    Answer, Campaign, Case, Conduct, DrawnTest, Extent, RecordedTest, Truth, TruthFile, commitment,
-    parse_truths, render_rows, rows, score,
-};
 
 /// Measure how often the diagnosis is right, on virtual tests.
 ///
@@ -222,7 +222,7 @@ fn drawn(
             truth
         })
         .collect::<Result<Vec<Truth>, _>>()?;
-    let sealed = tapjoint::report::blind_check::truths_json(&truths)?;
+    let sealed = crate::report::blind_check::truths_json(&truths)?;
     let commitment = commitment(&sealed);
     terminal.seal(&format!(
         "{} tests drawn; SHA-256 of truth.json: {commitment}",

@@ -2,6 +2,9 @@
 
 use super::output::failed;
 use super::terminal::Terminal;
+use crate::description::TestDescription;
+use crate::recording::{WavFormat, encode_wav};
+use crate::study::blind_check::RecordedTest;
 use anyhow::{Context, bail};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -10,9 +13,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use tapjoint::description::TestDescription;
-use tapjoint::recording::{WavFormat, encode_wav};
-use tapjoint::study::blind_check::RecordedTest;
 
 /// Number of tests that are diagnosed again under other names.
 pub(super) const AGAIN: usize = 3;

@@ -7,20 +7,20 @@ use super::input::{TestFile, read_test};
 use super::publication::OutputFolder;
 use super::simulate::SIDES;
 use super::terminal::Terminal;
+use crate::compare::{Pair, Settings, Test, compare};
+use crate::description::TestDescription;
+use crate::pipeline::{IdentifySettings, Stage, Work, compared_items, compared_test};
+use crate::report::change_check::{pair_score_json, render_change_check};
+use crate::study::blind_check::{RecordedTest, commitment, render_rows};
+use crate::study::change_check::{
+    DrawnPair, PairAnswer, PairCampaign, PairCase, PairConduct, PairTruth, PairTruthFile,
+    pair_rows, pair_truths_json, parse_pair_truths, score_pairs,
+};
 use anyhow::{Context, anyhow, bail};
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tapjoint::compare::{Pair, Settings, Test, compare};
-use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{IdentifySettings, Stage, Work, compared_items, compared_test};
-use tapjoint::report::change_check::{pair_score_json, render_change_check};
-use tapjoint::study::blind_check::{RecordedTest, commitment, render_rows};
-use tapjoint::study::change_check::{
-    DrawnPair, PairAnswer, PairCampaign, PairCase, PairConduct, PairTruth, PairTruthFile,
-    pair_rows, pair_truths_json, parse_pair_truths, score_pairs,
-};
 
 pub(super) fn run(
     arguments: &BlindCheckArguments,

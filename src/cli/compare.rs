@@ -9,21 +9,21 @@ use super::place::is_description;
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::compare::{
+    LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
+};
+use crate::pipeline::{
+    IdentifySettings, RecordingResult, Stage, TestedStructure, Warning, Work, compared_test,
+};
+use crate::report::document::{Document, PairFiles};
+use crate::report::{
+    ComparedRecordings, compared_files, comparison_of, draw_compared, earlier_files,
+    render_comparison_picture, render_series_csv, series_of,
+};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use std::mem;
 use std::path::{Path, PathBuf, absolute};
-use tapjoint::compare::{
-    LEAST_SERIES, MOST_PAIRS, MOST_REPEATS, MOST_SERIES, Pair, Settings, Test, compare, watch,
-};
-use tapjoint::pipeline::{
-    IdentifySettings, RecordingResult, Stage, TestedStructure, Warning, Work, compared_test,
-};
-use tapjoint::report::document::{Document, PairFiles};
-use tapjoint::report::{
-    ComparedRecordings, compared_files, comparison_of, draw_compared, earlier_files,
-    render_comparison_picture, render_series_csv, series_of,
-};
 
 /// Say what changed between two tests, or in a series of tests.
 ///

@@ -9,14 +9,14 @@ use super::input::{TestFile, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::TestDescription;
+use crate::gap::{Diagnosis, GapSettings, Verdict};
+use crate::pipeline::{Analysis, IdentifySettings, Stage, Work, diagnose_test};
+use crate::report::document::{GapSection, UpdatedModelSection};
+use crate::report::{MODEL_FILE, document_of, gap_section};
+use crate::study::updated_model::{described_frequencies, updated_model};
 use clap::Args;
 use std::path::PathBuf;
-use tapjoint::description::TestDescription;
-use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
-use tapjoint::pipeline::{Analysis, IdentifySettings, Stage, Work, diagnose_test};
-use tapjoint::report::document::{GapSection, UpdatedModelSection};
-use tapjoint::report::{MODEL_FILE, document_of, gap_section};
-use tapjoint::study::updated_model::{described_frequencies, updated_model};
 
 /// Find the cause of the gap between model and measurement.
 ///
@@ -85,6 +85,7 @@ pub(super) fn run(
         }
     }
     drop(work);
+    terminal.keep(&analysis);
     terminal.answer(&document, None, &arguments.full)?;
     terminal.write_document(&document)?;
     Ok(Outcome::of(diagnosis.is_ok()))

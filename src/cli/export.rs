@@ -5,19 +5,19 @@ use super::input::{TestFile, effect_at, read_model};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::TestDescription;
+use crate::pipeline::{IdentifySettings, tested_structure};
+use crate::report::deck::{
+    Deck, DeckError, DeckSource, LONGEST_REPORT, USUAL_FREQUENCIES, deck_of, deck_with_effects,
+    doubts_of, render_abaqus, render_nastran, source_in_report, source_of,
+};
+use crate::structure::Assembly;
+use crate::study::updated_model::described_structure;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tapjoint::description::TestDescription;
-use tapjoint::pipeline::{IdentifySettings, tested_structure};
-use tapjoint::report::deck::{
-    Deck, DeckError, DeckSource, LONGEST_REPORT, USUAL_FREQUENCIES, deck_of, deck_with_effects,
-    doubts_of, render_abaqus, render_nastran, source_in_report, source_of,
-};
-use tapjoint::structure::Assembly;
-use tapjoint::study::updated_model::described_structure;
 
 /// Write beam and joint as input of a finite-element program.
 ///

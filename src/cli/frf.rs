@@ -12,17 +12,17 @@ use super::place::is_description;
 use super::recording::{analyse, holds_functions, refuse_given};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
-use anyhow::bail;
-use clap::Args;
-use std::path::{Path, PathBuf};
-use tapjoint::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
-use tapjoint::pipeline::{
+use crate::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
+use crate::pipeline::{
     Analysis, Frf, FrfSettings, IdentifySettings, MeasureSettings, Response, Stage, Watch, Wiring,
     Work, frfs_of, run_wired, si_unit,
 };
-use tapjoint::recording::{Recording, UffFormat};
-use tapjoint::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
-use tapjoint::spectral::FrfEstimator;
+use crate::recording::{Recording, UffFormat};
+use crate::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
+use crate::spectral::FrfEstimator;
+use anyhow::bail;
+use clap::Args;
+use std::path::{Path, PathBuf};
 
 /// Compute frequency response functions with their coherence.
 ///

@@ -8,13 +8,13 @@ use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::MeasuredFrequencies;
+use crate::pipeline::{EstimateMethod, IdentifySettings, Stage, Work};
+use crate::report::{document_of, render_cloud_picture, render_perturbation_csv};
 use anyhow::bail;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::MeasuredFrequencies;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work};
-use tapjoint::report::{document_of, render_cloud_picture, render_perturbation_csv};
 
 /// Estimate joint stiffness from natural frequencies alone.
 #[derive(Debug, Args)]
@@ -119,6 +119,7 @@ pub(super) fn identify(
         &terminal.measuring(file.test.recordings.len()),
     )?;
     let document = document_of(&analysis);
+    terminal.keep(&analysis);
     terminal.answer(&document, None, &arguments.full)?;
     terminal.write_document(&document)?;
     Ok(Outcome::of_analysis(&analysis))

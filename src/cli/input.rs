@@ -1,14 +1,14 @@
 //! Reading test descriptions from files.
 
 use super::terminal::Terminal;
+use crate::description::{FreeTestFile, TestDescription};
+use crate::pipeline::{
+    Analysis, FreeTest, IdentifySettings, Watch, measure_free_test, run_test_watched,
+};
+use crate::study::updated_model::DescribedEffectError;
 use anyhow::{Context, anyhow, bail};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
-use tapjoint::description::{FreeTestFile, TestDescription};
-use tapjoint::pipeline::{
-    Analysis, FreeTest, IdentifySettings, Watch, measure_free_test, run_test_watched,
-};
-use tapjoint::study::updated_model::DescribedEffectError;
 
 /// No description of a free bar is larger (bytes).
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
@@ -47,10 +47,8 @@ pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<Test
 /// The file cannot be read, is no UTF-8 text, or is no valid description.
 pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let name = path.display().to_string();
-    let remedy = "give the path of a test description; `tapjoint init` prints one";
-    let bytes =
-        fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
-    let test = parse(bytes, &name)?;
+    let text = read_text(path, terminal)?;
+    let test = TestDescription::parse(&text, &name)?;
     for warning in &test.warnings {
         terminal.warn(&warning.to_string());
     }
@@ -58,9 +56,25 @@ pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<Tes
     Ok(TestFile { test, name, folder })
 }
 
-/// Returns the description in the bytes of a file of this name.
-fn parse(bytes: Vec<u8>, name: &str) -> anyhow::Result<TestDescription> {
-    let text = String::from_utf8(bytes).map_err(|error| {
+/// Returns the text of a description: that of a file, or one that the calling program holds.
+///
+/// # Errors
+/// The file cannot be read, or is no UTF-8 text.
+pub(super) fn read_text(path: &Path, terminal: &Terminal) -> anyhow::Result<String> {
+    let session = terminal.session();
+    if let Some(text) = session.and_then(|session| session.text_of(path)) {
+        return Ok(text.to_owned());
+    }
+    let name = path.display().to_string();
+    let remedy = "give the path of a test description; `tapjoint init` prints one";
+    let bytes =
+        fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
+    text_of(bytes, &name)
+}
+
+/// Returns the text in the bytes of a description of this name.
+fn text_of(bytes: Vec<u8>, name: &str) -> anyhow::Result<String> {
+    String::from_utf8(bytes).map_err(|error| {
         let good = error
             .as_bytes()
             .get(..error.utf8_error().valid_up_to())
@@ -69,8 +83,7 @@ fn parse(bytes: Vec<u8>, name: &str) -> anyhow::Result<TestDescription> {
         anyhow!(
             "{name}:{line}: not UTF-8 text; a test description is a text file; give the path of one; `tapjoint init` prints one"
         )
-    })?;
-    Ok(TestDescription::parse(&text, name)?)
+    })
 }
 
 /// Returns the error of a described effect with its file and line.
@@ -135,7 +148,8 @@ impl TestFile {
         }
         let bytes = fs::read(&path).map_err(|cause| unreadable(cause.to_string()))?;
         let name = path.display().to_string();
-        let test = parse(bytes, &name)?;
+        let text = text_of(bytes, &name)?;
+        let test = TestDescription::parse(&text, &name)?;
         named.check(&self.name, &self.test, &test)?;
         test.check_has_data(&name)?;
         let folder = path.parent().map(Path::to_owned).unwrap_or_default();

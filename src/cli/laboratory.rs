@@ -1,11 +1,11 @@
 //! The laboratory of a virtual test: its options, and its description for the terminal.
 
 use super::arguments::words;
+use crate::quantity::{Dimension, parse_quantity};
+use crate::simulate::{AntiAlias, Damping, Laboratory, MOST_RATE, Tip};
 use anyhow::bail;
 use clap::builder::{RangedU64ValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::simulate::{AntiAlias, Damping, Laboratory, MOST_RATE, Tip};
 
 /// Returns the parts of the laboratory with their values, `off` for a part that is left out.
 pub(super) fn laboratory_lines(laboratory: &Laboratory) -> Vec<(&'static str, String)> {

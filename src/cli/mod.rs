@@ -21,6 +21,7 @@ mod blind_tests;
 mod change_check;
 mod compare;
 mod diagnose;
+mod embedded;
 mod export;
 mod frf;
 mod identify;
@@ -32,18 +33,21 @@ mod run;
 mod simulate;
 mod watch;
 
+pub use embedded::{Answer, CallError, Host, call};
+
+use crate::description::TestDescription;
+use crate::pipeline::Analysis;
+use crate::report::render_timings;
 use arguments::CommonArguments;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use embedded::Session;
 use overwrite::{Expanded, Files, described};
 use place::is_description;
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
-use tapjoint::description::TestDescription;
-use tapjoint::pipeline::Analysis;
-use tapjoint::report::render_timings;
 use terminal::Terminal;
 use timings::{Stopwatch, TimingsArguments};
 
@@ -118,17 +122,13 @@ impl Outcome {
     }
 }
 
-/// Reads the arguments, runs the command, reports errors, and returns the exit code.
-pub(super) fn main() -> ExitCode {
-    let parsed = program::grouped::<CommandLine>()
-        .try_get_matches()
-        .and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
-    let (line, matches) = match parsed {
+/// Reads the arguments, the program's name first, runs the command, reports errors, and returns the exit code.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let (line, matches) = match parse(arguments) {
         Ok(parsed) => parsed,
         Err(usage) => {
-            let usage = program::with_suggestion(usage, &CommandLine::command());
             terminal::print_usage(&usage);
-            return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
+            return u8::try_from(usage.exit_code()).unwrap_or(2);
         }
     };
     let ready = staging::watch_signals().map_err(Into::into);
@@ -140,13 +140,26 @@ pub(super) fn main() -> ExitCode {
         _ => timed(&line, &matches),
     });
     match outcome {
-        Ok(Outcome::Answered) => ExitCode::SUCCESS,
-        Ok(Outcome::NoAnswer) => ExitCode::from(1),
+        Ok(Outcome::Answered) => 0,
+        Ok(Outcome::NoAnswer) => 1,
         Err(error) => {
             terminal::print_error(&error);
-            ExitCode::from(2)
+            2
         }
     }
+}
+
+/// Reads the arguments, the program's name first.
+///
+/// # Errors
+/// They make no command, or ask for help.
+fn parse(
+    arguments: impl IntoIterator<Item = OsString>,
+) -> Result<(CommandLine, ArgMatches), clap::Error> {
+    program::grouped::<CommandLine>()
+        .try_get_matches_from(arguments)
+        .and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)))
+        .map_err(|usage| program::with_suggestion(usage, &CommandLine::command()))
 }
 
 /// Runs the command, and prints what it took where that was asked for.
@@ -156,7 +169,7 @@ fn timed(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
     let stopwatch = timings
         .is_some_and(|given| given.timings)
         .then(|| Arc::new(Stopwatch::start()));
-    let outcome = run_command(line, matches, stopwatch.clone());
+    let outcome = run_command(line, matches, stopwatch.clone(), None);
     if let Some(stopwatch) = stopwatch.filter(|_| outcome.is_ok() && !line.common.quiet) {
         let _ = write!(
             io::stderr(),
@@ -176,10 +189,12 @@ fn timed(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
     outcome
 }
 
+/// Runs the command; `session` is the program that it runs in, if that is another one.
 fn run_command(
     line: &CommandLine,
     matches: &ArgMatches,
     stopwatch: Option<Arc<Stopwatch>>,
+    session: Option<Arc<Session>>,
 ) -> anyhow::Result<Outcome> {
     // The files that the command reads and writes, from its arguments and its test description.
     let mut files = Files::default();
@@ -193,7 +208,9 @@ fn run_command(
         }
         let description = named.first().map(PathBuf::as_path);
         let description = description.filter(|path| test.is_some() || is_description(path));
-        let test = description.and_then(described);
+        let given = session.as_deref().zip(description);
+        let given = given.and_then(|(session, path)| session.described(path));
+        let test = given.or_else(|| description.and_then(described));
         let expanded = line.command.expanded(test.as_ref());
         // `simulate` writes the recordings that the description names.
         let read = description.zip(test.as_ref());
@@ -205,7 +222,7 @@ fn run_command(
         publication::end_begun(folder, &files)?;
     }
     files.check()?;
-    let terminal = Terminal::new(&line.common, files, stopwatch)?;
+    let terminal = Terminal::new(&line.common, files, stopwatch, session)?;
     let seed = line.common.seed;
     match &line.command {
         Command::Run(arguments) => run::run(arguments, false, seed, terminal),

@@ -6,12 +6,12 @@
 use super::overwrite::{is_free, signed};
 use super::place::{folder_of, resolved};
 use super::staging::{TemporaryFile, ledger};
+use crate::report::picture::PictureFormat;
 use anyhow::{anyhow, bail};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-use tapjoint::report::picture::PictureFormat;
 
 /// Returns the error of an output for which nothing may be created in its folder.
 pub(super) fn not_writable(path: &Path, folder: &Path, cause: &io::Error) -> anyhow::Error {

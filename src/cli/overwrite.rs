@@ -9,6 +9,8 @@
 
 use super::arguments::JsonDestination;
 use super::place::{Place, folder_of, is_description};
+use crate::description::TestDescription;
+use crate::report::VERSION_HEAD;
 use anyhow::bail;
 use clap::ArgMatches;
 use serde_json::Value;
@@ -18,8 +20,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use tapjoint::description::TestDescription;
-use tapjoint::report::VERSION_HEAD;
 
 /// Options that name an output; all other paths are inputs.
 const OUTPUTS: [&str; 8] = [

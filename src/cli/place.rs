@@ -1,9 +1,9 @@
 //! Where a path leads: through links, `..` and hard links, also where nothing is there yet.
 
+use crate::report::earlier_files;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use tapjoint::report::earlier_files;
 
 /// Links that are followed one after the other.
 const LINKS: usize = 40;

@@ -6,15 +6,15 @@ use super::input::read_test;
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::JointModel;
+use crate::pipeline::{Stage, Work};
+use crate::report::blind_check::{render_confusion_picture, score_json, tell_apart};
+use crate::study::blind_check::{Conduct, score};
+use crate::study::plan::{PlanSettings, judge_plan};
 use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::JointModel;
-use tapjoint::pipeline::{Stage, Work};
-use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
-use tapjoint::study::blind_check::{Conduct, score};
-use tapjoint::study::plan::{PlanSettings, judge_plan};
 
 /// Show which effects a planned test could distinguish.
 ///

@@ -4,16 +4,16 @@ use super::Outcome;
 use super::arguments::{StiffnessArguments, assembly};
 use super::input::{TestFile, effect_at, read_model};
 use super::terminal::Terminal;
+use crate::identify::predict_lambdas;
+use crate::pipeline::{TestedStructure, predict_described, structure_details, tested_structure};
+use crate::report::document::{Document, PredictionSection};
+use crate::report::{lambdas_of, prediction_of};
+use crate::structure::{Assembly, JointStiffness, MODE_LIMIT};
+use crate::study::updated_model::described_frequencies;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::identify::predict_lambdas;
-use tapjoint::pipeline::{TestedStructure, predict_described, structure_details, tested_structure};
-use tapjoint::report::document::{Document, PredictionSection};
-use tapjoint::report::{lambdas_of, prediction_of};
-use tapjoint::structure::{Assembly, JointStiffness, MODE_LIMIT};
-use tapjoint::study::updated_model::described_frequencies;
 
 /// Predict the natural frequencies of a beam with a known joint.
 ///

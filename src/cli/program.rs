@@ -7,6 +7,11 @@ use super::arguments::assembly;
 use super::overwrite::Expanded;
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
+use crate::description::{Assembly, FoundContent, runnable_template, template_of};
+use crate::pipeline::look_at;
+use crate::report::document::VERSION;
+use crate::report::render_reproduction;
+use crate::study::publication::reproduce;
 use anyhow::bail;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Command, CommandFactory};
@@ -14,11 +19,6 @@ use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use tapjoint::description::{Assembly, FoundContent, runnable_template, template_of};
-use tapjoint::pipeline::look_at;
-use tapjoint::report::document::VERSION;
-use tapjoint::report::render_reproduction;
-use tapjoint::study::publication::reproduce;
 
 /// Tasks and their commands. A test makes sure that every command has its task; one that had none would stand under the last.
 const TASKS: &[(&str, &[&str])] = &[

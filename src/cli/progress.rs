@@ -1,11 +1,11 @@
 //! The line that shows on a terminal that the work goes on, with the time that is left.
 
+use crate::pipeline::{Stage, Watch};
 use std::io::{self, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
-use tapjoint::pipeline::{Stage, Watch};
 
 /// Time before the line appears: shorter work shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -10,12 +10,12 @@ use super::output::{failed, not_writable};
 use super::overwrite::{CHECKSUMS, Files, carries_mark, checksum_list, signed};
 use super::place::{or_here, resolved};
 use super::staging::{JOURNAL, Ledger, NEW, OLD, PREFIX, Staging, ledger, leftovers, sweep_files};
+use crate::report::earlier_files;
 use anyhow::{anyhow, bail};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Component, Path, PathBuf};
-use tapjoint::report::earlier_files;
 
 /// A folder of results that is filled aside and published at the end.
 #[derive(Debug)]

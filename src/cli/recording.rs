@@ -9,22 +9,22 @@ use super::input::{check_file, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::ReadBy;
+use crate::pipeline::{
+    Analysis, FunctionSettings, MeasureSettings, RecordingResult, Stage, Watch, Work,
+    analysis_of_bare, inspect_bare, measure_bare_watched, measure_functions_watched, together,
+};
+use crate::recording::{
+    RecordingError, is_universal_file, list_datasets, open_frequency_responses,
+};
+use crate::report::{
+    datasets_of, document_of, functions_of, inspection_of, render_spectrum_csv,
+    render_spectrum_picture,
+};
 use anyhow::{bail, ensure};
 use clap::Args;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use tapjoint::description::ReadBy;
-use tapjoint::pipeline::{
-    Analysis, FunctionSettings, MeasureSettings, RecordingResult, Stage, Watch, Work,
-    analysis_of_bare, inspect_bare, measure_bare_watched, measure_functions_watched, together,
-};
-use tapjoint::recording::{
-    RecordingError, is_universal_file, list_datasets, open_frequency_responses,
-};
-use tapjoint::report::{
-    datasets_of, document_of, functions_of, inspection_of, render_spectrum_csv,
-    render_spectrum_picture,
-};
 
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
 ///

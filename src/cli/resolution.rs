@@ -6,18 +6,18 @@ use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::{ReadBy, WindowKind};
+use crate::pipeline::{IdentifySettings, Stage, TestedStructure, Watch, Work, tested_structure};
+use crate::quantity::{Dimension, parse_quantity};
+use crate::report::{
+    prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
+};
+use crate::structure::{Assembly, JointStiffness};
+use crate::study::resolution::{ResolutionSettings, StudiedTest, study_resolution};
 use anyhow::{bail, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::{ReadBy, WindowKind};
-use tapjoint::pipeline::{IdentifySettings, Stage, TestedStructure, Watch, Work, tested_structure};
-use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::report::{
-    prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
-};
-use tapjoint::structure::{Assembly, JointStiffness};
-use tapjoint::study::resolution::{ResolutionSettings, StudiedTest, study_resolution};
 
 /// Show how resolution limits frequencies and joint stiffness.
 ///

@@ -12,20 +12,20 @@ use super::publication::OutputFolder;
 use super::recording::{analyse, analyse_together};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+use crate::description::{ReadBy, TestDescription};
+use crate::gap::GapSettings;
+use crate::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
+use crate::recording::{MOST_FILES, ReadSettings};
+use crate::report::document::{FileSection, SheetSection};
+use crate::report::{
+    EXCHANGED, MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, exchange_files,
+    gap_section, run_files, watched_files,
+};
 use anyhow::{Context, bail};
 use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::slice::from_ref;
-use tapjoint::description::{ReadBy, TestDescription};
-use tapjoint::gap::GapSettings;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
-use tapjoint::recording::{MOST_FILES, ReadSettings};
-use tapjoint::report::document::{FileSection, SheetSection};
-use tapjoint::report::{
-    EXCHANGED, MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, exchange_files,
-    gap_section, run_files, watched_files,
-};
 
 /// Analyse a test, from recordings to joint, and write a report.
 ///
@@ -328,7 +328,10 @@ pub(super) fn run(
             folder.display()
         ));
     }
-    let output = OutputFolder::prepare(&folder, terminal.files())?;
+    // Another program gets values, and a report where it names a folder.
+    let is_written = terminal.session().is_none() || arguments.out.is_some();
+    let output = is_written.then(|| OutputFolder::prepare(&folder, terminal.files()));
+    let output = output.transpose()?;
     let summed = match arguments.sheet {
         true => Some(summed_files(subject.files(), described.as_ref())?),
         false => None,
@@ -379,6 +382,12 @@ pub(super) fn run(
         document.add_gap(gap);
     }
     drop(measuring);
+    terminal.keep(&analysis);
+    let Some(output) = output else {
+        terminal.answer(&document, None, &arguments.full)?;
+        terminal.write_document(&document)?;
+        return Ok(Outcome::of_analysis(&analysis));
+    };
     let mut work = Work::begin(terminal.watch(), Stage::Pictures);
     let drawn = draw_run(&document, &analysis.recordings)?;
     work.go_on(Stage::Files);

@@ -2,12 +2,23 @@
 
 use super::Outcome;
 use super::arguments::{StiffnessArguments, percent, repeatability};
-use super::input::{effect_at, read_model};
+use super::input::{effect_at, read_model, read_text};
 use super::laboratory::{LaboratoryArguments, laboratory_lines};
 use super::overwrite::{CHECKSUMS, Expanded, listed_files};
 use super::publication::OutputFolder;
 use super::terminal::{Terminal, screen};
 use super::timings::TimingsArguments;
+use crate::description::TestDescription;
+use crate::effects::{Effect, EffectDimension, EffectId};
+use crate::quantity::{Dimension, parse_quantity};
+use crate::recording::{WavFormat, WavLayout, WavStream};
+use crate::report::format::with_minus_signs;
+use crate::simulate::{
+    Change, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest, nominal_description,
+    plan_test, truth_of, wav_name,
+};
+use crate::study::change_check::PlantedChange;
+use crate::study::updated_model::described_effects;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use rand::{Rng, SeedableRng};
@@ -18,17 +29,6 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tapjoint::description::TestDescription;
-use tapjoint::effects::{Effect, EffectDimension, EffectId};
-use tapjoint::quantity::{Dimension, parse_quantity};
-use tapjoint::recording::{WavFormat, WavLayout, WavStream};
-use tapjoint::report::format::with_minus_signs;
-use tapjoint::simulate::{
-    Change, Laboratory, TestPlan, Truth, VirtualRecording, VirtualTest, nominal_description,
-    plan_test, truth_of, wav_name,
-};
-use tapjoint::study::change_check::PlantedChange;
-use tapjoint::study::updated_model::described_effects;
 
 const EXAMPLES: &str = "Examples:
   tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g
@@ -273,8 +273,7 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let file = read_model(&arguments.test, &terminal)?;
-    let text = fs::read_to_string(&arguments.test)
-        .with_context(|| format!("{}: cannot be read", file.name))?;
+    let text = read_text(&arguments.test, &terminal)?;
     let given = arguments.stiffness.given(file.test.joint.kind)?;
     let laboratory = arguments.laboratory.resolve()?;
     if !arguments.changes.is_empty() {

@@ -1,21 +1,22 @@
 //! Output to standard output, standard error and `--json`.
 
 use super::arguments::{CommonArguments, FullAnswer, JsonDestination};
+use super::embedded::Session;
 use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
 use super::progress::{Measuring, time_left};
 use super::staging::ledger;
 use super::timings::Stopwatch;
+use crate::pipeline::{Analysis, Watch};
+use crate::report::document::{Document, TimingsSection};
+use crate::report::{
+    MOST_LINES, Screen, render_answer, render_json, render_readings, render_stages, render_text,
+};
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use tapjoint::pipeline::Watch;
-use tapjoint::report::document::{Document, TimingsSection};
-use tapjoint::report::{
-    MOST_LINES, Screen, render_answer, render_json, render_readings, render_stages, render_text,
-};
 
 /// Destinations of a command's output.
 #[derive(Debug)]
@@ -25,6 +26,8 @@ pub(super) struct Terminal {
     quiet: bool,
     verbose: u8,
     stopwatch: Option<Arc<Stopwatch>>,
+    /// The program that the command runs in; it takes what would be printed.
+    session: Option<Arc<Session>>,
     start: Instant,
 }
 
@@ -41,6 +44,7 @@ impl Terminal {
         common: &CommonArguments,
         files: Files,
         stopwatch: Option<Arc<Stopwatch>>,
+        session: Option<Arc<Session>>,
     ) -> anyhow::Result<Self> {
         let json = match &common.json {
             None => None,
@@ -53,6 +57,7 @@ impl Terminal {
             quiet: common.quiet,
             verbose: common.verbose,
             stopwatch,
+            session,
             start: Instant::now(),
         })
     }
@@ -64,10 +69,16 @@ impl Terminal {
 
     /// Returns the receiver of the stages of the work.
     pub(super) fn watch(&self) -> &dyn Watch {
-        match &self.stopwatch {
-            Some(stopwatch) => stopwatch.as_ref(),
-            None => &(),
+        match (&self.session, &self.stopwatch) {
+            (Some(session), _) => session.watch(),
+            (None, Some(stopwatch)) => stopwatch.as_ref(),
+            (None, None) => &(),
         }
+    }
+
+    /// Returns the program that the command runs in; `None` on a terminal.
+    pub(super) fn session(&self) -> Option<&Session> {
+        self.session.as_deref()
     }
 
     /// Returns what the stages took until now; `None` without `--timings`.
@@ -78,6 +89,10 @@ impl Terminal {
 
     /// Prints an answer, unless `--quiet` is given or JSON goes to standard output.
     pub(super) fn say(&self, text: &str) -> io::Result<()> {
+        if let Some(session) = &self.session {
+            session.answer().text.push_str(text);
+            return Ok(());
+        }
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             return Ok(());
         }
@@ -89,7 +104,8 @@ impl Terminal {
 
     /// Prints a text that must appear before the work begins: on standard error if `say` would not print it.
     pub(super) fn seal(&self, text: &str) -> io::Result<()> {
-        if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
+        let is_silent = self.session.is_none() && self.quiet;
+        if is_silent || matches!(self.json, Some(Json::StandardOutput)) {
             let _ = writeln!(io::stderr(), "{text}");
         }
         self.say(text)
@@ -98,12 +114,20 @@ impl Terminal {
     /// Receives the stages of the recordings that are measured; `recordings` is their number. A terminal shows the time that
     /// is left, until the returned value is dropped.
     pub(super) fn measuring(&self, recordings: usize) -> Measuring<'_> {
-        Measuring::begin(recordings, self.watch(), self.quiet)
+        Measuring::begin(
+            recordings,
+            self.watch(),
+            self.quiet || self.session.is_some(),
+        )
     }
 
     /// Prints a warning on standard error, unless `--quiet` is given. If standard error cannot be written
     /// to, there is no way to report it.
     pub(super) fn warn(&self, text: &str) {
+        if let Some(session) = &self.session {
+            session.answer().warnings.push(text.to_owned());
+            return;
+        }
         if self.quiet {
             return;
         }
@@ -120,6 +144,10 @@ impl Terminal {
 
     /// Shows the progress of a long task on a terminal, at every percent, with the time that is left.
     pub(super) fn count(&self, doing: &str, done: usize, of: usize) {
+        if let Some(session) = &self.session {
+            session.goes_on();
+            return;
+        }
         let mut error = io::stderr();
         let [now, before] = [done, done.saturating_sub(1)].map(|steps| 100 * steps / of.max(1));
         if self.quiet || now == before || !error.is_terminal() {
@@ -133,7 +161,10 @@ impl Terminal {
 
     /// Returns the screen that texts are laid out for.
     pub(super) fn screen(&self) -> Screen {
-        screen()
+        match self.session {
+            Some(_) => Screen::default(),
+            None => screen(),
+        }
     }
 
     /// Prints the tables of a report's document, and writes it to the destination of `--json`. Call it last.
@@ -159,10 +190,21 @@ impl Terminal {
         Ok(self.say(&text)?)
     }
 
+    /// Keeps the measured recordings for the program that the command runs in.
+    pub(super) fn keep(&self, analysis: &Analysis) {
+        if let Some(session) = &self.session {
+            session.answer().recordings.clone_from(&analysis.recordings);
+        }
+    }
+
     /// Writes a report's document to the destination of `--json`. With `--verbose`, first prints on standard
     /// error what each stage used. Call it last.
     pub(super) fn write_document(self, document: &Document) -> anyhow::Result<()> {
-        let verbose = if self.quiet { 0 } else { self.verbose };
+        if let Some(session) = &self.session {
+            session.answer().document = Some(document.clone());
+        }
+        let is_silent = self.quiet || self.session.is_some();
+        let verbose = if is_silent { 0 } else { self.verbose };
         let mut error = io::stderr();
         if verbose > 0 {
             let _ = write!(error, "{}", render_stages(document));
@@ -194,6 +236,9 @@ impl Terminal {
                 keys.entry(key).or_insert(value);
             }
             keys.extend(timings.map(|timings| ("timings".to_owned(), timings)));
+        }
+        if let Some(session) = &self.session {
+            session.answer().other = Some(whole.clone());
         }
         let mut text = serde_json::to_string_pretty(&whole)?;
         text.push('\n');
@@ -262,9 +307,14 @@ fn print(text: &str) -> io::Result<()> {
         .map_err(|cause| io::Error::new(cause.kind(), format!("standard output: {cause}")))
 }
 
-/// Prints `error: ...` on standard error, with the causes that the message does not contain yet, and the
-/// results that are written all the same.
+/// Prints `error: ...` on standard error.
 pub(super) fn print_error(error: &anyhow::Error) {
+    let _ = writeln!(io::stderr(), "error: {}", error_text(error));
+}
+
+/// Returns the text of an error, with the causes that the message does not contain yet, and the results that are written
+/// all the same.
+pub(super) fn error_text(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
         let cause = cause.to_string();
@@ -282,7 +332,18 @@ pub(super) fn print_error(error: &anyhow::Error) {
         text.push_str("; written all the same: ");
         text.push_str(&names.join(", "));
     }
-    let _ = writeln!(io::stderr(), "error: {}", shortened(&text));
+    shortened(&text)
+}
+
+/// Returns the text of the error of a wrong command line, without "error: " and without the hints of a terminal.
+pub(super) fn usage_text(usage: &clap::Error) -> String {
+    let text = usage.render().to_string();
+    let end = text
+        .find("\n\nUsage:")
+        .or(text.find("\n\nFor more"))
+        .unwrap_or(text.len());
+    let text = text[..end].trim();
+    shortened(text.strip_prefix("error: ").unwrap_or(text))
 }
 
 /// Prints the error of a wrong command line, or the help that was asked for.

@@ -1,10 +1,10 @@
 //! The stopwatch of `--timings`: what each stage of a command took.
 
+use crate::pipeline::{Stage, Watch};
+use crate::report::document::{StageTiming, Timing, TimingsSection};
 use clap::Args;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use tapjoint::pipeline::{Stage, Watch};
-use tapjoint::report::document::{StageTiming, Timing, TimingsSection};
 
 /// The option of commands that compute from data.
 #[derive(Debug, Args)]

@@ -104,6 +104,33 @@ pub fn render_html(document: &Document, figures: &[InlineFigure]) -> Result<Stri
     page.render().map_err(ReportError::Html)
 }
 
+/// Returns the page without what follows its first screen: the answer, its picture, the doubts, and what was tested. It has no
+/// script.
+///
+/// # Errors
+/// [`ReportError::Html`] if the template cannot be filled.
+pub(crate) fn render_first_screen_html(
+    document: &Document,
+    figure: Option<InlineFigure>,
+) -> Result<String, ReportError> {
+    let figure = figure.map(|figure| InlineFigure {
+        live: None,
+        ..figure
+    });
+    let figures: Vec<InlineFigure> = figure.into_iter().collect();
+    let answer = Answer::of(document);
+    let mut page = page_of(document, &answer, &figures);
+    page.sections.clear();
+    page.sheet = None;
+    page.method = Method {
+        recordings: false,
+        joint: false,
+        comparison: false,
+        series: false,
+    };
+    page.render().map_err(ReportError::Html)
+}
+
 /// Returns the whole page as one that reloads itself, and its version. It loads the script [`VERSION_FILE`] beside it every
 /// second, and reloads when that states another version.
 ///

@@ -56,8 +56,8 @@ pub use resolution::{render_resolution, render_resolution_csv, render_resolution
 pub use run::{
     DrawnPictures, MODEL_FILE, VERSION_FILE, VERSION_HEAD, compared_files, draw_compared, draw_run,
     earlier_files, render_cloud_picture, render_compared, render_comparison_picture,
-    render_frf_picture, render_json, render_run, render_schema, render_spectrum_picture, run_files,
-    watched_files,
+    render_first_screen, render_frf_picture, render_json, render_run, render_schema,
+    render_spectrum_picture, run_files, watched_files,
 };
 pub use screen::Screen;
 pub use text::{render_readings, render_reproduction, render_stages, render_text, render_timings};

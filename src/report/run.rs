@@ -15,7 +15,7 @@ use crate::charts::spectra::{frf, spectrum, taps};
 use crate::charts::{comparison, comparison_spectra, series};
 use crate::document::Document;
 use crate::exchange::EXCHANGED;
-use crate::html::{render_html, render_reloading_html};
+use crate::html::{render_first_screen_html, render_html, render_reloading_html};
 use crate::picture::InlineFigure;
 use crate::picture::{
     Block, Chart, Color, Drawing, PictureFormat, packed, render_picture, render_svg,
@@ -54,6 +54,19 @@ pub fn draw_run(
         drawn.figures.push(inline_figure(&chart, &chart.draw())?);
     }
     Ok(drawn)
+}
+
+/// Returns the first screen of the page as a page of its own: the answer, the picture of the recording with most modes, the
+/// doubts, and what was tested.
+///
+/// # Errors
+/// [`ReportError::Picture`] if the picture cannot be drawn, [`ReportError::Html`] if the template cannot be filled.
+pub fn render_first_screen(
+    document: &Document,
+    recordings: &[RecordingResult],
+) -> Result<String, ReportError> {
+    let figure = leading(recordings).map(|chart| inline_figure(&chart, &chart.draw()));
+    render_first_screen_html(document, figure.transpose()?)
 }
 
 /// The picture of the page's first screen: one function, or spectrum, of the recording with most modes.

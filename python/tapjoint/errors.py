@@ -1,0 +1,72 @@
+"""Exceptions of tapjoint. Every message says what is wrong, what is allowed, and what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._results import Result
+
+
+class TapjointError(Exception):
+    """Base of all exceptions of tapjoint.
+
+    Attributes:
+        file: The file with the problem, as it was named; None where no file is the cause.
+        line: Its line, counted from 1; None where there is none.
+        remedy: What to do; None where the message has no such part.
+    """
+
+    file: str | None
+    line: int | None
+    remedy: str | None
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.file = file
+        self.line = line
+        self.remedy = remedy
+
+
+class InputError(TapjointError, ValueError):
+    """Arguments or data that cannot be used."""
+
+
+class RecordingError(InputError):
+    """A recording that cannot be read, or that lacks the channel asked for."""
+
+
+class DescriptionError(InputError):
+    """A test description that is not valid, or that does not fit its recordings."""
+
+
+class NoAnswerError(TapjointError):
+    """The data give no answer.
+
+    Attributes:
+        result: What was found all the same.
+    """
+
+    result: Result
+
+    def __init__(self, message: str, result: Result) -> None:
+        super().__init__(message)
+        self.result = result
+
+    def __reduce__(self) -> tuple[type[NoAnswerError], tuple[str, Result]]:
+        return NoAnswerError, (str(self), self.result)
+
+
+class MissingPackageError(TapjointError, ImportError):
+    """A package that this call needs is not installed. The message has the command that installs it."""
+
+
+class TapjointWarning(UserWarning):
+    """A doubt that the program prints on standard error."""

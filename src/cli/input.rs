@@ -30,14 +30,7 @@ pub(super) struct TestFile {
 /// Those of [`read_model`], and a described effect.
 pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let file = read_model(path, terminal)?;
-    if let Some(effect) = file.test.effects.first() {
-        bail!(
-            "{}:{}: this command does not take a description with [[effect]]; remove it, or use `tapjoint predict` \
-             or `tapjoint simulate`",
-            file.name,
-            effect.line
-        );
-    }
+    file.check_has_no_effect()?;
     Ok(file)
 }
 
@@ -46,16 +39,20 @@ pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<Test
 /// # Errors
 /// The file cannot be read, is no UTF-8 text, or is no valid description.
 pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
-    let name = path.display().to_string();
-    let remedy = "give the path of a test description; `tapjoint init` prints one";
-    let bytes =
-        fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
-    let test = parse(bytes, &name)?;
-    for warning in &test.warnings {
+    let file = TestFile::of(path, read_bytes(path)?)?;
+    for warning in &file.test.warnings {
         terminal.warn(&warning.to_string());
     }
-    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    Ok(TestFile { test, name, folder })
+    Ok(file)
+}
+
+/// Reads the bytes of a test description.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let remedy = "give the path of a test description; `tapjoint init` prints one";
+    fs::read(path).map_err(|cause| anyhow!("{}: cannot be read: {cause}; {remedy}", path.display()))
 }
 
 /// Returns the description in the bytes of a file of this name.
@@ -82,6 +79,33 @@ pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Err
 }
 
 impl TestFile {
+    /// Returns the description in the bytes of a file.
+    ///
+    /// # Errors
+    /// They are no UTF-8 text, or no valid description.
+    pub(super) fn of(path: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+        let name = path.display().to_string();
+        let test = parse(bytes, &name)?;
+        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        Ok(Self { test, name, folder })
+    }
+
+    /// Refuses a description with effects.
+    ///
+    /// # Errors
+    /// It has an effect.
+    pub(super) fn check_has_no_effect(&self) -> anyhow::Result<()> {
+        let Some(effect) = self.test.effects.first() else {
+            return Ok(());
+        };
+        bail!(
+            "{}:{}: this command does not take a description with [[effect]]; remove it, or use `tapjoint predict` \
+             or `tapjoint simulate`",
+            self.name,
+            effect.line
+        );
+    }
+
     /// Runs the described test, and before it that of the free bar where the description names one. The stages are announced
     /// to `watch`.
     ///
@@ -119,7 +143,7 @@ impl TestFile {
     ///
     /// # Errors
     /// The file cannot be read, is no valid description, or describes another bar.
-    fn free_test(&self, named: &FreeTestFile) -> anyhow::Result<TestFile> {
+    pub(super) fn free_test(&self, named: &FreeTestFile) -> anyhow::Result<TestFile> {
         let path = self.path_of(&named.path);
         let unreadable = |cause: String| {
             let problem = format!(
@@ -134,12 +158,10 @@ impl TestFile {
             return Err(unreadable("it is not a regular file of at most 16 MB".to_owned()).into());
         }
         let bytes = fs::read(&path).map_err(|cause| unreadable(cause.to_string()))?;
-        let name = path.display().to_string();
-        let test = parse(bytes, &name)?;
-        named.check(&self.name, &self.test, &test)?;
-        test.check_has_data(&name)?;
-        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(TestFile { test, name, folder })
+        let free = TestFile::of(&path, bytes)?;
+        named.check(&self.name, &self.test, &free.test)?;
+        free.test.check_has_data(&free.name)?;
+        Ok(free)
     }
 
     /// Returns the path of a recording that the description names.

@@ -5,7 +5,7 @@
 pub mod blind_check;
 mod brief;
 pub mod change_check;
-mod data_files;
+pub mod data_files;
 pub mod deck;
 pub mod document;
 mod exchange;
@@ -51,6 +51,7 @@ pub use document::{
     comparison_of, datasets_of, document_of, frf_document, functions_of, gap_section,
     inspection_of, lambdas_of, prediction_of, series_of,
 };
+pub use html::{BatchPage, BatchSection, render_batch_page};
 pub use exchange::{EXCHANGED, ExchangeFiles, exchange_files};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{

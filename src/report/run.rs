@@ -307,27 +307,21 @@ pub(crate) fn picture_files(name: &str, drawing: &Drawing) -> Result<[ReportFile
 fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
     let drawing = chart.draw();
     let files = picture_files(name, &drawing)?;
-    Ok((files, inline_figure(chart, &drawing)?))
+    Ok((files, InlineFigure::of(section_of(chart), chart, &drawing)?))
 }
 
-/// Returns a picture for the page.
-fn inline_figure(chart: &Chart, drawing: &Drawing) -> Result<InlineFigure, ReportError> {
-    Ok(InlineFigure {
-        section: match chart.kind {
-            "answer" => "answer",
-            "taps" => "recordings",
-            "frequencies" | "mode-shapes" | "shape-agreement" => "joint",
-            "gap" | "gap-place" => "gap",
-            "cloud" => "uncertainty",
-            "compare" | "compare-spectra" => "compare",
-            "series" => "series",
-            _ => "modes",
-        },
-        caption: chart.caption.clone(),
-        svg: render_svg(drawing),
-        tall: drawing.height > drawing.width,
-        live: chart.page().as_ref().map(packed).transpose()?,
-    })
+/// Returns the section of the page in which a chart stands.
+fn section_of(chart: &Chart) -> &'static str {
+    match chart.kind {
+        "answer" => "answer",
+        "taps" => "recordings",
+        "frequencies" | "mode-shapes" | "shape-agreement" => "joint",
+        "gap" | "gap-place" => "gap",
+        "cloud" => "uncertainty",
+        "compare" | "compare-spectra" => "compare",
+        "series" => "series",
+        _ => "modes",
+    }
 }
 
 /// Returns all pictures that there are data for, with the names of their files without ending.

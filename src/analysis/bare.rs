@@ -132,7 +132,10 @@ pub fn measure_bare_file(
 ///
 /// # Errors
 /// One of them was given.
-pub fn refuse_for_functions(path: &Path, options: &[(&'static str, bool)]) -> Result<(), BareError> {
+pub fn refuse_for_functions(
+    path: &Path,
+    options: &[(&'static str, bool)],
+) -> Result<(), BareError> {
     match options.iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(BareError::NotForFunctions {
             file: path.display().to_string(),

@@ -168,7 +168,11 @@ fn test_row(test: &BatchTest, analysis: &Analysis, document: &Document) -> TestR
         modes: modes.iter().filter(|mode| mode.mode.is_some()).count() as u64,
         method: estimate.map(|estimate| estimate.method.name().to_owned()),
         modes_used: estimate.map_or_else(Vec::new, |estimate| {
-            estimate.modes_used.iter().map(|mode| *mode as u64).collect()
+            estimate
+                .modes_used
+                .iter()
+                .map(|mode| *mode as u64)
+                .collect()
         }),
         parameters: estimate.map_or_else(Parameters::default, parameters),
         goodness_of_fit: estimate.and_then(|estimate| estimate.goodness_of_fit),

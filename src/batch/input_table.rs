@@ -87,7 +87,10 @@ impl InputTable {
             problem,
         };
         let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
-        let first = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+        let first = bytes
+            .split(|byte| *byte == b'\n')
+            .next()
+            .unwrap_or_default();
         let separators = [b',', b';', b'\t'].into_iter();
         let separator = separators.max_by_key(|one| {
             // Of separators that are equally frequent the comma is taken.
@@ -107,9 +110,7 @@ impl InputTable {
                 } => format!(
                     "{len} cells, but the first line names {expected_len} columns; give each row a cell for each column"
                 ),
-                csv::ErrorKind::Utf8 { .. } => {
-                    "not UTF-8 text; save the table as UTF-8".to_owned()
-                }
+                csv::ErrorKind::Utf8 { .. } => "not UTF-8 text; save the table as UTF-8".to_owned(),
                 _ => format!("cannot be read: {problem}"),
             };
             error(line, words)
@@ -383,7 +384,10 @@ mod tests {
     fn limit_a_bad_table_names_line_and_column() {
         let cases = [
             ("serial\n1\n", "table.csv:1: no column `file`"),
-            ("file,file\na,b\n", "table.csv:1: the column `file` stands twice"),
+            (
+                "file,file\na,b\n",
+                "table.csv:1: the column `file` stands twice",
+            ),
             ("file,length\na.wav,1\nb.wav\n", "table.csv:3: 1 cells"),
             ("file,length\na.wav,1\n,2\n", "table.csv:3: no file"),
         ];
@@ -393,13 +397,28 @@ mod tests {
         }
         let cases = [
             ("length", "-1 mm", "table.csv:2: `length`: "),
-            ("beam.lenght", "1", "table.csv:2: `beam.lenght`: unknown key"),
-            ("sensor.C.mass", "1 g", "table.csv:2: `sensor.C.mass`: test.toml has no [[sensor]] with the name C"),
-            ("effect.id", "fixture", "table.csv:2: `effect.id`: test.toml has no [[effect]]"),
+            (
+                "beam.lenght",
+                "1",
+                "table.csv:2: `beam.lenght`: unknown key",
+            ),
+            (
+                "sensor.C.mass",
+                "1 g",
+                "table.csv:2: `sensor.C.mass`: test.toml has no [[sensor]] with the name C",
+            ),
+            (
+                "effect.id",
+                "fixture",
+                "table.csv:2: `effect.id`: test.toml has no [[effect]]",
+            ),
         ];
         for (head, cell, expected) in cases {
             let found = table(&format!("file,{head}\na.wav,{cell}\n")).unwrap();
-            let error = found.described(0, STRIP, "test.toml").expect_err(head).to_string();
+            let error = found
+                .described(0, STRIP, "test.toml")
+                .expect_err(head)
+                .to_string();
             assert!(error.starts_with(expected), "{error}");
         }
         let rows = "a.wav\n".repeat(11);
@@ -409,7 +428,10 @@ mod tests {
 
     #[test]
     fn limit_other_separators_and_a_byte_order_mark() {
-        for text in ["\u{feff}file;length\na.wav;1 m\n", "file\tlength\na.wav\t1 m\n"] {
+        for text in [
+            "\u{feff}file;length\na.wav;1 m\n",
+            "file\tlength\na.wav\t1 m\n",
+        ] {
             let found = table(text).unwrap();
             let (test, _) = found.described(0, STRIP, "test.toml").unwrap();
             assert_eq!(test.beam.length, 1.0);

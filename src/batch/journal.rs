@@ -172,7 +172,8 @@ mod tests {
         let mut text = JOURNAL_HEAD.to_owned();
         let mut ends = vec![text.len()];
         for number in 0..3 {
-            text += &journal_line(key(number), &record("a", Some(0.1 + f64::from(number)))).unwrap();
+            text +=
+                &journal_line(key(number), &record("a", Some(0.1 + f64::from(number)))).unwrap();
             ends.push(text.len());
         }
         for cut in 0..=text.len() {

@@ -111,9 +111,8 @@ fn chart(summary: &Summary, name: &dyn Fn(u32) -> String) -> Chart {
 
 fn panel(found: &Distribution, tests: u64, name: &dyn Fn(u32) -> String) -> Panel {
     let limits = found.limits();
-    let is_outlier = |point: &Point| {
-        limits.is_some_and(|[low, high]| !(low..=high).contains(&point.value))
-    };
+    let is_outlier =
+        |point: &Point| limits.is_some_and(|[low, high]| !(low..=high).contains(&point.value));
     let stride = found.points.len().div_ceil(MOST_POINTS).max(1);
     let mut inside = Series::new("test", Color::Blue, Mark::Dot(2.5));
     let mut outside = Series::new("outlier", Color::Vermilion, Mark::Ring(4.0));

@@ -422,7 +422,10 @@ mod tests {
         let percent = found.trend_percent.unwrap();
         assert!((percent / 2.0 - 1.0).abs() < 0.1, "{percent}");
         assert_eq!(found.outlier_count, 1);
-        assert_eq!((found.outliers[0].test, &*found.outliers[0].file), (50, "test 50"));
+        assert_eq!(
+            (found.outliers[0].test, &*found.outliers[0].file),
+            (50, "test 50")
+        );
     }
 
     #[test]
@@ -439,9 +442,16 @@ mod tests {
 
     #[test]
     fn limit_many_values_have_the_trend_of_their_groups() {
-        let summary = summary_of(scattered(5003).enumerate().map(|(i, v)| v + 1e-3 * i as f64));
+        let summary = summary_of(
+            scattered(5003)
+                .enumerate()
+                .map(|(i, v)| v + 1e-3 * i as f64),
+        );
         let percent = summary.distributions[0].trend_percent.unwrap();
-        assert!((percent / (100.0 * 5.003 / 102.5) - 1.0).abs() < 0.05, "{percent}");
+        assert!(
+            (percent / (100.0 * 5.003 / 102.5) - 1.0).abs() < 0.05,
+            "{percent}"
+        );
     }
 
     #[test]
@@ -454,6 +464,9 @@ mod tests {
         let summary = collector.finish(|test| test.to_string());
         assert_eq!(summary.failed, 2);
         assert_eq!(summary.reasons.len(), 1);
-        assert_eq!((&*summary.reasons[0].name, summary.reasons[0].count), ("FILE: is empty", 2));
+        assert_eq!(
+            (&*summary.reasons[0].name, summary.reasons[0].count),
+            ("FILE: is empty", 2)
+        );
     }
 }

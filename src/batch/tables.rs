@@ -406,9 +406,14 @@ mod tests {
     #[test]
     fn limit_no_carried_cell_is_a_formula() {
         let mut bytes = Vec::new();
-        let mut table = TableWriter::new(TableKind::Tests, &["=A1".to_owned()], &mut bytes).unwrap();
+        let mut table =
+            TableWriter::new(TableKind::Tests, &["=A1".to_owned()], &mut bytes).unwrap();
         table
-            .add(&BatchRecord::failed("a.wav", &["=B1".to_owned()], "bad".to_owned()))
+            .add(&BatchRecord::failed(
+                "a.wav",
+                &["=B1".to_owned()],
+                "bad".to_owned(),
+            ))
             .unwrap();
         table.finish().unwrap();
         let text = String::from_utf8(bytes).unwrap();

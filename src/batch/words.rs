@@ -2,7 +2,9 @@
 
 use crate::summary::{Counted, Distribution, OUTLIER_LIMIT, Quantity, Summary};
 use tapjoint_report::Screen;
-use tapjoint_report::format::{MISSING, capital, optional, signed_percent, significant, unit_words};
+use tapjoint_report::format::{
+    MISSING, capital, optional, signed_percent, significant, unit_words,
+};
 use tapjoint_report::tables::{Table, number, words};
 
 /// Most lines of an answer on a terminal of 80 columns.
@@ -145,11 +147,17 @@ pub fn findings(summary: &Summary) -> Vec<String> {
             signed_percent(one.trend_percent)
         ));
     }
-    let outliers: usize = summary.distributions.iter().map(|one| one.outlier_count).sum();
+    let outliers: usize = summary
+        .distributions
+        .iter()
+        .map(|one| one.outlier_count)
+        .sum();
     sentences.push(match outliers {
         0 => format!("No value is more than {OUTLIER_LIMIT} spreads from its median."),
         1 => format!("1 value is more than {OUTLIER_LIMIT} spreads from its median."),
-        count => format!("{count} values are more than {OUTLIER_LIMIT} spreads from their medians."),
+        count => {
+            format!("{count} values are more than {OUTLIER_LIMIT} spreads from their medians.")
+        }
     });
     sentences
 }
@@ -185,7 +193,11 @@ pub fn distributions<'a>(all: impl IntoIterator<Item = &'a Distribution>) -> Tab
 }
 
 fn quantity_with_unit(one: &Distribution) -> String {
-    format!("{} ({})", capital(&one.quantity.to_string()), unit_words(one.unit))
+    format!(
+        "{} ({})",
+        capital(&one.quantity.to_string()),
+        unit_words(one.unit)
+    )
 }
 
 fn trend_words(one: &Distribution) -> &'static str {

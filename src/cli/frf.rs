@@ -2,8 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{
-    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form,
-    sensor_kind,
+    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form, sensor_kind,
 };
 use super::input::{TestFile, check_file, read_test, stem};
 use super::output::OutputFile;

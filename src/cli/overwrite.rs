@@ -363,7 +363,9 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
         return Ok(true);
     }
     if head.starts_with(PARQUET) {
-        return Ok(tail.windows(PARQUET_WRITER.len()).any(|part| part == PARQUET_WRITER));
+        return Ok(tail
+            .windows(PARQUET_WRITER.len())
+            .any(|part| part == PARQUET_WRITER));
     }
     // The last character of the head may be cut.
     let text = String::from_utf8_lossy(&head);

@@ -51,8 +51,8 @@ pub use document::{
     comparison_of, datasets_of, document_of, frf_document, functions_of, gap_section,
     inspection_of, lambdas_of, prediction_of, series_of,
 };
-pub use html::{BatchPage, BatchSection, render_batch_page};
 pub use exchange::{EXCHANGED, ExchangeFiles, exchange_files};
+pub use html::{BatchPage, BatchSection, render_batch_page};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     DrawnPictures, MODEL_FILE, VERSION_FILE, VERSION_HEAD, compared_files, draw_compared, draw_run,

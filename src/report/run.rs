@@ -17,9 +17,7 @@ use crate::document::Document;
 use crate::exchange::EXCHANGED;
 use crate::html::{render_html, render_reloading_html};
 use crate::picture::InlineFigure;
-use crate::picture::{
-    Block, Chart, Color, Drawing, PictureFormat, packed, render_picture, render_svg,
-};
+use crate::picture::{Block, Chart, Color, Drawing, PictureFormat, render_picture};
 use crate::sheet::render_sheet;
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
@@ -51,7 +49,10 @@ pub fn draw_run(
 ) -> Result<DrawnPictures, ReportError> {
     let mut drawn = DrawnPictures::of(&pictures(document, recordings))?;
     if let Some(chart) = leading(recordings) {
-        drawn.figures.push(inline_figure(&chart, &chart.draw())?);
+        let section = section_of(&chart);
+        drawn
+            .figures
+            .push(InlineFigure::of(section, &chart, &chart.draw())?);
     }
     Ok(drawn)
 }

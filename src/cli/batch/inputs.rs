@@ -251,7 +251,10 @@ fn described(
     let name = path.display().to_string();
     inputs.push(InputFile {
         name: name.clone(),
-        sha256: bytes.as_ref().ok().map(|bytes| Sha256::digest(bytes).into()),
+        sha256: bytes
+            .as_ref()
+            .ok()
+            .map(|bytes| Sha256::digest(bytes).into()),
     });
     let bytes = bytes?;
     let text = row.map(|_| String::from_utf8_lossy(&bytes).into_owned());
@@ -310,7 +313,8 @@ fn words(problem: &anyhow::Error) -> String {
 fn read_table(path: &Path) -> anyhow::Result<InputTable> {
     let name = path.display().to_string();
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(LARGEST_LIST + 1).read_to_end(&mut bytes));
+    let read =
+        File::open(path).and_then(|file| file.take(LARGEST_LIST + 1).read_to_end(&mut bytes));
     read.with_context(|| format!("{name}: cannot be read"))?;
     ensure!(
         bytes.len() as u64 <= LARGEST_LIST,

@@ -59,7 +59,8 @@ impl JournalFile {
         file.set_len(found.length).map_err(unwritable)?;
         let mut length = file.seek(SeekFrom::End(0)).map_err(unwritable)?;
         if length == 0 {
-            file.write_all(JOURNAL_HEAD.as_bytes()).map_err(unwritable)?;
+            file.write_all(JOURNAL_HEAD.as_bytes())
+                .map_err(unwritable)?;
             length = JOURNAL_HEAD.len() as u64;
         }
         Ok(Self {
@@ -159,7 +160,9 @@ impl ShardJournals {
                 "{shown}: holds journals of {first} and of {second} parts; remove those that are not wanted"
             ),
         };
-        let shards: Vec<super::Shard> = (1..=parts).map(|part| super::Shard { part, parts }).collect();
+        let shards: Vec<super::Shard> = (1..=parts)
+            .map(|part| super::Shard { part, parts })
+            .collect();
         // A part without tests need not have been run.
         let needed = shards.into_iter().take(tests.max(1));
         let (mut journals, mut missing) = (Vec::new(), Vec::new());
@@ -168,7 +171,10 @@ impl ShardJournals {
             match File::open(&path) {
                 Ok(file) => {
                     let found = found_in(&file)?.ok_or_else(|| {
-                        anyhow!("{}: is no journal of tapjoint; remove it, and analyse its part again", path.display())
+                        anyhow!(
+                            "{}: is no journal of tapjoint; remove it, and analyse its part again",
+                            path.display()
+                        )
                     })?;
                     journals.push((path, RefCell::new(BufReader::new(file)), found));
                 }
@@ -176,13 +182,16 @@ impl ShardJournals {
                     missing.push(format!("{}/{parts}", shard.part));
                 }
                 Err(cause) => {
-                    return Err(cause).with_context(|| format!("{}: cannot be read", path.display()));
+                    return Err(cause)
+                        .with_context(|| format!("{}: cannot be read", path.display()));
                 }
             }
         }
         if !missing.is_empty() {
             let missing = missing.join(", ");
-            bail!("{shown}: the journals of these parts are missing: {missing}; analyse them with --shard");
+            bail!(
+                "{shown}: the journals of these parts are missing: {missing}; analyse them with --shard"
+            );
         }
         Ok(Self { journals })
     }

@@ -1,7 +1,7 @@
 //! The page of a batch.
 
 use crate::summary::{Distribution, Point, Quantity, Summary};
-use crate::words::{counted, counted_table, distributions, findings, outliers};
+use crate::words::{counted, counted_table, distributions, findings, outliers, tests};
 use tapjoint_report::document::WarningSection;
 use tapjoint_report::format::{capital, significant, unit_words};
 use tapjoint_report::picture::{
@@ -17,11 +17,23 @@ const MOST_POINTS: usize = 2000;
 /// Quantities that are drawn.
 const MOST_PANELS: usize = 12;
 
-/// Returns the page. `name` gives the name of a test by its index.
+/// Caption of the chart.
+const CAPTION: &str = "Each point is a test. The band holds the values that are no outliers.";
+
+/// Names and reports of the tests, by their index.
+pub trait TestNames {
+    /// Returns the name of a test.
+    fn name(&self, test: u32) -> String;
+
+    /// Returns the address of a test's report, seen from the page; `None` without a report.
+    fn report(&self, test: u32) -> Option<String>;
+}
+
+/// Returns the page.
 ///
 /// # Errors
 /// [`ReportError::Html`] if the template cannot be filled, and those of the charts.
-pub fn render(summary: &Summary, name: &dyn Fn(u32) -> String) -> Result<String, ReportError> {
+pub fn render(summary: &Summary, names: &dyn TestNames) -> Result<String, ReportError> {
     let mut sections = Vec::new();
     if !summary.distributions.is_empty() {
         let mut own = vec![distributions(&summary.distributions)];
@@ -30,7 +42,7 @@ pub fn render(summary: &Summary, name: &dyn Fn(u32) -> String) -> Result<String,
             id: "distributions",
             title: "All tests together",
             tables: own,
-            charts: vec![chart(summary, name)],
+            charts: vec![chart(summary, names)],
             ..BatchSection::default()
         });
     }
@@ -73,10 +85,7 @@ pub fn render(summary: &Summary, name: &dyn Fn(u32) -> String) -> Result<String,
         beside: false,
     });
     render_batch_page(BatchPage {
-        title: match summary.tests {
-            1 => "Batch of 1 test".to_owned(),
-            count => format!("Batch of {count} tests"),
-        },
+        title: format!("Batch of {}", tests(summary.tests)),
         facts: vec![
             ("Tests", summary.tests.to_string()),
             ("Answered", summary.answered.to_string()),
@@ -90,17 +99,20 @@ pub fn render(summary: &Summary, name: &dyn Fn(u32) -> String) -> Result<String,
 }
 
 /// Returns the values of all tests in their order, a panel for each quantity.
-fn chart(summary: &Summary, name: &dyn Fn(u32) -> String) -> Chart {
+fn chart(summary: &Summary, names: &dyn TestNames) -> Chart {
     // Stiffnesses first: there may be more modes than panels.
     let mut all: Vec<&Distribution> = summary.distributions.iter().collect();
     all.sort_by_key(|one| matches!(one.quantity, Quantity::Mode(_)));
     let panels = all.iter().take(MOST_PANELS);
-    let panels = panels.map(|one| panel(one, summary.tests, name));
+    let panels = panels.map(|one| panel(one, summary.tests, names));
     Chart {
         kind: "batch",
         title: "Tests in their order".to_owned(),
         subtitle: "values in the band are no outliers".to_owned(),
-        caption: "Each point is a test. The band holds the values that are no outliers.".to_owned(),
+        caption: match names.report(0) {
+            Some(_) => format!("{CAPTION} A click on a point opens its report."),
+            None => CAPTION.to_owned(),
+        },
         blocks: vec![Block {
             in_page: InPage::Together,
             ..Block::new(2, panels.collect())
@@ -109,7 +121,7 @@ fn chart(summary: &Summary, name: &dyn Fn(u32) -> String) -> Chart {
     }
 }
 
-fn panel(found: &Distribution, tests: u64, name: &dyn Fn(u32) -> String) -> Panel {
+fn panel(found: &Distribution, count: u64, names: &dyn TestNames) -> Panel {
     let limits = found.limits();
     let is_outlier =
         |point: &Point| limits.is_some_and(|[low, high]| !(low..=high).contains(&point.value));
@@ -123,11 +135,12 @@ fn panel(found: &Distribution, tests: u64, name: &dyn Fn(u32) -> String) -> Pane
             false => continue,
         };
         own.push(f64::from(point.test) + 1.0, point.value);
-        own.words.push(name(point.test));
+        own.words.push(names.name(point.test));
+        own.links.extend(names.report(point.test));
         let (value, unit) = (significant(point.value, 5), unit_words(found.unit));
         own.said.push(format!("{value} {unit}"));
     }
-    let last = tests as f64 + 0.5;
+    let last = count as f64 + 0.5;
     let ends = extent([found.min, found.max]).unwrap_or((0.0, 1.0));
     let mut band = Series::new("no outliers", Color::Data, Mark::Band);
     if let Some([low, high]) = limits {

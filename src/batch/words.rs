@@ -82,10 +82,6 @@ fn shown(all: &[Distribution]) -> Vec<&Distribution> {
 
 /// Returns how many tests there are, and how they ended.
 pub fn counts(summary: &Summary) -> String {
-    let tests = match summary.tests {
-        1 => "1 test".to_owned(),
-        count => format!("{count} tests"),
-    };
     let mut parts = vec![format!("{} answered", summary.answered)];
     for (count, name) in [
         (summary.no_answer, "without an answer"),
@@ -95,15 +91,21 @@ pub fn counts(summary: &Summary) -> String {
             parts.push(format!("{count} {name}"));
         }
     }
-    format!("{tests}: {}", parts.join(", "))
+    format!("{}: {}", tests(summary.tests), parts.join(", "))
+}
+
+/// Returns "1 test" or "2 tests".
+pub fn tests(count: u64) -> String {
+    match count {
+        1 => "1 test".to_owned(),
+        count => format!("{count} tests"),
+    }
 }
 
 /// Returns a reason with the number of tests that have it, and the first of them.
 pub fn counted(one: &Counted) -> String {
-    match one.count {
-        1 => format!("1 test ({}): {}", one.first, one.name),
-        count => format!("{count} tests ({}, ...): {}", one.first, one.name),
-    }
+    let more = if one.count > 1 { ", ..." } else { "" };
+    format!("{} ({}{more}): {}", tests(one.count), one.first, one.name)
 }
 
 /// Returns the most frequent checks and warnings, one line each.
@@ -120,7 +122,8 @@ fn worst_codes(summary: &Summary) -> Vec<String> {
             .map(|one| format!("{} in {}", one.name, one.count))
             .collect();
         if !all.is_empty() {
-            lines.push(format!("{}: {} tests", capital(name), all.join(", ")));
+            let (name, tests) = (capital(name), tests(summary.tests));
+            lines.push(format!("{name}: {} of {tests}", all.join(", ")));
         }
     }
     lines

@@ -5,6 +5,7 @@
 
 mod inputs;
 mod journal_file;
+mod reports;
 
 use super::Outcome;
 use super::arguments::{RecordingArguments, SpectrumSettings};
@@ -18,6 +19,7 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use inputs::{Loaded, Tests};
 use journal_file::{JournalFile, Place, ShardJournals};
+use reports::Reports;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -26,6 +28,7 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
+use tapjoint::batch::page::TestNames;
 use tapjoint::batch::{
     BatchRecord, BatchSettings, Collector, JOURNAL_HEAD, Summary, TABLES, TableWriter,
     answer_watched,
@@ -69,6 +72,9 @@ pub(super) struct BatchArguments {
     /// Number of tests that are analysed at the same time; default: one for each thread
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_JOBS))]
     jobs: Option<usize>,
+    /// Write a report for each test, as `run` does, into the folder `reports`. It takes many times as long
+    #[arg(long)]
+    reports: bool,
     /// Leave the diagnosis out
     #[arg(long)]
     no_diagnosis: bool,
@@ -162,17 +168,19 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let tests = Tests::listed(arguments, arguments.settings(seed), &terminal)?;
+    let reports = arguments.reports.then(|| Reports::of(&arguments.out));
+    let reports = reports.as_ref();
     if arguments.merge {
         let journals = ShardJournals::open(&arguments.out, tests.len())?;
         let places = merged_places(&tests, &journals, arguments)?;
         let read = |place: Place| journals.line(place);
-        return finish(&tests, &places, read, arguments, terminal);
+        return finish(&tests, &places, reports, read, arguments, terminal);
     }
     let name = arguments.shard.map_or(JOURNAL.to_owned(), Shard::journal);
     let journal = JournalFile::open(&arguments.out, &name, terminal.files().force)?;
     let shard = arguments.shard.unwrap_or(Shard { part: 1, parts: 1 });
     let own: Vec<usize> = (0..tests.len()).filter(|test| shard.holds(*test)).collect();
-    let done = analyse_all(&tests, &own, journal, arguments, &terminal)?;
+    let done = analyse_all(&tests, &own, journal, reports, arguments, &terminal)?;
     if arguments.shard.is_some() {
         terminal.say(&format!(
             "part {} of {}: {} tests, {} of them analysed now; `tapjoint batch --merge` with the same tests and settings writes the tables\n",
@@ -187,7 +195,7 @@ pub(super) fn run(
         return Ok(Outcome::Answered);
     }
     let read = |place: Place| done.journal.line(place);
-    finish(&tests, &done.places, read, arguments, terminal)
+    finish(&tests, &done.places, reports, read, arguments, terminal)
 }
 
 /// What the workers leave.
@@ -216,6 +224,7 @@ fn analyse_all(
     tests: &Tests,
     own: &[usize],
     journal: JournalFile,
+    reports: Option<&Reports>,
     arguments: &BatchArguments,
     terminal: &Terminal,
 ) -> anyhow::Result<Done> {
@@ -235,7 +244,14 @@ fn analyse_all(
             let Some(&index) = own.get(slot) else { return };
             let test = tests.load(index);
             let known = locked(&shared).done.journal.place(test.key);
-            let record = known.is_none().then(|| record_of(&test, tests, terminal));
+            // A report that was not written, or not wholly, needs the analysis again.
+            let name = tests.name(index);
+            let has_report = reports.is_none_or(|reports| reports.has(index, &name));
+            let known = known.filter(|_| has_report || test.test.is_err());
+            let record = known.is_none().then(|| {
+                let wanted = reports.map(|reports| (reports, index));
+                record_of(&test, tests, wanted, terminal)
+            });
             let mut shared = locked(&shared);
             if shared.problem.is_some() {
                 return;
@@ -305,13 +321,23 @@ impl Shared {
 }
 
 /// Analyses a test. A panic is our fault, and no reason to lose the other tests.
-fn record_of(test: &Loaded, tests: &Tests, terminal: &Terminal) -> BatchRecord {
+fn record_of(
+    test: &Loaded,
+    tests: &Tests,
+    reports: Option<(&Reports, usize)>,
+    terminal: &Terminal,
+) -> BatchRecord {
     let own = match &test.test {
         Ok(own) => own,
         Err(problem) => return problem.clone(),
     };
-    let answered = catch_unwind(AssertUnwindSafe(|| {
-        answer_watched(own, &tests.settings, terminal.watch())
+    let answered = catch_unwind(AssertUnwindSafe(|| match reports {
+        None => answer_watched(own, &tests.settings, terminal.watch()),
+        Some((reports, index)) => reports
+            .write(index, own, &tests.settings, terminal)
+            .unwrap_or_else(|error| {
+                BatchRecord::failed(&own.file, &own.carried, inputs::words(&error))
+            }),
     }));
     answered.unwrap_or_else(|_| {
         let error = "internal error; please report it with this test".to_owned();
@@ -363,12 +389,13 @@ fn merged_places(
 fn finish(
     tests: &Tests,
     places: &[Place],
+    reports: Option<&Reports>,
     read: impl Fn(Place) -> anyhow::Result<(Vec<u8>, BatchRecord)>,
     arguments: &BatchArguments,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
-    let summary = write_all(tests, places, read, &output)
+    let summary = write_all(tests, places, reports, read, &output)
         .map_err(|cause| unless_told(cause, &arguments.out))?;
     let folder = output.publish()?;
     let page = folder.join(PAGE);
@@ -390,9 +417,27 @@ fn unless_told(cause: anyhow::Error, folder: &Path) -> anyhow::Error {
     }
 }
 
+/// Names and reports for the page.
+struct Named<'a> {
+    tests: &'a Tests,
+    reports: Option<&'a Reports>,
+}
+
+impl TestNames for Named<'_> {
+    fn name(&self, test: u32) -> String {
+        self.tests.name(test as usize)
+    }
+
+    fn report(&self, test: u32) -> Option<String> {
+        let reports = self.reports?;
+        Some(reports.address(test as usize, &self.name(test)))
+    }
+}
+
 fn write_all(
     tests: &Tests,
     places: &[Place],
+    reports: Option<&Reports>,
     read: impl Fn(Place) -> anyhow::Result<(Vec<u8>, BatchRecord)>,
     output: &OutputFolder,
 ) -> anyhow::Result<Summary> {
@@ -418,7 +463,7 @@ fn write_all(
     }
     journal.flush()?;
     let summary = collector.finish(|test| tests.name(test as usize));
-    let page = tapjoint::batch::page::render(&summary, &|test| tests.name(test as usize))?;
+    let page = tapjoint::batch::page::render(&summary, &Named { tests, reports })?;
     output.add(PAGE, page.as_bytes())?;
     Ok(summary)
 }

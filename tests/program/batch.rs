@@ -31,7 +31,7 @@ fn tests() -> tempfile::TempDir {
             "--ky",
             &ky.to_string(),
             "--seconds",
-            "2",
+            "5",
             "--taps",
             "1",
             "--seed",
@@ -221,6 +221,46 @@ fn val_a_table_changes_the_description_of_its_recordings() {
 }
 
 #[test]
+fn val_reports_are_those_of_run_and_the_page_leads_to_them() {
+    let folder = tests();
+    let place = folder.path();
+    let test = "tests/t02/test.toml";
+    batch(
+        place,
+        &[
+            test,
+            "tests/missing/test.toml",
+            "--reports",
+            "--out",
+            "made",
+        ],
+    );
+    tapjoint(place, &["run", test, "--out", "alone", "-q"], 0);
+    let own = place.join("made/reports/000001-t02");
+    for file in ["report.json", "report.html", "updated-model.toml"] {
+        let [one, other] =
+            [&own, &place.join("alone")].map(|folder| fs::read(folder.join(file)).ok());
+        assert!(one == other, "{file}");
+    }
+    assert!(!place.join("made/reports/000002-missing").exists());
+    // With and without reports the tables are the same, and so are those of a second call.
+    let expected = tables(&place.join("made"));
+    batch(
+        place,
+        &[
+            test,
+            "tests/missing/test.toml",
+            "--reports",
+            "--out",
+            "made",
+        ],
+    );
+    batch(place, &[test, "tests/missing/test.toml", "--out", "plain"]);
+    assert_eq!(tables(&place.join("made")), expected);
+    assert_eq!(tables(&place.join("plain")), expected);
+}
+
+#[test]
 fn limit_a_bad_call_is_refused_before_any_work() {
     let folder = tests();
     let place = folder.path();
@@ -270,6 +310,7 @@ fn frozen_batch() {
     let said = batch(place, &["tests", "--jobs", "1"]);
     let page = fs::read_to_string(place.join("batch-report/batch.html")).unwrap();
     assert!(page.contains("<title>Batch of 14 tests – tapjoint report</title>"));
-    assert!(!page.contains("http://") || !page.contains("src=\"http"));
+    // Nothing of the page lies elsewhere.
+    assert!(!page.contains("src=\"http") && !page.contains("href=\"http"));
     assert_snapshot("batch", &said);
 }

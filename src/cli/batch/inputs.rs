@@ -300,7 +300,7 @@ fn summed(path: &Path) -> InputFile {
 }
 
 /// Returns an error with its causes, as the command line prints it.
-fn words(problem: &anyhow::Error) -> String {
+pub(super) fn words(problem: &anyhow::Error) -> String {
     let mut text = problem.to_string();
     for cause in problem.chain().skip(1).map(ToString::to_string) {
         if !text.contains(&cause) {

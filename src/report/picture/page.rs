@@ -315,6 +315,7 @@ fn view(name: &str, panels: &[Panel]) -> Block {
                 extra: each(&one.extra, PLACE_DIGITS),
                 words: one.words.clone(),
                 said: one.said.clone(),
+                links: one.links.clone(),
                 ..Series::new(&one.name, one.color, one.mark)
             });
         }

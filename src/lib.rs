@@ -71,6 +71,7 @@ pub mod notation;
 pub mod references;
 
 pub use tapjoint_analysis as pipeline;
+pub use tapjoint_batch as batch;
 pub use tapjoint_beam as structure;
 pub use tapjoint_beam::effects;
 pub use tapjoint_compare as compare;

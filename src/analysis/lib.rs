@@ -11,6 +11,7 @@
 
 mod amplitude;
 mod averages;
+mod bare;
 mod checks;
 mod compared;
 mod decays;
@@ -40,6 +41,9 @@ mod warnings;
 mod wiring;
 
 pub use amplitude::AmplitudeChange;
+pub use bare::{
+    BareError, BareSettings, channel_of, is_no_time_series, measure_bare_file, refuse_for_functions,
+};
 use checks::judge;
 pub use compared::{compared_items, compared_test};
 pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
@@ -111,6 +115,19 @@ pub struct Analysis {
     pub verdicts: Vec<QualityVerdict>,
     /// Everything that a reader of the results has to know.
     pub warnings: Vec<Warning>,
+}
+
+impl Analysis {
+    /// Returns true if there is an answer. A test is answered by an estimate, or by a prediction (from known stiffnesses)
+    /// beside a measured mode. A bare recording is answered by a mode.
+    pub fn is_answered(&self) -> bool {
+        match &self.identification {
+            Some(found) => {
+                found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
+            }
+            None => self.modes.iter().any(|mode| mode.mode.is_some()),
+        }
+    }
 }
 
 /// Runs a described test: its recordings, or the frequencies that it or its file of modes gives.

@@ -5,7 +5,7 @@ use crate::description::{
     ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
     SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
 };
-use crate::pipeline::{EstimateMethod, IdentifySettings, MeasureSettings};
+use crate::pipeline::{BareSettings, EstimateMethod, IdentifySettings, MeasureSettings};
 use crate::quantity::{Dimension, parse_quantity};
 use crate::recording::{
     ReadSettings, Recording, RecordingError, TIME_UNITS, ValueColumns, VariableRole, Variables,
@@ -159,35 +159,24 @@ impl RecordingArguments {
         }
     }
 
+    /// Returns the settings for a file without a description.
+    pub(super) fn bare(&self, spectrum: &SpectrumSettings, reading: ReadBy) -> BareSettings {
+        BareSettings {
+            hammer: self.hammer.clone(),
+            read: self.settings(),
+            keep_overload: self.overload,
+            block: spectrum.block,
+            band: spectrum.zoom,
+            window: spectrum.window,
+            reading,
+        }
+    }
+
     /// Opens a recording that has the hammer's channel.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
-        let recording = Recording::open(path, &self.settings())?;
-        if let Some(hammer) = &self.hammer {
-            channel_of(&recording, "--hammer", hammer)?;
-        }
-        // Errors name the whole path, tables the file.
-        let name = path.file_name().unwrap_or(path.as_os_str());
-        Ok(recording.renamed(name.to_string_lossy()))
+        let spectrum = SpectrumSettings::default();
+        self.bare(&spectrum, ReadBy::default()).open(path)
     }
-}
-
-/// Returns the channel (0-based) that an option names.
-///
-/// # Errors
-/// No such channel, or several of that name. The message names the option.
-pub(super) fn channel_of(
-    recording: &Recording,
-    option: &str,
-    channel: &ChannelRef,
-) -> Result<usize, RecordingError> {
-    let found = match channel {
-        ChannelRef::Number(number) => recording.channel_by_number(*number),
-        ChannelRef::Name(name) => recording.channel_by_name(name),
-    };
-    found.map_err(|problem| RecordingError::Unusable {
-        place: option.to_owned(),
-        problem: problem.to_string(),
-    })
 }
 
 /// Parses the use of a variable and its name.

@@ -336,18 +336,13 @@ fn read_side(
 /// Returns the description with this file in the place of its recordings.
 fn placed(path: &Path, template: &TestFile) -> anyhow::Result<TestFile> {
     check_file(path)?;
-    let mut test = template.test.clone();
-    test.measured = None;
-    test.recordings.truncate(1);
-    let Some(recording) = test.recordings.first_mut() else {
+    let Some(test) = template.test.with_recording(absolute(path)?) else {
         bail!(
             "{}: describes no recording; add a [[recording]] with the settings for {}",
             template.name,
             path.display()
         );
     };
-    recording.file = absolute(path)?;
-    recording.more_files.clear();
     Ok(TestFile {
         test,
         name: template.name.clone(),

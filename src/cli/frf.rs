@@ -2,20 +2,19 @@
 
 use super::Outcome;
 use super::arguments::{
-    RecordingArguments, SpectrumSettings, channel_of, channel_scale, estimator, response_form,
-    sensor_kind,
+    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form, sensor_kind,
 };
 use super::input::{TestFile, check_file, read_test, stem};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
 use super::place::is_description;
-use super::recording::{analyse, holds_functions, refuse_given};
+use super::recording::{analyse, holds_functions};
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
 use crate::pipeline::{
     Analysis, Frf, FrfSettings, IdentifySettings, MeasureSettings, Response, Stage, Watch, Wiring,
-    Work, frfs_of, run_wired, si_unit,
+    Work, channel_of, frfs_of, refuse_for_functions, run_wired, si_unit,
 };
 use crate::recording::{Recording, UffFormat};
 use crate::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
@@ -150,7 +149,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
             file.display()
         );
     }
-    refuse_given(file, &own_options)?;
+    refuse_for_functions(file, &own_options)?;
     Ok(Subject::Functions)
 }
 

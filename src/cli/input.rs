@@ -30,14 +30,7 @@ pub(super) struct TestFile {
 /// Those of [`read_model`], and a described effect.
 pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let file = read_model(path, terminal)?;
-    if let Some(effect) = file.test.effects.first() {
-        bail!(
-            "{}:{}: this command does not take a description with [[effect]]; remove it, or use `tapjoint predict` \
-             or `tapjoint simulate`",
-            file.name,
-            effect.line
-        );
-    }
+    file.check_has_no_effect()?;
     Ok(file)
 }
 
@@ -46,14 +39,20 @@ pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<Test
 /// # Errors
 /// The file cannot be read, is no UTF-8 text, or is no valid description.
 pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
-    let name = path.display().to_string();
-    let text = read_text(path, terminal)?;
-    let test = TestDescription::parse(&text, &name)?;
-    for warning in &test.warnings {
+    let file = TestFile::of(path, read_text(path, terminal)?)?;
+    for warning in &file.test.warnings {
         terminal.warn(&warning.to_string());
     }
-    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    Ok(TestFile { test, name, folder })
+    Ok(file)
+}
+
+/// Reads the bytes of a test description.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let remedy = "give the path of a test description; `tapjoint init` prints one";
+    fs::read(path).map_err(|cause| anyhow!("{}: cannot be read: {cause}; {remedy}", path.display()))
 }
 
 /// Returns the text of a description: that of a file, or one that the calling program holds.
@@ -65,15 +64,14 @@ pub(super) fn read_text(path: &Path, terminal: &Terminal) -> anyhow::Result<Stri
     if let Some(text) = session.and_then(|session| session.text_of(path)) {
         return Ok(text.to_owned());
     }
-    let name = path.display().to_string();
-    let remedy = "give the path of a test description; `tapjoint init` prints one";
-    let bytes =
-        fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
-    text_of(bytes, &name)
+    text_of(read_bytes(path)?, &path.display().to_string())
 }
 
 /// Returns the text in the bytes of a description of this name.
-fn text_of(bytes: Vec<u8>, name: &str) -> anyhow::Result<String> {
+///
+/// # Errors
+/// They are no UTF-8 text.
+pub(super) fn text_of(bytes: Vec<u8>, name: &str) -> anyhow::Result<String> {
     String::from_utf8(bytes).map_err(|error| {
         let good = error
             .as_bytes()
@@ -95,6 +93,33 @@ pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Err
 }
 
 impl TestFile {
+    /// Returns the description in the text of a file.
+    ///
+    /// # Errors
+    /// It is no valid description.
+    pub(super) fn of(path: &Path, text: String) -> anyhow::Result<Self> {
+        let name = path.display().to_string();
+        let test = TestDescription::parse(&text, &name)?;
+        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        Ok(Self { test, name, folder })
+    }
+
+    /// Refuses a description with effects.
+    ///
+    /// # Errors
+    /// It has an effect.
+    pub(super) fn check_has_no_effect(&self) -> anyhow::Result<()> {
+        let Some(effect) = self.test.effects.first() else {
+            return Ok(());
+        };
+        bail!(
+            "{}:{}: this command does not take a description with [[effect]]; remove it, or use `tapjoint predict` \
+             or `tapjoint simulate`",
+            self.name,
+            effect.line
+        );
+    }
+
     /// Runs the described test, and before it that of the free bar where the description names one. The stages are announced
     /// to `watch`.
     ///
@@ -132,7 +157,7 @@ impl TestFile {
     ///
     /// # Errors
     /// The file cannot be read, is no valid description, or describes another bar.
-    fn free_test(&self, named: &FreeTestFile) -> anyhow::Result<TestFile> {
+    pub(super) fn free_test(&self, named: &FreeTestFile) -> anyhow::Result<TestFile> {
         let path = self.path_of(&named.path);
         let unreadable = |cause: String| {
             let problem = format!(
@@ -147,13 +172,10 @@ impl TestFile {
             return Err(unreadable("it is not a regular file of at most 16 MB".to_owned()).into());
         }
         let bytes = fs::read(&path).map_err(|cause| unreadable(cause.to_string()))?;
-        let name = path.display().to_string();
-        let text = text_of(bytes, &name)?;
-        let test = TestDescription::parse(&text, &name)?;
-        named.check(&self.name, &self.test, &test)?;
-        test.check_has_data(&name)?;
-        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-        Ok(TestFile { test, name, folder })
+        let free = TestFile::of(&path, text_of(bytes, &path.display().to_string())?)?;
+        named.check(&self.name, &self.test, &free.test)?;
+        free.test.check_has_data(&free.name)?;
+        Ok(free)
     }
 
     /// Returns the path of a recording that the description names.

@@ -16,6 +16,7 @@ mod staging;
 mod terminal;
 mod timings;
 
+mod batch;
 mod blind_check;
 mod blind_tests;
 mod change_check;
@@ -84,6 +85,7 @@ enum Command {
     Plan(plan::PlanArguments),
     Diagnose(diagnose::DiagnoseArguments),
     Compare(compare::CompareArguments),
+    Batch(batch::BatchArguments),
     BlindCheck(blind_check::BlindCheckArguments),
     Resolution(resolution::ResolutionArguments),
     Reproduce(program::ReproduceArguments),
@@ -110,15 +112,8 @@ impl Outcome {
         }
     }
 
-    /// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
-    /// A bare recording is answered by a mode.
     fn of_analysis(analysis: &Analysis) -> Outcome {
-        Outcome::of(match &analysis.identification {
-            Some(found) => {
-                found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
-            }
-            None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
-        })
+        Outcome::of(analysis.is_answered())
     }
 }
 
@@ -237,6 +232,7 @@ fn run_command(
         Command::Plan(arguments) => plan::run(arguments, seed, terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, seed, terminal),
         Command::Compare(arguments) => compare::run(arguments, terminal),
+        Command::Batch(arguments) => batch::run(arguments, seed, terminal),
         Command::BlindCheck(arguments) if arguments.compare => {
             change_check::run(arguments, seed, terminal)
         }
@@ -266,6 +262,7 @@ impl Command {
             Self::Plan(arguments) => Some(&arguments.timings),
             Self::Diagnose(arguments) => Some(&arguments.timings),
             Self::Compare(arguments) => Some(&arguments.timings),
+            Self::Batch(arguments) => Some(&arguments.timings),
             Self::BlindCheck(arguments) => Some(&arguments.timings),
             Self::Resolution(arguments) => Some(&arguments.timings),
             Self::Export(arguments) => Some(&arguments.timings),
@@ -286,6 +283,7 @@ impl Command {
             Self::Frf(arguments) => arguments.expanded(test),
             Self::BlindCheck(arguments) => arguments.expanded(),
             Self::Compare(arguments) => arguments.expanded(),
+            Self::Batch(arguments) => arguments.expanded(),
             Self::Man(arguments) => arguments.expanded(&mut CommandLine::command()),
             Self::Simulate(arguments) => arguments.expanded(test),
             _ => Vec::new(),

@@ -9,6 +9,7 @@
 
 use super::arguments::JsonDestination;
 use super::place::{Place, folder_of, is_description};
+use crate::batch::JOURNAL_HEAD;
 use crate::description::TestDescription;
 use crate::report::VERSION_HEAD;
 use anyhow::bail;
@@ -251,8 +252,12 @@ const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
     NONE                         0         0         0\nNONE                \ntapjoint\n\
     NONE                         0         0         0\n    -1\n";
 
+/// Parquet files begin with these bytes, and name the program in their footer.
+const PARQUET: &[u8] = b"PAR1";
+const PARQUET_WRITER: &[u8] = b"tapjoint";
+
 /// First words of the CSV files that the program writes.
-const CSV_HEADS: [&str; 11] = [
+const CSV_HEADS: [&str; 14] = [
     "parameter,method,unit,value,std,low,high,",
     "mode,label,recording,method,frequency_Hz,std_Hz,",
     "mode,frequency_Hz,frequency_std_Hz,damping_ratio,node,",
@@ -264,6 +269,9 @@ const CSV_HEADS: [&str; 11] = [
     "quantity,name,method,unit,block,lines,window,reading,",
     "name,planted,detectable,refutable,verdict,named,",
     "name,changed,item,visible,repeatability,verdict,named,",
+    "test,outcome,error,name,kind,recordings,",
+    "test,mode,label,recording,method,frequency_Hz,",
+    "test,rank,hypothesis,group,probability,",
 ];
 /// First words of the test descriptions that the program writes.
 const DESCRIPTION_HEADS: [&str; 3] = [
@@ -311,6 +319,8 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// | HTML | end of the title |
 /// | JSON | an object with a whole `version` and a list `warnings` |
 /// | CSV | names of the first columns |
+/// | Journal of a batch | first line |
+/// | Parquet | writer in the footer |
 /// | TOML, manual page, deck, version of a page | first comment |
 /// | list of checksums | its name, and the form of its lines |
 ///
@@ -346,6 +356,16 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
     }
     if head.starts_with(UFF) {
         return Ok(tail.ends_with(UFF_HEADER));
+    }
+    // The head of a journal may be all that a killed process has written of it.
+    let journal = JOURNAL_HEAD.as_bytes();
+    if head.starts_with(journal) || !head.is_empty() && journal.starts_with(&head) {
+        return Ok(true);
+    }
+    if head.starts_with(PARQUET) {
+        return Ok(tail
+            .windows(PARQUET_WRITER.len())
+            .any(|part| part == PARQUET_WRITER));
     }
     // The last character of the head may be cut.
     let text = String::from_utf8_lossy(&head);
@@ -417,13 +437,18 @@ fn name_in_list(name: &Path) -> String {
 /// # Errors
 /// The file cannot be read.
 pub(super) fn checksum(path: &Path) -> io::Result<String> {
+    let sum = checksum_bytes(path)?;
+    Ok(sum.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Returns the SHA-256 of a file's content.
+///
+/// # Errors
+/// The file cannot be read.
+pub(super) fn checksum_bytes(path: &Path) -> io::Result<[u8; 32]> {
     let mut sum = Sha256::new();
     io::copy(&mut File::open(path)?, &mut sum)?;
-    Ok(sum
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect())
+    Ok(sum.finalize().into())
 }
 
 #[cfg(test)]

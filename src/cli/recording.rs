@@ -11,17 +11,15 @@ use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::ReadBy;
 use crate::pipeline::{
-    Analysis, FunctionSettings, MeasureSettings, RecordingResult, Stage, Watch, Work,
-    analysis_of_bare, inspect_bare, measure_bare_watched, measure_functions_watched, together,
+    Analysis, RecordingResult, Stage, Watch, Work, analysis_of_bare, inspect_bare,
+    is_no_time_series, measure_bare_file, together,
 };
-use crate::recording::{
-    RecordingError, is_universal_file, list_datasets, open_frequency_responses,
-};
+use crate::recording::{is_universal_file, list_datasets, open_frequency_responses};
 use crate::report::{
     datasets_of, document_of, functions_of, inspection_of, render_spectrum_csv,
     render_spectrum_picture,
 };
-use anyhow::{bail, ensure};
+use anyhow::ensure;
 use clap::Args;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -65,7 +63,7 @@ pub(super) fn analyse_together(
 /// Measures a recording, or the frequency response functions of a file without samples in time.
 ///
 /// # Errors
-/// The file cannot be read, an option does not apply to functions, or the analysis is not possible.
+/// Those of [`measure_bare_file`].
 fn measured(
     path: &Path,
     recording: &RecordingArguments,
@@ -73,50 +71,8 @@ fn measured(
     reading: ReadBy,
     watch: &dyn Watch,
 ) -> anyhow::Result<RecordingResult> {
-    let work = Work::begin(watch, Stage::Taps);
-    let problem = match recording.open(path) {
-        Ok(opened) => {
-            drop(work);
-            let adjust = |measure: &mut MeasureSettings| {
-                spectrum.apply(measure);
-                measure.taps = recording.taps();
-                measure.reading = reading;
-            };
-            let hammer = recording.hammer.as_ref();
-            return Ok(measure_bare_watched(opened, hammer, adjust, watch)?);
-        }
-        Err(problem) => problem,
-    };
-    // Only a file that is recognised as no time series is read again.
-    if !is_no_time_series(&problem) {
-        return Err(problem.into());
-    }
-    let mut functions = match (
-        problem,
-        open_frequency_responses(path, &recording.settings()),
-    ) {
-        (_, Ok(functions)) => functions,
-        // A universal file without samples may hold neither.
-        (problem @ RecordingError::NoTimeSeries { .. }, Err(_)) => return Err(problem.into()),
-        (_, Err(problem)) => return Err(problem.into()),
-    };
-    let time_options = [
-        ("--hammer", recording.hammer.is_some()),
-        ("--sample-rate", recording.sample_rate.is_some()),
-        ("--time-unit", recording.time_unit.is_some()),
-        ("--overload", recording.overload.is_some()),
-        ("--block", spectrum.block.is_some()),
-        ("--window", spectrum.window.is_some()),
-    ];
-    refuse_given(path, &time_options)?;
-    drop(work);
-    functions.file = file_name(path);
-    let settings = FunctionSettings {
-        band: spectrum.zoom,
-        reading,
-        ..FunctionSettings::default()
-    };
-    Ok(measure_functions_watched(&functions, &settings, watch)?)
+    let settings = recording.bare(spectrum, reading);
+    Ok(measure_bare_file(path, &settings, watch)?)
 }
 
 /// Returns true if a file holds frequency response functions and no samples in time.
@@ -128,30 +84,6 @@ pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> an
         Ok(_) => Ok(false),
         Err(problem) if is_no_time_series(&problem) => Ok(true),
         Err(problem) => Err(problem.into()),
-    }
-}
-
-/// Returns true if a file was recognised and holds no samples in time.
-fn is_no_time_series(problem: &RecordingError) -> bool {
-    matches!(
-        problem,
-        RecordingError::FrequencyColumn { .. }
-            | RecordingError::Functions { .. }
-            | RecordingError::NoTimeSeries { .. }
-    )
-}
-
-/// Refuses the first of these options that was given: they do not apply to functions.
-///
-/// # Errors
-/// One of them was given.
-pub(super) fn refuse_given(path: &Path, options: &[(&str, bool)]) -> anyhow::Result<()> {
-    match options.iter().find(|(_, given)| *given) {
-        Some((name, _)) => bail!(
-            "{}: holds frequency response functions, and {name} is for samples in time; leave it out",
-            path.display()
-        ),
-        None => Ok(()),
     }
 }
 

@@ -216,7 +216,7 @@ impl Subject {
 const MOST_NAMES: usize = 10;
 
 /// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
-const SAMPLES: usize = 1000;
+pub(super) const SAMPLES: usize = 1000;
 
 /// Reads the description, and checks that options and recordings go with it.
 fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {

@@ -104,6 +104,18 @@ impl TestDescription {
         })
     }
 
+    /// Returns the description with this file in the place of its recordings: with the settings of the first of them, and
+    /// without measured frequencies. `None` where it describes no recording.
+    pub fn with_recording(&self, file: PathBuf) -> Option<Self> {
+        let mut test = self.clone();
+        test.measured = None;
+        test.recordings.truncate(1);
+        let recording = test.recordings.first_mut()?;
+        recording.file = file;
+        recording.more_files.clear();
+        Some(test)
+    }
+
     /// Asks for something to analyse.
     ///
     /// # Errors

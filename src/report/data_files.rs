@@ -370,16 +370,21 @@ pub fn render_spectrum_csv(recording: &RecordingResult) -> Result<Option<String>
 }
 
 /// Returns the shortest digits that give the same number back; empty where there is none.
-pub(super) fn number(value: Option<f64>) -> String {
+pub fn number(value: Option<f64>) -> String {
     value
         .filter(|value| value.is_finite())
         .map(|value| value.to_string())
         .unwrap_or_default()
 }
 
-/// Returns true for a cell that a spreadsheet would take for a formula. Numbers may begin with a sign.
-fn is_formula(cell: &str) -> bool {
-    cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err()
+/// Returns a text as a cell: with an apostrophe before it where a spreadsheet would take it for a formula. Numbers may begin
+/// with a sign.
+pub fn cell(text: String) -> String {
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    match is_formula && text.parse::<f64>().is_err() {
+        true => format!("'{text}"),
+        false => text,
+    }
 }
 
 /// Returns rows below a line of heads, which are joined by commas.
@@ -390,17 +395,14 @@ pub(super) fn write(
     write_below(heads.split(',').map(str::to_owned).collect(), rows)
 }
 
-/// Returns rows below a line of heads. A text that a spreadsheet would take for a formula gets an apostrophe before it.
+/// Returns rows below a line of heads.
 fn write_below(
     heads: Vec<String>,
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in once(heads).chain(rows) {
-        let row = row.into_iter().map(|cell| match is_formula(&cell) {
-            true => format!("'{cell}"),
-            false => cell,
-        });
+        let row = row.into_iter().map(cell);
         writer.write_record(row).map_err(ReportError::Csv)?;
     }
     let bytes = writer

@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use super::ReportError;
 use super::document::{Document, SheetSection, WarningSection};
 use super::format::{capital, significant, trimmed};
-use super::picture::InlineFigure;
+use super::picture::{Chart, InlineFigure};
 use super::sheet::{Sheet, running_head};
 use super::tables::{self, Table};
 use super::words::answer::Answer;
@@ -77,6 +77,112 @@ impl Method {
     fn is_told(&self) -> bool {
         self.recordings || self.joint || self.comparison || self.series
     }
+}
+
+/// A page on many tests, of which none has a document here.
+#[derive(Debug, Clone, Default)]
+pub struct BatchPage {
+    /// Title.
+    pub title: String,
+    /// Facts in pairs of name and value.
+    pub facts: Vec<(&'static str, String)>,
+    /// What was found, in a few sentences.
+    pub findings: Vec<String>,
+    /// Doubts, the worst first.
+    pub warnings: Vec<WarningSection>,
+    /// Parts of the page.
+    pub sections: Vec<BatchSection>,
+}
+
+/// A part of a page on many tests.
+#[derive(Debug, Clone, Default)]
+pub struct BatchSection {
+    /// Short name, for links.
+    pub id: &'static str,
+    /// Title.
+    pub title: &'static str,
+    /// Paragraphs before the tables.
+    pub story: Vec<String>,
+    /// Tables.
+    pub tables: Vec<Table>,
+    /// Long tables that open on demand.
+    pub folded: Vec<Table>,
+    /// Charts.
+    pub charts: Vec<Chart>,
+}
+
+/// Returns a page on many tests, which looks like that of a report.
+///
+/// # Errors
+/// [`ReportError::Html`] if the template cannot be filled, and those of the charts.
+pub fn render_batch_page(page: BatchPage) -> Result<String, ReportError> {
+    let (mut sections, mut figures) = (Vec::new(), Vec::new());
+    for section in page.sections {
+        for chart in &section.charts {
+            figures.push(InlineFigure::of(section.id, chart, &chart.draw())?);
+        }
+        sections.push(Section {
+            id: section.id,
+            title: section.title,
+            story: section.story,
+            tables: section.tables,
+            folded: section.folded,
+            ..Section::default()
+        });
+    }
+    for section in &mut sections {
+        let own = figures.iter().filter(|figure| figure.section == section.id);
+        section.figures = own.collect();
+    }
+    let answer = Answer {
+        state: None,
+        reason: String::new(),
+        name: page.title.clone(),
+        measured: Vec::new(),
+        modes: None,
+        strongest: Vec::new(),
+        values: Vec::new(),
+        model: None,
+        findings: page.findings.clone(),
+        action: None,
+        doubts: Vec::new(),
+    };
+    let filled = Page {
+        running: page.title.clone(),
+        title: page.title,
+        facts: page.facts,
+        answer: &answer,
+        sheet: None,
+        filed: Vec::new(),
+        first_figure: None,
+        warnings: page.warnings.iter().collect(),
+        hidden_warnings: 0,
+        findings: page.findings,
+        sections,
+        method: Method {
+            recordings: false,
+            joint: false,
+            comparison: false,
+            series: false,
+        },
+        live: live_of(&figures),
+        reload: None,
+        version: env!("CARGO_PKG_VERSION"),
+    };
+    filled.render().map_err(ReportError::Html)
+}
+
+/// Returns the scripts that figures need; `None` where none is live.
+fn live_of(figures: &[InlineFigure]) -> Option<Live> {
+    let any_live = figures.iter().any(|figure| figure.live.is_some());
+    any_live.then_some(Live {
+        library: PLOT_LIBRARY,
+        style: PLOT_STYLE,
+        license: PLOT_LICENSE,
+        script: SCRIPT,
+        points: POINTS,
+        views: VIEWS,
+    })
 }
 
 /// A part of the page.
@@ -171,7 +277,6 @@ fn page_of<'a>(
     }
     // Uncertainties may stand in pictures alone.
     sections.retain(|section| section.id != "uncertainty" || !section.is_empty());
-    let any_live = figures.iter().any(|figure| figure.live.is_some());
     let name = document.test.as_ref().map(|test| test.name.clone());
     let name = name.filter(|name| !name.is_empty());
     let name = name.unwrap_or_else(|| "Unnamed test".to_owned());
@@ -201,14 +306,7 @@ fn page_of<'a>(
             comparison: document.compare.is_some(),
             series: document.series.is_some(),
         },
-        live: any_live.then_some(Live {
-            library: PLOT_LIBRARY,
-            style: PLOT_STYLE,
-            license: PLOT_LICENSE,
-            script: SCRIPT,
-            points: POINTS,
-            views: VIEWS,
-        }),
+        live: live_of(figures),
         reload: None,
         version: env!("CARGO_PKG_VERSION"),
     }

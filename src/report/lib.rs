@@ -5,7 +5,7 @@
 pub mod blind_check;
 mod brief;
 pub mod change_check;
-mod data_files;
+pub mod data_files;
 pub mod deck;
 pub mod document;
 mod exchange;
@@ -52,6 +52,7 @@ pub use document::{
     inspection_of, lambdas_of, prediction_of, series_of,
 };
 pub use exchange::{EXCHANGED, ExchangeFiles, exchange_files};
+pub use html::{BatchPage, BatchSection, render_batch_page};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{
     DrawnPictures, MODEL_FILE, VERSION_FILE, VERSION_HEAD, compared_files, draw_compared, draw_run,

@@ -17,9 +17,7 @@ use crate::document::Document;
 use crate::exchange::EXCHANGED;
 use crate::html::{render_first_screen_html, render_html, render_reloading_html};
 use crate::picture::InlineFigure;
-use crate::picture::{
-    Block, Chart, Color, Drawing, PictureFormat, packed, render_picture, render_svg,
-};
+use crate::picture::{Block, Chart, Color, Drawing, PictureFormat, render_picture};
 use crate::sheet::render_sheet;
 use crate::short_names::{ends_of_paths, stems};
 use crate::{
@@ -51,7 +49,10 @@ pub fn draw_run(
 ) -> Result<DrawnPictures, ReportError> {
     let mut drawn = DrawnPictures::of(&pictures(document, recordings))?;
     if let Some(chart) = leading(recordings) {
-        drawn.figures.push(inline_figure(&chart, &chart.draw())?);
+        let section = section_of(&chart);
+        drawn
+            .figures
+            .push(InlineFigure::of(section, &chart, &chart.draw())?);
     }
     Ok(drawn)
 }
@@ -65,7 +66,8 @@ pub fn render_first_screen(
     document: &Document,
     recordings: &[RecordingResult],
 ) -> Result<String, ReportError> {
-    let figure = leading(recordings).map(|chart| inline_figure(&chart, &chart.draw()));
+    let figure = leading(recordings)
+        .map(|chart| InlineFigure::of(section_of(&chart), &chart, &chart.draw()));
     render_first_screen_html(document, figure.transpose()?)
 }
 
@@ -320,27 +322,21 @@ pub(crate) fn picture_files(name: &str, drawing: &Drawing) -> Result<[ReportFile
 fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
     let drawing = chart.draw();
     let files = picture_files(name, &drawing)?;
-    Ok((files, inline_figure(chart, &drawing)?))
+    Ok((files, InlineFigure::of(section_of(chart), chart, &drawing)?))
 }
 
-/// Returns a picture for the page.
-fn inline_figure(chart: &Chart, drawing: &Drawing) -> Result<InlineFigure, ReportError> {
-    Ok(InlineFigure {
-        section: match chart.kind {
-            "answer" => "answer",
-            "taps" => "recordings",
-            "frequencies" | "mode-shapes" | "shape-agreement" => "joint",
-            "gap" | "gap-place" => "gap",
-            "cloud" => "uncertainty",
-            "compare" | "compare-spectra" => "compare",
-            "series" => "series",
-            _ => "modes",
-        },
-        caption: chart.caption.clone(),
-        svg: render_svg(drawing),
-        tall: drawing.height > drawing.width,
-        live: chart.page().as_ref().map(packed).transpose()?,
-    })
+/// Returns the section of the page in which a chart stands.
+fn section_of(chart: &Chart) -> &'static str {
+    match chart.kind {
+        "answer" => "answer",
+        "taps" => "recordings",
+        "frequencies" | "mode-shapes" | "shape-agreement" => "joint",
+        "gap" | "gap-place" => "gap",
+        "cloud" => "uncertainty",
+        "compare" | "compare-spectra" => "compare",
+        "series" => "series",
+        _ => "modes",
+    }
 }
 
 /// Returns all pictures that there are data for, with the names of their files without ending.

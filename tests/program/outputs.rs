@@ -198,6 +198,16 @@ const TABLE: &[Row] = &[
         &[folder("--out", "series.csv", None)],
     ),
     row(
+        &["batch", "cantilever", "--no-diagnosis"],
+        &[
+            "cantilever/test.toml",
+            "cantilever/low.wav",
+            "cantilever/high.wav",
+        ],
+        &[],
+        &[folder("--out", "tests.csv", None)],
+    ),
+    row(
         &["blind-check", "--folder", "tests", "--truth", "truths.json"],
         &["truths.json", "tests/a/test.toml", "tests/a/taps.wav"],
         &[],

@@ -180,6 +180,9 @@ pub struct Series {
     /// Height of each point with its uncertainty and unit; where empty, the number itself is shown.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub said: Vec<String>,
+    /// Address that a click on each point of the page opens; may be empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub links: Vec<String>,
     /// Words beside each point in the picture, as far as there is room.
     #[serde(skip)]
     pub labels: Vec<String>,
@@ -374,6 +377,7 @@ impl Series {
             extra: Vec::new(),
             words: Vec::new(),
             said: Vec::new(),
+            links: Vec::new(),
             labels: Vec::new(),
         }
     }

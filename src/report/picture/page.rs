@@ -8,7 +8,8 @@ use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::drawing::Point;
+use super::drawing::{Drawing, Point};
+use super::files::render_svg;
 use super::{Block, Chart, Event, InPage, Mark, Panel, Places, Run, Series};
 use crate::ReportError;
 use crate::format::significant;
@@ -43,6 +44,26 @@ pub struct InlineFigure {
     pub live: Option<String>,
     /// True where it is so high that in print it takes a page of its own.
     pub tall: bool,
+}
+
+impl InlineFigure {
+    /// Takes a chart for a section of the page, with its drawing.
+    ///
+    /// # Errors
+    /// [`ReportError::Json`] where the chart is no JSON.
+    pub fn of(
+        section: &'static str,
+        chart: &Chart,
+        drawing: &Drawing,
+    ) -> Result<Self, ReportError> {
+        Ok(Self {
+            section,
+            caption: chart.caption.clone(),
+            svg: render_svg(drawing),
+            tall: drawing.height > drawing.width,
+            live: chart.page().as_ref().map(packed).transpose()?,
+        })
+    }
 }
 
 /// Returns a chart as it stands in the page: JSON, deflated, since numbers take up most of it, and in base 64.
@@ -294,6 +315,7 @@ fn view(name: &str, panels: &[Panel]) -> Block {
                 extra: each(&one.extra, PLACE_DIGITS),
                 words: one.words.clone(),
                 said: one.said.clone(),
+                links: one.links.clone(),
                 ..Series::new(&one.name, one.color, one.mark)
             });
         }

@@ -68,13 +68,14 @@ pub enum Place {
 }
 
 /// A cell with the head of its column.
-pub(crate) struct Cell {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
     column: Column,
     text: String,
 }
 
 /// A cell of a column of numbers shown everywhere.
-pub(crate) fn number(name: &str, text: impl Into<String>) -> Cell {
+pub fn number(name: &str, text: impl Into<String>) -> Cell {
     Cell {
         column: Column {
             name: name.to_owned(),
@@ -86,7 +87,7 @@ pub(crate) fn number(name: &str, text: impl Into<String>) -> Cell {
 }
 
 /// A cell of a column of words shown everywhere.
-pub(crate) fn words(name: &str, text: impl Into<String>) -> Cell {
+pub fn words(name: &str, text: impl Into<String>) -> Cell {
     let mut cell = number(name, text);
     cell.column.is_number = false;
     cell
@@ -114,7 +115,7 @@ impl Cell {
 
 impl Table {
     /// A table of these rows, whose cells bring their heads along; without rows it has no columns.
-    pub(crate) fn of<R: IntoIterator<Item = Cell>>(
+    pub fn of<R: IntoIterator<Item = Cell>>(
         caption: impl Into<String>,
         rows: impl IntoIterator<Item = R>,
         note: impl Into<String>,

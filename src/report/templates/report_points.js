@@ -265,6 +265,9 @@ function buildPoints(figure) {
     panel.tip = element("div", "tip");
     u.over.appendChild(panel.tip);
     fingers(u, { x: panel.x.range, y: panel.y.range }, function (x, y) { look(figure, u, panel, x, y); });
+    u.over.addEventListener("click", function () {
+      if (panel.lit && panel.lit.set.links) location.href = panel.lit.set.links[panel.lit.index];
+    });
     if (choosesPoles(figure)) u.over.addEventListener("click", function () {
       if (!panel.lit || panel.lit.set.mark === "square") return;
       // One and a half per mille of what is shown is the width of a mark.

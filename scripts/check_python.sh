@@ -47,14 +47,14 @@ step 'import without extras' "$bin/python" -c 'import tapjoint; assert tapjoint.
 step 'the command' "$bin/tapjoint" --version
 
 cat >"$work/import_time.py" <<'PYTHON'
-"""Median time of importing everything, numpy included, beyond that of importing numpy (ms)."""
+"""Median processor time of importing everything, numpy included, beyond that of importing numpy (ms)."""
 
 import statistics
 import subprocess
 import sys
 
 MODULES = "numpy, tapjoint, tapjoint._commands, tapjoint._functions, tapjoint._recording"
-CODE = "import time; start = time.perf_counter(); import {}; print(time.perf_counter() - start)"
+CODE = "import time; start = time.process_time(); import {}; print(time.process_time() - start)"
 
 
 def seconds(modules):
@@ -62,7 +62,7 @@ def seconds(modules):
     return float(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
 
 
-# By turns, so that other work on the machine meets both alike.
+# Processor time: other work on the machine counts as little as possible. By turns, for the same reason.
 pairs = [(seconds("numpy"), seconds(MODULES)) for _ in range(21)]
 numpy, both = (1e3 * statistics.median(times) for times in zip(*pairs))
 own = 1e3 * statistics.median(b - a for a, b in pairs)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Real = NDArray[np.float64]
+    Complex = NDArray[np.complex128]
 
 
 def real(name: str, values: ArrayLike) -> Real:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any, Union
 
 import numpy as np
@@ -291,6 +289,10 @@ def simulate(
     Raises:
         DescriptionError, InputError: Bad input, with the message of the program.
     """
+    # Loaded here, because few need them.
+    import shutil
+    from tempfile import mkdtemp
+
     temporary = mkdtemp(prefix="tapjoint-") if out is None else None
     folder = Path(os.fspath(out or temporary or ""))
     call = _Call("simulate")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from . import _native, _plots
-from ._arrays import Complex, Real, complex_values, real
+from ._arrays import complex_values, real
 from ._packages import package
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ._arrays import Complex, Real
 
 
 @dataclass(frozen=True, eq=False)

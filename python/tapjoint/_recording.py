@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from . import _native, _plots
-from ._arrays import Real, real
+from ._arrays import real
 from ._functions import FrequencyResponses, Spectrum
 from ._packages import package
 from ._results import Result, Section
 from .errors import InputError, RecordingError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ._arrays import Real
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
-import weakref
 from collections.abc import Iterator, Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -239,6 +236,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         """The first screen of the report's page, in a frame of its own, so that no style meets the notebook's."""
+        from html import escape
+
         if self._native is None:
             return f"<pre>{escape(str(self))}</pre>"
         page = escape(self._native.first_screen(), quote=True)
@@ -263,6 +262,10 @@ class Simulation:
 
     def remove_with(self, folder: str) -> None:
         """Removes this folder once nothing refers to the simulation any more."""
+        # Loaded here, because few need them.
+        import shutil
+        import weakref
+
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
 
     @property

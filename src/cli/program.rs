@@ -32,7 +32,7 @@ const TASKS: &[(&str, &[&str])] = &[
         &["identify", "predict", "perturb", "resolution", "export"],
     ),
     ("Effects that the model lacks", &["plan", "diagnose"]),
-    ("Changes between tests", &["compare"]),
+    ("Many tests", &["compare", "batch"]),
     ("Virtual tests", &["simulate", "blind-check", "reproduce"]),
     (OTHER, &["completions", "man", "help"]),
 ];

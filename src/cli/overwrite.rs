@@ -134,6 +134,27 @@ impl Files {
         Ok(())
     }
 
+    /// Checks inputs that other files name against all outputs.
+    ///
+    /// # Errors
+    /// One of them is an output.
+    pub(super) fn check_inputs(&self, paths: impl Iterator<Item = PathBuf>) -> anyhow::Result<()> {
+        let outputs = self.outputs.iter();
+        let outputs: Vec<(Place, &str, &Path)> = outputs
+            .filter_map(|(option, path)| Some((Place::of(path)?, option.as_str(), path.as_path())))
+            .collect();
+        for path in paths {
+            let Some(input) = Place::of(&path) else {
+                continue;
+            };
+            let mut same = outputs.iter().filter(|(output, ..)| output.is(&input));
+            if let Some((_, option, output)) = same.next() {
+                bail!(is_input(output, option));
+            }
+        }
+        Ok(())
+    }
+
     /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
@@ -151,9 +172,7 @@ impl Files {
             );
         }
         if self.reads(path) {
-            bail!(
-                "{shown}: is an input of this command and cannot be its output ({option}); give another name"
-            );
+            bail!(is_input(path, option));
         }
         if !self.force && !is_free(path) {
             bail!(
@@ -180,6 +199,14 @@ impl Files {
     fn reads(&self, path: &Path) -> bool {
         Place::of(path).is_some_and(|place| self.inputs.iter().any(|input| input.is(&place)))
     }
+}
+
+/// Returns the words on an input that is an output as well.
+fn is_input(path: &Path, option: &str) -> String {
+    format!(
+        "{}: is an input of this command and cannot be its output ({option}); give another name",
+        path.display()
+    )
 }
 
 /// Returns true if there is no file, an empty one, or one that the program made.

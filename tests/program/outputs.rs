@@ -198,6 +198,18 @@ const TABLE: &[Row] = &[
         &[folder("--out", "series.csv", None)],
     ),
     row(
+        &["batch", "--from", "list.txt", "--no-diagnosis"],
+        &["list.txt", "cantilever/test.toml", "cantilever/low.wav"],
+        &[],
+        &[],
+    ),
+    row(
+        &["batch", "--table", "rows.csv", "--no-diagnosis"],
+        &["rows.csv", "cantilever/test.toml", "cantilever/low.wav"],
+        &[],
+        &[],
+    ),
+    row(
         &["batch", "cantilever", "--no-diagnosis"],
         &[
             "cantilever/test.toml",
@@ -381,6 +393,8 @@ fn inputs() -> tempfile::TempDir {
     fs::write(place.join("modes.unv"), BY_PYUFF).unwrap();
     let truth = r#"[{"name": "a", "effects": [], "params": {}}]"#;
     fs::write(place.join("truths.json"), truth).unwrap();
+    fs::write(place.join("list.txt"), "cantilever/test.toml\n").unwrap();
+    fs::write(place.join("rows.csv"), "file\ncantilever/test.toml\n").unwrap();
     let truth = r#"[{"name": "a", "changes": []}]"#;
     fs::write(place.join("pairs.json"), truth).unwrap();
     let rows: Vec<String> = (0..2000)
@@ -703,6 +717,7 @@ fn prop_the_table_has_every_option_with_a_file() {
         let given = row.arguments.iter().filter(|argument| {
             [
                 "--report", "--folder", "--truth", "--before", "--after", "--pair", "--series",
+                "--from", "--table",
             ]
             .contains(argument)
         });

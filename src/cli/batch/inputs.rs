@@ -3,7 +3,7 @@
 use super::super::input::{
     TestFile, check_file, file_name, read_bytes, read_test, read_text, stem, text_of,
 };
-use super::super::overwrite::{carries_mark, checksum_bytes, files_of};
+use super::super::overwrite::{carries_mark, checksum_bytes, described, files_of};
 use super::super::place::{FolderContents, is_description};
 use super::super::terminal::Terminal;
 use super::BatchArguments;
@@ -91,7 +91,19 @@ impl Tests {
             tests.len() > 0,
             "there is no test; give descriptions, folders with descriptions, or recordings"
         );
+        let inputs = (0..tests.len()).flat_map(|test| tests.files(test));
+        terminal.files().check_inputs(inputs)?;
         Ok(tests)
+    }
+
+    /// Returns the files that a test reads.
+    fn files(&self, test: usize) -> Vec<PathBuf> {
+        let path = self.path(test);
+        let test = Some(&path).filter(|path| is_description(path));
+        let test = test.and_then(|path| described(path));
+        let mut files = test.map_or_else(Vec::new, |test| files_of(&path, &test));
+        files.push(path);
+        files
     }
 
     /// Returns the number of tests.
@@ -165,7 +177,7 @@ impl Tests {
     ) -> anyhow::Result<Subject> {
         let row = self.row(test);
         if is_description(path) {
-            let described = described(path, row.map(|table| (table, test)), inputs)?;
+            let described = read_described(path, row.map(|table| (table, test)), inputs)?;
             return Ok(Subject::Described(Box::new(described)));
         }
         inputs.push(summed(path));
@@ -244,7 +256,7 @@ impl Template {
 }
 
 /// Reads a description, and that of the free bar which it names, with the keys that a row of a table sets.
-fn described(
+fn read_described(
     path: &Path,
     row: Option<(&InputTable, usize)>,
     inputs: &mut Vec<InputFile>,

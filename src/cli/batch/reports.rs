@@ -7,6 +7,7 @@ use super::super::run::SAMPLES;
 use super::super::terminal::Terminal;
 use crate::batch::{BatchRecord, BatchSettings, BatchTest, Subject, analyse, record_of};
 use crate::pipeline::IdentifySettings;
+use crate::report::document::SheetSection;
 use crate::report::{MODEL_FILE, document_of, draw_run, gap_section, run_files};
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,9 @@ impl Reports {
         let folder = self.folder.join(folder_name(index, &test.file));
         let output = OutputFolder::prepare(&folder, terminal.files())?;
         let mut document = document_of(&found.analysis);
+        if let Subject::Described(described) = &test.subject {
+            document.sheet = Some(SheetSection::of(&described.test));
+        }
         if let (Some(diagnosis), Subject::Described(described)) = (&found.diagnosis, &test.subject)
         {
             let mut gap = gap_section(diagnosis.as_ref());

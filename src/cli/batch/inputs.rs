@@ -93,6 +93,7 @@ impl Tests {
         );
         let inputs = (0..tests.len()).flat_map(|test| tests.files(test));
         terminal.files().check_inputs(inputs)?;
+        terminal.files().check()?;
         Ok(tests)
     }
 

@@ -1,6 +1,6 @@
 //! Commands inside another program: nothing is printed, and the results come back as values.
 
-use super::terminal::{error_text, usage_text};
+use super::error_text::{error_text, usage_text};
 use super::{Command, Outcome, parse, run_command, staging};
 use crate::description::TestDescription;
 use crate::pipeline::{RecordingResult, Stage, Watch, Work};

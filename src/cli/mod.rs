@@ -4,6 +4,7 @@
 //! writes. Exit codes: 0 = answered, 1 = these data give no answer, 2 = wrong usage or bad input.
 
 mod arguments;
+mod error_text;
 mod input;
 mod laboratory;
 mod output;

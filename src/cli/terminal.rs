@@ -2,10 +2,10 @@
 
 use super::arguments::{CommonArguments, FullAnswer, JsonDestination};
 use super::embedded::Session;
+use super::error_text::{error_text, shortened};
 use super::output::{OutputFile, unless_closed};
 use super::overwrite::Files;
 use super::progress::{Measuring, time_left};
-use super::staging::ledger;
 use super::timings::Stopwatch;
 use crate::pipeline::{Analysis, Watch};
 use crate::report::document::{Document, TimingsSection};
@@ -312,40 +312,6 @@ pub(super) fn print_error(error: &anyhow::Error) {
     let _ = writeln!(io::stderr(), "error: {}", error_text(error));
 }
 
-/// Returns the text of an error, with the causes that the message does not contain yet, and the results that are written
-/// all the same.
-pub(super) fn error_text(error: &anyhow::Error) -> String {
-    let mut text = error.to_string();
-    for cause in error.chain().skip(1) {
-        let cause = cause.to_string();
-        if !text.contains(&cause) {
-            text.push_str(": ");
-            text.push_str(&cause);
-        }
-    }
-    let written = &ledger().written;
-    if !written.is_empty() {
-        let names: Vec<_> = written
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect();
-        text.push_str("; written all the same: ");
-        text.push_str(&names.join(", "));
-    }
-    shortened(&text)
-}
-
-/// Returns the text of the error of a wrong command line, without "error: " and without the hints of a terminal.
-pub(super) fn usage_text(usage: &clap::Error) -> String {
-    let text = usage.render().to_string();
-    let end = text
-        .find("\n\nUsage:")
-        .or(text.find("\n\nFor more"))
-        .unwrap_or(text.len());
-    let text = text[..end].trim();
-    shortened(text.strip_prefix("error: ").unwrap_or(text))
-}
-
 /// Prints the error of a wrong command line, or the help that was asked for.
 pub(super) fn print_usage(usage: &clap::Error) {
     if !usage.use_stderr() {
@@ -361,37 +327,9 @@ pub(super) fn print_usage(usage: &clap::Error) {
     let _ = write!(io::stderr(), "{}", shortened(&text));
 }
 
-/// Replaces numbers of more than 40 digits by their beginning and the count of their digits.
-fn shortened(text: &str) -> String {
-    const MOST_DIGITS: usize = 40;
-    const KEPT: usize = 8;
-    let mut short = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
-        let tail = &rest[start..];
-        let digits = tail.bytes().take_while(u8::is_ascii_digit).count();
-        let kept = if digits > MOST_DIGITS { KEPT } else { digits };
-        short.push_str(&rest[..start + kept]);
-        if kept < digits {
-            short.push_str(&format!("... ({digits} digits)"));
-        }
-        rest = &tail[digits..];
-    }
-    short + rest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn limit_long_numbers_are_shortened() {
-        let nines = "9".repeat(309);
-        let text = format!("a {nines} b 1{} c 12", "0".repeat(39));
-        let short = format!("a 99999999... (309 digits) b 1{} c 12", "0".repeat(39));
-        assert_eq!(shortened(&text), short);
-        assert_eq!(shortened("no number"), "no number");
-    }
 
     #[test]
     fn prop_colours_change_no_word() {

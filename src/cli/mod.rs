@@ -217,9 +217,10 @@ fn run_command(
     for folder in files.folders() {
         publication::end_begun(folder, &files)?;
     }
-    // A batch checks its files once it has listed its tests.
-    if !matches!(line.command, Command::Batch(_)) {
-        files.check()?;
+    // A batch checks its inputs once it has listed its tests.
+    match line.command {
+        Command::Batch(_) => files.check_distinct()?,
+        _ => files.check()?,
     }
     let terminal = Terminal::new(&line.common, files, stopwatch, session)?;
     let seed = line.common.seed;

@@ -117,9 +117,19 @@ impl Files {
     /// # Errors
     /// An output is an input, two outputs are one file, or an existing file was not made by the program.
     pub(super) fn check(&self) -> anyhow::Result<()> {
-        let mut before: Vec<(Place, &str)> = Vec::new();
         for (option, path) in &self.outputs {
             self.check_output(path, option)?;
+        }
+        self.check_distinct()
+    }
+
+    /// Checks all outputs against each other.
+    ///
+    /// # Errors
+    /// Two outputs are one file.
+    pub(super) fn check_distinct(&self) -> anyhow::Result<()> {
+        let mut before: Vec<(Place, &str)> = Vec::new();
+        for (option, path) in &self.outputs {
             let Some(place) = Place::of(path) else {
                 continue;
             };

@@ -288,6 +288,11 @@ fn better_numbering(
     let is_tested = estimate.goodness.probability? < FAILS && used.len() >= fitted + 2;
     let mut found: Vec<(f64, Vec<usize>)> = Vec::new();
     let own: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
+    let quick_misfit = |modes: &[MeasuredMode]| {
+        let estimator = estimator_of_lengths(structure, details, modes, moved);
+        estimator.map_or(f64::INFINITY, |estimator| estimator.quick_misfit())
+    };
+    let own_misfit = if is_tested { quick_misfit(used) } else { 0.0 };
     for from in (0..own.len()).filter(|_| is_tested) {
         for up in [true, false] {
             let mut numbers = own.clone();
@@ -305,6 +310,10 @@ fn better_numbering(
                     ..*mode
                 })
                 .collect();
+            // A numbering that fits no better than one that fails cannot explain the readings.
+            if quick_misfit(&modes) >= own_misfit {
+                continue;
+            }
             let other = settled(structure, details, &modes, moved, &[]);
             let probability = other.ok().and_then(|(_, other)| other.goodness.probability);
             found.extend(probability.map(|probability| (probability, numbers)));

@@ -11,12 +11,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ._batch import Batch, batch
     from ._commands import compare, diagnose, identify, predict, run, simulate
     from ._functions import FrequencyResponses, Modes, Spectrum, frf, modes
     from ._recording import Channel, Recording, from_arrays, from_sep005, read
     from ._results import Result, Section, Simulation
     from ._test import Test
     from .errors import (
+        BatchError,
         DescriptionError,
         InputError,
         MissingPackageError,
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Batch",
+    "BatchError",
     "Channel",
     "DescriptionError",
     "FrequencyResponses",
@@ -46,6 +50,7 @@ __all__ = [
     "TapjointWarning",
     "Test",
     "__version__",
+    "batch",
     "compare",
     "diagnose",
     "frf",
@@ -61,6 +66,7 @@ __all__ = [
 
 # Names are loaded when they are first used, so that the command and `import tapjoint` start without numpy.
 _MODULES = {
+    "_batch": ("Batch", "batch"),
     "_commands": ("compare", "diagnose", "identify", "predict", "run", "simulate"),
     "_functions": ("FrequencyResponses", "Modes", "Spectrum", "frf", "modes"),
     "_native": ("__version__",),
@@ -68,6 +74,7 @@ _MODULES = {
     "_results": ("Result", "Section", "Simulation"),
     "_test": ("Test",),
     "errors": (
+        "BatchError",
         "DescriptionError",
         "InputError",
         "MissingPackageError",

@@ -64,6 +64,10 @@ class NoAnswerError(TapjointError):
         return NoAnswerError, (str(self), self.result)
 
 
+class BatchError(TapjointError):
+    """Tasks of a batch failed on every worker that tried them. What was finished is kept."""
+
+
 class MissingPackageError(TapjointError, ImportError):
     """A package that this call needs is not installed. The message has the command that installs it."""
 

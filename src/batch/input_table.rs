@@ -1,5 +1,6 @@
 //! The input table: a row for each recording, with what differs between the tests.
 
+use crate::WITHOUT_PARQUET;
 use std::fmt;
 use tapjoint_description::{DescriptionError, TestDescription};
 use toml::{Table, Value};
@@ -31,6 +32,9 @@ const TABLES: [&str; 9] = [
     "effect",
     "sheet",
 ];
+
+/// First bytes of a Parquet file.
+const PARQUET: &[u8] = b"PAR1";
 
 /// Column with the names of the recordings or descriptions.
 const FILE: &str = "file";
@@ -77,8 +81,10 @@ struct KeyColumn {
 impl InputTable {
     /// Reads a table of comma separated values; semicolons and tabs separate as well. Messages call it `name`.
     ///
+    /// With the feature `parquet` it may be a Parquet file. Its rows then count as lines, after a line of heads.
+    ///
     /// # Errors
-    /// A line with another number of cells than the first, a missing column `file`, a column that stands twice, an empty
+    /// A Parquet file that cannot be read, or a line with another number of cells than the first, a missing column `file`, a column that stands twice, an empty
     /// name of a file, or more than `most` rows.
     pub fn parse(bytes: &[u8], name: &str, most: usize) -> Result<Self, TableError> {
         let error = |line: u64, problem: String| TableError {
@@ -86,6 +92,17 @@ impl InputTable {
             line,
             problem,
         };
+        #[cfg(feature = "parquet")]
+        let text = match bytes.starts_with(PARQUET) {
+            true => crate::parquet_table::csv_of(bytes).map_err(|problem| error(1, problem))?,
+            false => Vec::new(),
+        };
+        #[cfg(feature = "parquet")]
+        let bytes = if text.is_empty() { bytes } else { &text };
+        if bytes.starts_with(PARQUET) {
+            let problem = format!("is a Parquet file; {WITHOUT_PARQUET}, or save the table as CSV");
+            return Err(error(1, problem));
+        }
         let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
         let first = bytes
             .split(|byte| *byte == b'\n')

@@ -6,13 +6,15 @@
 //!
 //! [`answer`] is a pure function of the test's files, its description and the settings. It may run in any thread, process or
 //! machine. [`journal`] writes a record as one line of JSON and reads it back without loss. [`tables`] writes the records of
-//! all tests as CSV. [`summary`] gathers what all tests together show. Nothing here prints, and nothing but recordings is
+//! all tests as CSV, and with the feature `parquet` `parquet_table` writes them as Parquet. [`summary`] gathers what all tests together show. Nothing here prints, and nothing but recordings is
 //! read from files.
 
 mod answer;
 pub mod input_table;
 pub mod journal;
 pub mod page;
+#[cfg(feature = "parquet")]
+pub mod parquet_table;
 pub mod record;
 pub mod settings;
 pub mod summary;
@@ -22,6 +24,8 @@ pub mod words;
 pub use answer::{Analysed, BatchError, analyse, answer, answer_watched, record_of};
 pub use input_table::{InputTable, TableError};
 pub use journal::{JOURNAL_HEAD, Journal, Key, journal_line, record_in};
+#[cfg(feature = "parquet")]
+pub use parquet_table::ParquetWriter;
 pub use record::{
     BatchRecord, Estimated, HypothesisRow, ModeRow, Parameters, TestOutcome, TestRow,
 };
@@ -31,3 +35,6 @@ pub use tables::{TABLES, TableKind, TableWriter};
 
 /// Most tests of one batch. Their names and places stay in memory.
 pub const MOST_TESTS: usize = 10_000_000;
+
+/// What to do where a build lacks the feature `parquet`.
+pub const WITHOUT_PARQUET: &str = "this build of tapjoint has no Parquet; build it with `cargo build --release --features parquet`, or use the command of the Python package";

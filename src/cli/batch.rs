@@ -14,13 +14,15 @@ use super::overwrite::Expanded;
 use super::publication::OutputFolder;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
+#[cfg(feature = "parquet")]
+use crate::batch::ParquetWriter;
 use crate::batch::page::TestNames;
 use crate::batch::{
     BatchRecord, BatchSettings, Collector, JOURNAL_HEAD, Summary, TABLES, TableWriter,
-    answer_watched,
+    WITHOUT_PARQUET, answer_watched,
 };
 use crate::description::ReadBy;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use inputs::{Loaded, Tests};
@@ -78,6 +80,9 @@ pub(super) struct BatchArguments {
     /// Leave the diagnosis out
     #[arg(long)]
     no_diagnosis: bool,
+    /// Write the tables as Parquet as well. A build without the feature `parquet` cannot
+    #[arg(long, conflicts_with = "shard")]
+    parquet: bool,
     #[command(flatten)]
     spectrum: SpectrumSettings,
     #[command(flatten)]
@@ -144,6 +149,9 @@ impl BatchArguments {
             None => {
                 let tables = TABLES.map(|table| format!("{}.csv", table.stem()));
                 let mut names = tables.to_vec();
+                if self.parquet {
+                    names.extend(TABLES.map(|table| format!("{}.parquet", table.stem())));
+                }
                 names.extend([JOURNAL, PAGE].map(str::to_owned));
                 names
             }
@@ -167,6 +175,10 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
+    ensure!(
+        !arguments.parquet || cfg!(feature = "parquet"),
+        "--parquet: {WITHOUT_PARQUET}"
+    );
     let tests = Tests::listed(arguments, arguments.settings(seed), &terminal)?;
     let reports = arguments.reports.then(|| Reports::of(&arguments.out));
     let reports = reports.as_ref();
@@ -395,7 +407,7 @@ fn finish(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let output = OutputFolder::prepare(&arguments.out, terminal.files())?;
-    let summary = write_all(tests, places, reports, read, &output)
+    let summary = write_all(tests, places, reports, read, arguments, &output)
         .map_err(|cause| unless_told(cause, &arguments.out))?;
     let folder = output.publish()?;
     let page = folder.join(PAGE);
@@ -439,6 +451,7 @@ fn write_all(
     places: &[Place],
     reports: Option<&Reports>,
     read: impl Fn(Place) -> anyhow::Result<(Vec<u8>, BatchRecord)>,
+    arguments: &BatchArguments,
     output: &OutputFolder,
 ) -> anyhow::Result<Summary> {
     let carried = tests.carried_heads();
@@ -446,6 +459,13 @@ fn write_all(
     for table in TABLES {
         let file = File::create(output.place_of(&format!("{}.csv", table.stem())))?;
         tables.push(TableWriter::new(table, &carried, BufWriter::new(file))?);
+    }
+    #[cfg(feature = "parquet")]
+    let mut parquet = Vec::new();
+    #[cfg(feature = "parquet")]
+    for table in TABLES.into_iter().filter(|_| arguments.parquet) {
+        let file = File::create(output.place_of(&format!("{}.parquet", table.stem())))?;
+        parquet.push(ParquetWriter::new(table, &carried, file)?);
     }
     let mut journal = BufWriter::new(File::create(output.place_of(JOURNAL))?);
     journal.write_all(JOURNAL_HEAD.as_bytes())?;
@@ -455,10 +475,18 @@ fn write_all(
         for table in &mut tables {
             table.add(&record)?;
         }
+        #[cfg(feature = "parquet")]
+        for table in &mut parquet {
+            table.add(&record)?;
+        }
         collector.add(&record);
         journal.write_all(&line)?;
     }
     for table in tables {
+        table.finish()?;
+    }
+    #[cfg(feature = "parquet")]
+    for table in parquet {
         table.finish()?;
     }
     journal.flush()?;

@@ -291,7 +291,7 @@ const UFF_HEADER: &[u8] = b"    -1\n   151\nNONE\nNONE\ntapjoint\n\
 
 /// Parquet files begin with these bytes, and name the program in their footer.
 const PARQUET: &[u8] = b"PAR1";
-const PARQUET_WRITER: &[u8] = b"tapjoint";
+const PARQUET_WRITER: &[u8] = b"tapjoint batch";
 
 /// First words of the CSV files that the program writes.
 const CSV_HEADS: [&str; 14] = [

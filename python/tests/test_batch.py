@@ -1,0 +1,169 @@
+"""Many tests: on this machine, and on a cluster whose workers fail."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import resource
+import shutil
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tapjoint
+from conftest import ROOT
+
+TABLES = ("tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html")
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Twelve taps: eleven that can be read, and one that is cut."""
+    folder = tmp_path_factory.mktemp("taps")
+    whole = (ROOT / "recordings" / "cantilever" / "high.wav").read_bytes()
+    for number in range(11):
+        samples = bytearray(whole)
+        samples[5000 + number] ^= 1
+        (folder / f"tap-{number:02}.wav").write_bytes(samples)
+    (folder / "tap-11.wav").write_bytes(whole[:100])
+    return folder
+
+
+def _sums(folder: Path) -> dict[str, str]:
+    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in TABLES}
+
+
+def _taps(folder: Path) -> list[str]:
+    return sorted(str(path) for path in folder.glob("*.wav"))
+
+
+@pytest.fixture(scope="module")
+def alone(recordings, tmp_path_factory):
+    """The batch on this machine."""
+    out = tmp_path_factory.mktemp("alone") / "out"
+    return tapjoint.batch(_taps(recordings), hammer=1, out=out)
+
+
+def val_a_batch_has_a_row_for_each_test(alone, command, recordings):
+    rows = alone.rows()
+    assert [row["outcome"] for row in rows] == ["answered"] * 11 + ["failed"]
+    assert "tap-11.wav" in rows[11]["test"] and rows[11]["error"]
+    assert (alone.summary["answered"], alone.summary["failed"]) == (11, 1)
+    document = command("spectrum", rows[3]["test"], "--hammer", "1")
+    expected = [mode["frequency"] for mode in document["modes"]]
+    found = [float(row["frequency_Hz"]) for row in alone.rows("modes") if row["test"] == rows[3]["test"]]
+    assert found == expected
+    assert "11 answered" in repr(alone)
+
+
+def limit_a_table_that_does_not_exist_is_named(alone):
+    with pytest.raises(tapjoint.InputError, match="peaks: there is no such table"):
+        alone.rows("peaks")
+
+
+def limit_bad_arguments_have_the_message_of_the_program(tmp_path):
+    with pytest.raises(tapjoint.InputError, match="absent.wav"):
+        tapjoint.batch("absent.wav", hammer=1, out=tmp_path / "out")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+def prop_a_cluster_gives_the_tables_of_one_machine(alone, cluster, recordings, tmp_path):
+    found = tapjoint.batch(
+        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=5
+    )
+    assert _sums(found.folder) == _sums(alone.folder)
+    assert found.summary == alone.summary
+    # Once more, all is known.
+    again = tapjoint.batch(
+        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=5
+    )
+    assert _sums(again.folder) == _sums(alone.folder)
+
+
+def recover_a_batch_from_a_worker_that_is_killed(alone, cluster, recordings, tmp_path):
+    """The first worker that begins a task kills itself, once. Its nanny starts another one."""
+    mark = tmp_path / "killed"
+
+    def kill_once(dask_worker):
+        def before(self, key, start, finish, **_):
+            if finish == "executing" and not mark.exists():
+                mark.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        from distributed.diagnostics.plugin import WorkerPlugin
+
+        class Killing(WorkerPlugin):
+            transition = before
+
+        return dask_worker.plugin_add(plugin=Killing(), name="killing")
+
+    cluster.run(kill_once)
+    found = tapjoint.batch(
+        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=2
+    )
+    assert mark.exists()
+    assert _sums(found.folder) == _sums(alone.folder)
+
+
+def _full_disk():
+    """No file may grow beyond 2000 bytes. The signal would end the process; ignored, the write fails."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+
+
+def recover_a_batch_from_a_worker_whose_disk_is_full(alone, cluster, recordings, tmp_path):
+    cluster.wait_for_workers(2)
+    first = next(iter(cluster.nthreads()))
+    cluster.run(_full_disk, workers=[first])
+    found = tapjoint.batch(
+        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=2
+    )
+    assert _sums(found.folder) == _sums(alone.folder)
+
+
+def limit_a_test_that_hangs_is_a_row(cluster, recordings, tmp_path):
+    folder = tmp_path / "taps"
+    folder.mkdir()
+    shutil.copy(recordings / "tap-00.wav", folder / "a.wav")
+    # Nothing ever writes into this pipe.
+    os.mkfifo(folder / "b.wav")
+    shutil.copy(recordings / "tap-01.wav", folder / "c.wav")
+    names = [str(folder / name) for name in ("a.wav", "b.wav", "c.wav")]
+    found = tapjoint.batch(
+        names, hammer=1, out=tmp_path / "out", client=cluster, limit=5, tests_per_task=1
+    )
+    rows = found.rows()
+    assert [row["outcome"] for row in rows] == ["answered", "failed", "answered"]
+    assert "--limit" in rows[1]["error"]
+
+
+def limit_tasks_that_fail_everywhere_are_an_error_and_the_rest_is_kept(recordings, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as local, distributed.Client(local) as client:
+        client.run(_full_disk)
+        with pytest.raises(tapjoint.BatchError, match="failed 2 times"):
+            tapjoint.batch(
+                _taps(recordings)[:2], hammer=1, out=tmp_path / "out", client=client, attempts=2
+            )
+    assert not (tmp_path / "out" / "tests.csv").exists()
+
+
+def val_parquet_tables_hold_the_same_numbers_and_their_units(recordings, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    found = tapjoint.batch(_taps(recordings)[:3], hammer=1, out=tmp_path / "out", parquet=True)
+    table = parquet.read_table(found.folder / "modes.parquet")
+    assert table.schema.field("frequency_Hz").metadata == {b"unit": b"Hz"}
+    expected = [float(row["frequency_Hz"]) for row in found.rows("modes")]
+    assert np.array_equal(table["frequency_Hz"].to_numpy(), expected)

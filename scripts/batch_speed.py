@@ -5,8 +5,9 @@ usage: scripts/batch_speed.py PROGRAM [--tests N] [--jobs N] [--folder DIR]
 
 Writes N recordings of 1 s with one tap each (3 channels, 25.6 kHz, 16 bit) by a modal model with random frequencies. Then
 prints the processor time of a test, the peak memory at N/4, N/2 and N tests, and beside it what reading and transforming the
-same files by numpy alone takes. At last a run is killed in its middle and started again: its files must be those of a run
-that nobody disturbed. Needs numpy and Linux.
+same files by numpy alone takes. A run is killed in its middle and started again: its files must be those of an undisturbed
+run. Tests in parts are joined. At last the measured parts give the cost of a million tests on 1, 16 and 256 machines. Needs
+numpy and Linux.
 """
 
 import argparse
@@ -24,6 +25,8 @@ import numpy as np
 RATE = 25_600
 SECONDS = 1.0
 CHANNELS = 3
+# The model of a million tests: processors of a machine, and what a shared disk reads in a second (bytes).
+MILLION, PROCESSORS, DISK = 1_000_000, 16, 1e9
 # Files that a batch writes; the journal is in the order of the tests at the end.
 FILES = ("tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html")
 
@@ -69,18 +72,18 @@ def read_and_transform(files):
     return (time.process_time() - begin) / len(files)
 
 
-def batch(program, jobs, out, files):
-    command = [program, "batch", "--from", "-", "--hammer", "1", "--jobs", str(jobs), "--out", str(out), "--quiet"]
+def batch(program, jobs, out, files, *options):
+    command = [program, "batch", "--from", "-", "--hammer", "1", "--jobs", str(jobs), "--out", str(out), "--quiet", *options]
     process = subprocess.Popen(command, stdin=subprocess.PIPE)
     process.stdin.write("".join(f"{path}\n" for path in files).encode())
     process.stdin.close()
     return process
 
 
-def measured(program, jobs, out, files):
+def measured(program, jobs, out, files, *options):
     """Processor time (s), wall time (s) and peak memory (MB) of a run."""
     begin = time.time()
-    process = batch(program, jobs, out, files)
+    process = batch(program, jobs, out, files, *options)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in (0, 1):
@@ -90,6 +93,18 @@ def measured(program, jobs, out, files):
 
 def sums(folder):
     return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
+
+
+def print_model(own, joining, read, written):
+    """Prints the cost of a million tests. `own` and `joining` are processor times (s), the others bytes, all of one test."""
+    print(f"\na million tests, {PROCESSORS} processors a machine, a shared disk that reads {DISK / 1e9:.0f} GB/s:")
+    print(f"the disk reads {MILLION * read / 1e9:.0f} GB, the journals have {MILLION * written / 1e9:.1f} GB")
+    print("| machines | analysis | reading | joining, on one machine |")
+    print("|---|---|---|---|")
+    for machines in (1, 16, 256):
+        analysis = MILLION * own / (machines * PROCESSORS)
+        reading = MILLION * read / DISK
+        print(f"| {machines} | {analysis:.0f} s | {reading:.0f} s | {max(MILLION * joining / PROCESSORS, reading):.0f} s |")
 
 
 def main():
@@ -131,7 +146,16 @@ def main():
         measured(program, arguments.jobs, out, files)
         is_equal = sums(out) == sums(temporary / "out-1")
         print(f"killed after {lines} tests and started again: files are {'equal' if is_equal else 'DIFFERENT'}")
-        if not is_equal:
+        parted = temporary / "parted"
+        for part in ("1/2", "2/2"):
+            measured(program, arguments.jobs, parted, files, "--shard", part)
+        joining, wall, peak = measured(program, arguments.jobs, parted, files, "--merge")
+        is_joined = sums(parted) == sums(temporary / "out-1")
+        words = "equal" if is_joined else "DIFFERENT"
+        print(f"two parts joined: files are {words}, {1e3 * joining / len(files):.3f} ms a test, peak memory {peak:.0f} MB")
+        read = sum(path.stat().st_size for path in files) / len(files)
+        print_model(own / len(files), joining / len(files), read, whole / len(files))
+        if not (is_equal and is_joined):
             raise SystemExit(1)
 
 

@@ -7,7 +7,7 @@
 //! units of the parameters do not matter. The first trial has the damping of the settings, by default
 //! mu = 0, which is Gauss-Newton's step. A step that does not lower the cost is tried again with ten times
 //! the damping (Levenberg 1944, Marquardt 1963), and the damping follows how much of its promise each step
-//! keeps. Along a bent valley the first trial leaves the ground. Where a problem offers it, a second step by the same
+//! keeps. Along a bent valley the first trial raises the cost. Where a problem offers it, a second step by the same
 //! slopes leads back to it, before the damping shortens the way.
 
 use crate::cholesky::Cholesky;
@@ -153,7 +153,8 @@ pub struct Minimum<S> {
 /// Factor from one damping to the next. A rejected step raises the damping by it and an accepted one lowers
 /// it at most by it, so that a search has at most three trials for each step and some 15 more.
 const FACTOR: f64 = 10.0;
-/// Weakest damping that is not none.
+/// Weakest damping that is not none. It shortens a step by 1e-4 of itself, along the stiff directions. From a weaker one a
+/// search at a bend needs more rejected trials until a step is short enough.
 const WEAKEST: f64 = 1e-4;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;

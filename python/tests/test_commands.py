@@ -105,7 +105,7 @@ def regress_a_description_in_memory_hides_no_file(tmp_path, monkeypatch):
     assert -1.01 < change(["test.toml", described(1.0001)], [lighter, described(0.9901)]) < -0.99
     assert change(pairs=[(lighter, "test.toml"), (lighter, "test.toml")]) > 1.0
     series = tapjoint.compare(series=[lighter, "test.toml", described(1.0001), lighter]).series
-    assert len(set(one.file for one in series.tests)) == 3
+    assert len(set(series.tests)) == 3
 
 
 def regress_warnings_name_the_line_of_the_caller(tmp_path):

@@ -24,26 +24,16 @@ import sys
 import time
 import warnings
 
+import compare_frf
 import numpy as np
-import scipy.fft
-import scipy.signal
 
 import tapjoint
 
-RATE = 5120.0
+RATE = float(compare_frf.RATE)
 FREQUENCIES = np.array([42.7, 118.3, 231.9, 383.4, 572.6])
 DAMPING = np.array([0.004, 0.003, 0.0035, 0.005, 0.006])
 LOWER, UPPER, ORDER = 10.0, 700.0, 40
 TARGETS = {"numpy + scipy.fft": 2.5, "pyFRF": 10.0, "pyEMA": 10.0}
-
-
-def records():
-    """Force and response of 1000 records, (1000, 2048)."""
-    random = np.random.default_rng(20240501)
-    force = random.standard_normal((1000, 2048))
-    b, a = scipy.signal.butter(2, [0.1, 0.3], btype="band")
-    response = 3.0 * scipy.signal.lfilter(b, a, force, axis=1)
-    return force, response + 0.3 * random.standard_normal(force.shape)
 
 
 def by_tapjoint(force, response):
@@ -51,29 +41,9 @@ def by_tapjoint(force, response):
     return found.h1, found.coherence
 
 
-def by_fft(force, response):
-    """What one would write: both transforms, the sums, the quotients."""
-    f, x = scipy.fft.rfft(force, axis=1), scipy.fft.rfft(response, axis=1)
-    gff = (np.abs(f) ** 2).sum(0)
-    gxx = (np.abs(x) ** 2).sum(0)
-    gfx = (f.conj() * x).sum(0)
-    return gfx / gff, np.abs(gfx) ** 2 / (gff * gxx)
-
-
-def by_fast_fft(force, response):
-    """The same without square roots and copies."""
-    f, x = scipy.fft.rfft(force, axis=1), scipy.fft.rfft(response, axis=1)
-    gff = np.einsum("ij,ij->j", f.real, f.real) + np.einsum("ij,ij->j", f.imag, f.imag)
-    gxx = np.einsum("ij,ij->j", x.real, x.real) + np.einsum("ij,ij->j", x.imag, x.imag)
-    gfx = np.einsum("ij,ij->j", f.conj(), x)
-    return gfx / gff, np.abs(gfx) ** 2 / (gff * gxx)
-
-
 def by_pyfrf(force, response):
-    import pyFRF
-
-    frf = pyFRF.FRF(int(RATE), exc=force, resp=response, exc_type="f", resp_type="a", window="none")
-    return frf.get_FRF("H1", frf_form="accelerance")[0, 0], frf.get_coherence()[0]
+    h1, coherence = compare_frf.pyfrf_work(force, response)
+    return h1[0, 0], coherence[0]
 
 
 def accelerances():
@@ -152,8 +122,8 @@ def main():
     repetitions = parser.parse_args().repetitions
     warnings.simplefilter("ignore")
 
-    force, response = records()
-    ways = {"tapjoint": by_tapjoint, "numpy + scipy.fft": by_fft, "without roots": by_fast_fft}
+    force, response = compare_frf.records(1000, 2048)
+    ways = {"tapjoint": by_tapjoint, "numpy + scipy.fft": compare_frf.by_fft, "without roots": compare_frf.by_fast_fft}
     if installed("pyFRF"):
         ways["pyFRF"] = by_pyfrf
     h1, coherence = by_tapjoint(force, response)

@@ -1,7 +1,8 @@
 //! What a command or a measurement has found, and its arrays.
 
-use crate::errors::{Kind, exception};
-use crate::functions::{complex_lines, lines};
+use crate::errors::{Kind, exception, refused};
+use crate::functions::{complex_lines, matrix};
+use num_complex::Complex64;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,7 +10,7 @@ use tapjoint::cli;
 use tapjoint::description::FORMS;
 use tapjoint::pipeline::{Frf, FrfSettings, RecordingResult, frfs_of};
 use tapjoint::report::document::Document;
-use tapjoint::report::{ReportError, render_first_screen, render_json};
+use tapjoint::report::{render_first_screen, render_json};
 use tapjoint::spectral::FrfEstimator;
 
 /// What a command or a measurement has found.
@@ -39,7 +40,8 @@ impl Answer {
     /// The document as JSON, the same text as that of `--json`.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
         if let Some(document) = &self.0.document {
-            return render_json(document).map_err(|error| of_report(py, &error));
+            let rendered = py.detach(|| render_json(document));
+            return rendered.map_err(|error| refused(py, &error.to_string()));
         }
         let other = self.0.other.as_ref();
         Ok(other.unwrap_or(&serde_json::Value::Null).to_string())
@@ -50,7 +52,7 @@ impl Answer {
         let (document, recordings) = (self.0.document.as_ref(), &self.0.recordings);
         let none = Document::default();
         py.detach(|| render_first_screen(document.unwrap_or(&none), recordings))
-            .map_err(|error| of_report(py, &error))
+            .map_err(|error| refused(py, &error.to_string()))
     }
 
     /// Number of measured recordings.
@@ -72,7 +74,8 @@ impl Answer {
         let averages = &spectra.averages;
         let dict = PyDict::new(py);
         dict.set_item("frequency", averages.lines.frequencies().into_pyarray(py))?;
-        dict.set_item("response", lines(py, &averages.responses)?)?;
+        let shape = [averages.responses.len(), averages.lines.points()];
+        dict.set_item("response", matrix(py, averages.responses.concat(), shape)?)?;
         let force = averages.force.clone();
         dict.set_item("force", force.map(|force| force.into_pyarray(py)))?;
         dict.set_item("averages", averages.taps)?;
@@ -104,7 +107,7 @@ impl Answer {
                 let known = FORMS.iter().find(|(known, _)| *known == name);
                 let names = FORMS.map(|(known, _)| known).join(", ");
                 let text = format!("form: \"{name}\" is no form; give one of {names}");
-                Some(known.ok_or_else(|| exception(py, Kind::Input, &text))?.1)
+                Some(known.ok_or_else(|| refused(py, &text))?.1)
             }
         };
         let settings = FrfSettings {
@@ -122,7 +125,7 @@ impl Answer {
         let count = self.0.recordings.len();
         let text = format!("recording: there are {count}, counted from 0; give one of them");
         let recording = self.0.recordings.get(index);
-        recording.ok_or_else(|| exception(py, Kind::Input, &text))
+        recording.ok_or_else(|| refused(py, &text))
     }
 }
 
@@ -137,7 +140,8 @@ fn arrays_of<'py>(py: Python<'py>, frf: Frf) -> PyResult<Bound<'py, PyDict>> {
     dict.set_item("window_decay", frf.window.added_decay())?;
     dict.set_item("frequency", frf.lines.frequencies().into_pyarray(py))?;
     for (name, values) in [("h1", &frf.h1), ("h2", &frf.h2), ("hv", &frf.hv)] {
-        dict.set_item(name, complex_lines(values).into_pyarray(py))?;
+        let values: Vec<Complex64> = complex_lines(values).collect();
+        dict.set_item(name, values.into_pyarray(py))?;
     }
     for (name, values) in [
         ("coherence", &frf.coherence),
@@ -150,9 +154,4 @@ fn arrays_of<'py>(py: Python<'py>, frf: Frf) -> PyResult<Bound<'py, PyDict>> {
         dict.set_item(name, values)?;
     }
     Ok(dict)
-}
-
-/// Returns the exception of a document that cannot be rendered.
-fn of_report(py: Python<'_>, error: &ReportError) -> PyErr {
-    exception(py, Kind::Input, &error.to_string())
 }

@@ -1,7 +1,7 @@
 //! The commands of tapjoint: in this process with results as values, and as the program.
 
 use crate::answer::Answer;
-use crate::errors::{self, Kind, exception};
+use crate::errors::{self, Kind, exception, refused};
 use crate::work;
 use pyo3::prelude::*;
 use std::ffi::OsString;
@@ -47,7 +47,8 @@ pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// `DescriptionError` with file, line and remedy.
 #[pyfunction]
 pub fn check_description(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<String>> {
-    let test = TestDescription::parse(text, file)
+    let test = py
+        .detach(|| TestDescription::parse(text, file))
         .map_err(|error| exception(py, Kind::Description, &error.to_string()))?;
     Ok(test.warnings.iter().map(ToString::to_string).collect())
 }
@@ -58,13 +59,14 @@ pub fn check_description(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec
 /// `InputError` for a value that TOML does not have.
 #[pyfunction]
 pub fn toml_text(py: Python<'_>, json: &str) -> PyResult<String> {
-    let refused = |cause: String| {
+    let written = py.detach(|| {
+        let tables: toml::Table = serde_json::from_str(json).map_err(|cause| cause.to_string())?;
+        toml::to_string(&tables).map_err(|cause| cause.to_string())
+    });
+    written.map_err(|cause| {
         let text = format!(
             "the description cannot be written as TOML: {cause}; give texts, finite numbers, true or false, lists and tables of these"
         );
-        exception(py, Kind::Input, &text)
-    };
-    let tables: toml::Table =
-        serde_json::from_str(json).map_err(|cause| refused(cause.to_string()))?;
-    toml::to_string(&tables).map_err(|cause| refused(cause.to_string()))
+        refused(py, &text)
+    })
 }

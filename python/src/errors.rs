@@ -28,19 +28,21 @@ impl Kind {
     }
 }
 
-/// Returns the exception with this message: file and line stand at its beginning, the remedy at its end.
-pub fn exception(py: Python<'_>, kind: Kind, text: &str) -> PyErr {
-    made(py, kind, text).unwrap_or_else(|error| error)
+/// Returns the exception of wrong arguments, with this message.
+pub fn refused(py: Python<'_>, text: &str) -> PyErr {
+    made(py, Kind::Input, text, Place::default()).unwrap_or_else(|error| error)
 }
 
-fn made(py: Python<'_>, kind: Kind, text: &str) -> PyResult<PyErr> {
+/// Returns the exception of a file, with this message: file and line stand at its beginning.
+pub fn exception(py: Python<'_>, kind: Kind, text: &str) -> PyErr {
+    made(py, kind, text, place_of(text)).unwrap_or_else(|error| error)
+}
+
+fn made(py: Python<'_>, kind: Kind, text: &str, place: Place<'_>) -> PyResult<PyErr> {
     let class = py.import("tapjoint.errors")?.getattr(kind.class())?;
-    let (file, line) = place_of(text);
-    let remedy = text.rsplit_once("; ").map(|(_, remedy)| remedy);
     let keys = [
-        ("file", file.into_pyobject(py)?.into_any()),
-        ("line", line.into_pyobject(py)?.into_any()),
-        ("remedy", remedy.into_pyobject(py)?.into_any()),
+        ("file", place.file.into_pyobject(py)?.into_any()),
+        ("line", place.line.into_pyobject(py)?.into_any()),
     ];
     let value = class
         .cast_into::<PyType>()?
@@ -48,19 +50,33 @@ fn made(py: Python<'_>, kind: Kind, text: &str) -> PyResult<PyErr> {
     Ok(PyErr::from_value(value))
 }
 
-/// Returns file and line (from 1) at the beginning of a message, `FILE:LINE: ` or `FILE: `.
-fn place_of(text: &str) -> (Option<&str>, Option<u64>) {
+/// Where the problem is.
+#[derive(Default)]
+struct Place<'a> {
+    file: Option<&'a str>,
+    /// From 1.
+    line: Option<u64>,
+}
+
+/// Returns the place at the beginning of a message, `FILE:LINE: ` or `FILE: `.
+fn place_of(text: &str) -> Place<'_> {
     let Some((head, _)) = text.split_once(": ") else {
-        return (None, None);
+        return Place::default();
     };
     let numbered = head.rsplit_once(':');
     let numbered = numbered.and_then(|(file, line)| Some((file, line.parse().ok()?)));
     match numbered {
-        Some((file, line)) => (Some(file), Some(line)),
+        Some((file, line)) => Place {
+            file: Some(file),
+            line: Some(line),
+        },
         // Words, and options of a command, are no file.
-        None if head.contains(' ') && !std::path::Path::new(head).exists() => (None, None),
-        None if head.starts_with("--") || head.starts_with('`') => (None, None),
-        None => (Some(head), None),
+        None if head.contains(' ') && !std::path::Path::new(head).exists() => Place::default(),
+        None if head.starts_with("--") || head.starts_with('`') => Place::default(),
+        None => Place {
+            file: Some(head),
+            line: None,
+        },
     }
 }
 
@@ -82,7 +98,7 @@ pub fn of_pipeline(py: Python<'_>, error: &PipelineError) -> PyErr {
 /// Returns the exception of a command that has failed.
 pub fn of_call(py: Python<'_>, error: &CallError) -> PyErr {
     let CallError::Failed { text, cause } = error else {
-        return exception(py, Kind::Input, &error.to_string());
+        return refused(py, &error.to_string());
     };
     let kind = cause.chain().find_map(|cause| {
         if cause.is::<DescriptionError>() {

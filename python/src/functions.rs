@@ -1,12 +1,11 @@
 //! Frequency response functions and modes of arrays.
 
-use crate::errors::{Kind, exception};
+use crate::errors::refused;
 use crate::work;
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::prelude::*;
 use tapjoint::modal::polyreference::{
     BandPeaks, BandSearch, PoleStability, PolyreferenceError, PolyreferenceMode,
     PolyreferenceSettings, ResponseMatrix, all_modes, find_modes as search_bands, select_modes,
@@ -18,19 +17,18 @@ use tapjoint::spectral::{
 };
 
 /// Values of lines, NaN where there is none.
-pub fn complex_lines(values: &[Option<Complex64>]) -> Vec<Complex64> {
+pub fn complex_lines(values: &[Option<Complex64>]) -> impl Iterator<Item = Complex64> {
     const NONE: Complex64 = Complex64::new(f64::NAN, f64::NAN);
-    values.iter().map(|one| one.unwrap_or(NONE)).collect()
+    values.iter().map(|one| one.unwrap_or(NONE))
 }
 
-/// Returns rows of equal length as one array.
-pub fn lines<'py, T: numpy::Element + Clone>(
-    py: Python<'py>,
-    rows: &[Vec<T>],
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let points = rows.first().map_or(0, Vec::len);
-    let flat: Vec<T> = rows.iter().flatten().cloned().collect();
-    flat.to_pyarray(py).reshape([rows.len(), points])
+/// Returns values, one row after the other, as an array of this shape. They are not copied.
+pub fn matrix<T: numpy::Element>(
+    py: Python<'_>,
+    values: Vec<T>,
+    shape: [usize; 2],
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    values.into_pyarray(py).reshape(shape)
 }
 
 /// Records up to this number are one share of the work, which other threads cannot speed up.
@@ -38,7 +36,7 @@ const FEW_RECORDS: usize = 8;
 /// Samples of responses that take less time than to wake a thread.
 const FEW_SAMPLES: usize = 1 << 15;
 
-/// Averages over tap records: frequency response functions, coherence and powers.
+/// Averages over tap records: frequency response functions and coherence.
 ///
 /// `force` has the shape (records, samples), `response` (records, responses, samples); both are contiguous. `rate` in Hz,
 /// `band` in Hz, `block` in samples at the zoomed rate, `decay` (1/s) that of an exponential window.
@@ -59,38 +57,42 @@ pub fn average<'py>(
     decay: f64,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let refused = |text: &str| exception(py, Kind::Input, text);
     let (records, samples) = force.as_array().dim();
     let (of_records, responses, of_samples) = response.as_array().dim();
     if (of_records, of_samples) != (records, samples) {
-        return Err(refused(&format!(
-            "response: {of_records} records of {of_samples} samples, and force has {records} of {samples}; give both the same"
-        )));
+        return Err(refused(
+            py,
+            &format!(
+                "response: {of_records} records of {of_samples} samples, and force has {records} of {samples}; give both the same"
+            ),
+        ));
     }
     if records == 0 || responses == 0 || samples == 0 {
         return Err(refused(
+            py,
             "force and response: there are no samples; give at least one record",
         ));
     }
     if !(rate.is_finite() && rate > 0.0) {
         return Err(refused(
+            py,
             "rate: give the samples per second, a number above 0 Hz",
         ));
     }
-    let window = window_of(window, decay).map_err(|text| refused(&text))?;
+    let window = window_of(window, decay).map_err(|text| refused(py, &text))?;
     let band = band.unwrap_or((0.0, rate / DISPLAY_RATIO));
     let seconds = samples as f64 / rate;
     let zoomed = DISPLAY_RATIO * (band.1 - band.0) * seconds;
     // All samples, as an even number at the zoomed rate.
     let block = block.unwrap_or(2 * ((zoomed * (1.0 + 1e-12)) as usize / 2));
     let axis =
-        Lines::zoom(band, rate, block, seconds).map_err(|error| refused(&error.to_string()))?;
+        Lines::zoom(band, rate, block, seconds).map_err(|error| refused(py, &error.to_string()))?;
     let force = force
         .as_slice()
-        .map_err(|_| refused("force: the array is not contiguous"))?;
+        .map_err(|_| refused(py, "force: the array is not contiguous"))?;
     let response = response
         .as_slice()
-        .map_err(|_| refused("response: the array is not contiguous"))?;
+        .map_err(|_| refused(py, "response: the array is not contiguous"))?;
     let signals = Signals {
         force,
         response,
@@ -112,6 +114,7 @@ pub fn average<'py>(
     })?;
     let found = found.filter(are_finite).ok_or_else(|| {
         refused(
+            py,
             "force is zero throughout, or force or response has a value that is not finite (NaN, infinite) or whose square is too large; leave such records out",
         )
     })?;
@@ -159,11 +162,14 @@ impl<'a> Signals<'a> {
         if window == Window::Rectangular {
             return None;
         }
+        let mut weights = vec![1.0; self.samples];
+        window.apply(&mut weights, rate);
         let copy = |values: &[f64]| {
-            let mut values = values.to_vec();
-            let records = values.par_chunks_mut(self.samples);
-            records.for_each(|record| window.apply(record, rate));
-            values
+            let mut copy = Vec::with_capacity(values.len());
+            for record in values.chunks_exact(self.samples) {
+                copy.extend(record.iter().zip(&weights).map(|(x, weight)| x * weight));
+            }
+            copy
         };
         Some((copy(self.force), copy(self.response)))
     }
@@ -186,39 +192,42 @@ fn averaged_arrays<'py>(
     averages: &AveragedSpectra,
     window: Window,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let shape = [averages.response_power.len(), averages.lines.points()];
+    let [responses, points] = shape;
     let dict = PyDict::new(py);
     dict.set_item("frequency", averages.lines.frequencies().into_pyarray(py))?;
-    let responses = averages.response_power.len();
     for estimator in FrfEstimator::ALL {
-        let rows: Vec<Vec<Complex64>> = (0..responses)
-            .map(|response| {
-                let none = vec![None; averages.lines.points()];
-                complex_lines(&averages.frf(response, estimator).unwrap_or(none))
-            })
+        let values = py.detach(|| {
+            let mut values = Vec::with_capacity(responses * points);
+            for response in 0..responses {
+                let none = || vec![None; points];
+                let function = averages.frf(response, estimator).unwrap_or_else(none);
+                values.extend(complex_lines(&function));
+            }
+            values
+        });
+        let name = estimator.name().to_lowercase();
+        dict.set_item(name, matrix(py, values, shape)?)?;
+    }
+    let (coherence, errors) = py.detach(|| {
+        let rows: Option<Vec<_>> = (0..responses)
+            .map(|response| averages.coherence(response))
             .collect();
-        dict.set_item(estimator.name().to_lowercase(), lines(py, &rows)?)?;
-    }
-    let coherence: Option<Vec<Vec<f64>>> = (0..responses)
-        .map(|response| {
-            let values = averages.coherence(response)?.into_iter();
-            Some(values.map(|one| one.unwrap_or(f64::NAN)).collect())
-        })
-        .collect();
-    let errors = coherence.as_ref().map(|rows| {
-        let error = |one: &f64| random_error(*one, averages.taps).unwrap_or(f64::NAN);
-        let rows = rows.iter().map(|row| row.iter().map(error).collect());
-        rows.collect::<Vec<Vec<f64>>>()
+        let values = |of: &dyn Fn(f64) -> Option<f64>| -> Option<Vec<f64>> {
+            let values = rows.as_ref()?.iter().flatten();
+            Some(
+                values
+                    .map(|one| one.and_then(of).unwrap_or(f64::NAN))
+                    .collect(),
+            )
+        };
+        let error = |one| random_error(one, averages.taps);
+        (values(&Some), values(&error))
     });
-    for (name, rows) in [("coherence", coherence), ("random_error", errors)] {
-        let rows = rows.map(|rows| lines(py, &rows)).transpose()?;
-        dict.set_item(name, rows)?;
+    for (name, values) in [("coherence", coherence), ("random_error", errors)] {
+        let values = values.map(|values| matrix(py, values, shape));
+        dict.set_item(name, values.transpose()?)?;
     }
-    dict.set_item("response_power", lines(py, &averages.response_power)?)?;
-    let force_power = averages.force_power.clone();
-    dict.set_item(
-        "force_power",
-        force_power.map(|power| power.into_pyarray(py)),
-    )?;
     dict.set_item("averages", averages.taps)?;
     dict.set_item("window", window.name())?;
     dict.set_item("window_decay", window.added_decay())?;
@@ -243,29 +252,31 @@ pub fn find_modes<'py>(
     decay: f64,
     sub_bands: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let refused = |text: &str| exception(py, Kind::Input, text);
     const MOST_ORDER: usize = 200;
     if !(2..=MOST_ORDER).contains(&order) {
-        return Err(refused(&format!(
-            "order: {order} is not allowed; give 2 to {MOST_ORDER}"
-        )));
+        return Err(refused(
+            py,
+            &format!("order: {order} is not allowed; give 2 to {MOST_ORDER}"),
+        ));
     }
     let good_axis = first.is_finite() && first >= 0.0 && spacing.is_finite() && spacing > 0.0;
     let good_decay = decay.is_finite() && decay >= 0.0;
     if !(good_axis && good_decay) {
         return Err(refused(
+            py,
             "frequency: give equally spaced lines in Hz that ascend from 0 or more, and a window_decay of 0 1/s or more",
         ));
     }
     let (outputs, inputs, points) = values.as_array().dim();
     if outputs * inputs * points == 0 {
         return Err(refused(
+            py,
             "frf: there are no values; give at least one function",
         ));
     }
     let values = values
         .as_slice()
-        .map_err(|_| refused("frf: the array is not contiguous"))?;
+        .map_err(|_| refused(py, "frf: the array is not contiguous"))?;
     let settings = PolyreferenceSettings {
         order,
         added_decay: decay,
@@ -279,8 +290,8 @@ pub fn find_modes<'py>(
         let matrix = ResponseMatrix::new(first, spacing, &rows)?;
         searched(&matrix, &settings, sub_bands)
     });
-    let (modes, searches) = found.map_err(|error| refused(&error.to_string()))?;
-    let dict = mode_arrays(py, &modes)?;
+    let (modes, searches) = found.map_err(|error| refused(py, &error.to_string()))?;
+    let dict = mode_arrays(py, &modes, [outputs, inputs])?;
     dict.set_item("poles", pole_arrays(py, &searches)?)?;
     Ok(dict)
 }
@@ -311,8 +322,12 @@ fn searched(
     Ok((modes, vec![whole]))
 }
 
-/// Returns modes as arrays, one entry for each mode.
-fn mode_arrays<'py>(py: Python<'py>, modes: &[PolyreferenceMode]) -> PyResult<Bound<'py, PyDict>> {
+/// Returns modes of functions from so many inputs to so many outputs as arrays, one entry for each mode.
+fn mode_arrays<'py>(
+    py: Python<'py>,
+    modes: &[PolyreferenceMode],
+    [outputs, inputs]: [usize; 2],
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     let frequencies: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
     dict.set_item("frequency", frequencies.into_pyarray(py))?;
@@ -322,11 +337,14 @@ fn mode_arrays<'py>(py: Python<'py>, modes: &[PolyreferenceMode]) -> PyResult<Bo
     dict.set_item("above_noise", levels.into_pyarray(py))?;
     let poles: Vec<Complex64> = modes.iter().map(|mode| mode.pole).collect();
     dict.set_item("pole", poles.into_pyarray(py))?;
-    let shapes: Vec<_> = modes.iter().map(|mode| mode.shape.clone()).collect();
-    dict.set_item("shape", lines(py, &shapes)?)?;
-    let participations = modes.iter().map(|mode| mode.participation.clone());
-    let participations: Vec<_> = participations.collect();
-    dict.set_item("participation", lines(py, &participations)?)?;
+    let shapes = modes.iter().flat_map(|mode| &mode.shape).copied().collect();
+    dict.set_item("shape", matrix(py, shapes, [modes.len(), outputs])?)?;
+    let participations = modes.iter().flat_map(|mode| &mode.participation);
+    let participations = participations.copied().collect();
+    dict.set_item(
+        "participation",
+        matrix(py, participations, [modes.len(), inputs])?,
+    )?;
     Ok(dict)
 }
 

@@ -1,8 +1,9 @@
 //! `tapjoint._native`: the library as Python sees it.
 //!
-//! Arrays come in as contiguous float64 or complex128 arrays, which are read where they are. Results go out as arrays that
-//! numpy owns, without a second copy. Python's lock is released during all computation. The typed layer above, which takes
-//! arrays and descriptions of any kind, is the Python code beside this crate.
+//! Arrays come in as contiguous float64 or complex128 arrays, which are read where they are, so nobody may write them
+//! meanwhile. Functions and modes go out as arrays that take over the memory of the library. Python's lock is released
+//! during all computation, and held where arrays and dictionaries are made. The typed layer above, which takes arrays and
+//! descriptions of any kind, is the Python code beside this crate.
 
 mod answer;
 mod commands;

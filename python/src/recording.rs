@@ -1,7 +1,7 @@
 //! Recordings: files and arrays.
 
 use crate::answer::Answer;
-use crate::errors::{self, Kind, exception};
+use crate::errors::{self, refused};
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -181,7 +181,7 @@ impl Recording {
             Ok(analysis_of_bare(measured.file.clone(), vec![measured]))
         })?;
         let analysis = measured.map_err(|error| errors::of_pipeline(py, &error))?;
-        Ok(answer_of(document_of(&analysis), analysis))
+        Ok(py.detach(|| answer_of(document_of(&analysis), analysis)))
     }
 
     /// Finds taps and goes no further.
@@ -206,9 +206,10 @@ impl Recording {
             inspect_bare(recording, hammer.as_ref(), &settings, cancel.as_ref())
         })?;
         let found = found.map_err(|error| errors::of_pipeline(py, &error))?;
-        let document = inspection_of(std::slice::from_ref(&found), &found.measurement.warnings);
-        let analysis = analysis_of_bare(found.file.clone(), vec![found]);
-        Ok(answer_of(document, analysis))
+        Ok(py.detach(|| {
+            let document = inspection_of(std::slice::from_ref(&found), &found.measurement.warnings);
+            answer_of(document, analysis_of_bare(found.file.clone(), vec![found]))
+        }))
     }
 }
 
@@ -248,5 +249,5 @@ fn named<T: Copy>(
         "{key}: \"{name}\" is not allowed; give one of {}",
         names.join(", ")
     );
-    Err(exception(py, Kind::Input, &text))
+    Err(refused(py, &text))
 }

@@ -1,8 +1,8 @@
 //! Work beside the interpreter: threads, and Ctrl-C during long calls.
 
-use crate::errors::{Kind, exception};
+use crate::errors::refused;
 use pyo3::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::any::Any;
 use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -50,7 +50,7 @@ static KEPT: Mutex<Option<KeptPool>> = Mutex::new(None);
 fn check(py: Python<'_>, threads: Option<usize>) -> PyResult<()> {
     if threads.is_some_and(|count| !(1..=MOST_THREADS).contains(&count)) {
         let text = format!("threads: give 1 to {MOST_THREADS}, or None for one to each processor");
-        return Err(exception(py, Kind::Input, &text));
+        return Err(refused(py, &text));
     }
     Ok(())
 }
@@ -58,6 +58,15 @@ fn check(py: Python<'_>, threads: Option<usize>) -> PyResult<()> {
 /// Returns a pool with so many threads; `None` = one for each processor, or as RAYON_NUM_THREADS says.
 fn pool_of(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     check(py, threads)?;
+    // Python may let other threads run while it makes an exception: the pool is free again by then.
+    kept_pool(threads).map_err(|cause| {
+        let text = format!("threads: the system cannot start them: {cause}; give fewer");
+        refused(py, &text)
+    })
+}
+
+/// Returns the kept pool if it fits, else a new one, which is kept in its place.
+fn kept_pool(threads: Option<usize>) -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let process = process::id();
     if let Some(known) = kept.as_ref()
@@ -68,11 +77,7 @@ fn pool_of(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> 
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .stack_size(STACK)
-        .build()
-        .map_err(|cause| {
-            let text = format!("threads: the system cannot start them: {cause}; give fewer");
-            exception(py, Kind::Input, &text)
-        })?;
+        .build()?;
     let pool = Arc::new(pool);
     let before = kept.replace(KeptPool {
         process,
@@ -142,7 +147,7 @@ pub fn run<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 let text = "the work has ended without a result";
-                return Err(exception(py, Kind::Input, text));
+                return Err(refused(py, text));
             }
         }
         if let Err(signal) = py.check_signals() {

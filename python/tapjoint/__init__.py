@@ -11,18 +11,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import errors
     from ._batch import Batch, batch
     from ._commands import compare, diagnose, identify, predict, run, simulate
     from ._functions import FrequencyResponses, Modes, Spectrum, frf, modes
     from ._recording import Channel, Recording, from_arrays, from_sep005, read
-    from ._results import Result, Section, Simulation
+    from ._results import NoAnswerError, Result, Section, Simulation
     from ._test import Test
     from .errors import (
         BatchError,
         DescriptionError,
         InputError,
         MissingPackageError,
-        NoAnswerError,
         RecordingError,
         TapjointError,
         TapjointWarning,
@@ -53,6 +53,7 @@ __all__ = [
     "batch",
     "compare",
     "diagnose",
+    "errors",
     "frf",
     "from_arrays",
     "from_sep005",
@@ -71,17 +72,17 @@ _MODULES = {
     "_functions": ("FrequencyResponses", "Modes", "Spectrum", "frf", "modes"),
     "_native": ("__version__",),
     "_recording": ("Channel", "Recording", "from_arrays", "from_sep005", "read"),
-    "_results": ("Result", "Section", "Simulation"),
+    "_results": ("NoAnswerError", "Result", "Section", "Simulation"),
     "_test": ("Test",),
     "errors": (
         "BatchError",
         "DescriptionError",
         "InputError",
         "MissingPackageError",
-        "NoAnswerError",
         "RecordingError",
         "TapjointError",
         "TapjointWarning",
+        "errors",
     ),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
@@ -93,7 +94,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'tapjoint' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f"{__name__}.{home}"), name)
+    module = import_module(f"{__name__}.{home}")
+    value = module if name == home else getattr(module, name)
     globals()[name] = value
     return value
 

@@ -1,7 +1,9 @@
-"""Arrays of any kind as the library takes them: contiguous float64 or complex128."""
+"""Arguments as the library takes them: contiguous arrays of float64 or complex128, and whole numbers."""
 
 from __future__ import annotations
 
+import sys
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +36,23 @@ def complex_values(name: str, values: ArrayLike) -> Complex:
         InputError: The values are no numbers.
     """
     return np.ascontiguousarray(_numbers(name, values), dtype=np.complex128)
+
+
+def whole(name: str, value: Any, least: int = 1) -> int:
+    """Returns a whole number that is not below the least one.
+
+    Raises:
+        InputError: The value is no whole number, too small, or larger than any count of this machine.
+    """
+    try:
+        number = index(value)
+    except TypeError:
+        raise InputError(f"{name}: {value!r} is no whole number; give one") from None
+    if number > sys.maxsize:
+        raise InputError(f"{name}: the number is too large; give a smaller one")
+    if number < least:
+        raise InputError(f"{name}: {number} is not allowed; give a whole number of at least {least}")
+    return number
 
 
 def _numbers(name: str, values: ArrayLike) -> NDArray[Any]:

@@ -11,28 +11,38 @@ from typing import Any, Union
 import numpy as np
 
 from . import _native
-from ._results import Result, Simulation
+from ._arrays import whole
+from ._results import NoAnswerError, Result, Simulation
 from ._test import Test
-from .errors import InputError, NoAnswerError, TapjointWarning
+from .errors import InputError, TapjointWarning
 
 #: A description: a file, or one in memory.
 Described = Union[str, "os.PathLike[str]", Test]
 
 
 class _Call:
-    """Arguments of a command, and the descriptions in memory among them."""
+    """Arguments of a command, and the descriptions in memory among them.
 
-    def __init__(self, *arguments: str) -> None:
-        self.arguments = list(arguments)
+    Args:
+        name: Name of the command.
+        tests: All tests that the command reads.
+    """
+
+    def __init__(self, name: str, *tests: Described) -> None:
+        self.arguments = [name]
         self.descriptions: list[tuple[str, str]] = []
+        files = (os.fspath(test) for test in tests if not isinstance(test, Test))
+        self._files = {os.path.abspath(file) for file in files}
 
     def path_of(self, test: Described) -> str:
-        """Returns the path of a description. Those in memory get different ones."""
+        """Returns the path of a test. A description in memory gets one that no file and no other description has."""
         if not isinstance(test, Test):
             return os.fspath(test)
         file = Path(test.file)
         path, number = os.fspath(test.folder / file), 1
-        while any(path == known and text != test.text for known, text in self.descriptions):
+        while os.path.abspath(path) in self._files or any(
+            path == known and text != test.text for known, text in self.descriptions
+        ):
             number += 1
             path = os.fspath(test.folder / f"{file.stem}-{number}{file.suffix}")
         self.descriptions.append((path, test.text))
@@ -47,16 +57,18 @@ class _Call:
             # The equals sign keeps a value that begins with a hyphen from being an option.
             self.arguments.append(name if value is True else f"{name}={_text(value)}")
 
-    def run(self, threads: int | None) -> _native.Answer:
-        answer = _native.call(self.arguments, self.descriptions, threads)
+    def run(self, threads: int | None, callers: int = 1) -> _native.Answer:
+        """Runs the command. Its function, from which warnings come, is so many callers above this method."""
+        count = None if threads is None else whole("threads", threads)
+        answer = _native.call(self.arguments, self.descriptions, count)
         for text in answer.warnings:
-            warnings.warn(text, TapjointWarning, stacklevel=3)
+            warnings.warn(text, TapjointWarning, stacklevel=callers + 2)
         return answer
 
     def result(self, threads: int | None) -> Result:
-        result = Result(self.run(threads))
+        result = Result(self.run(threads, callers=2))
         if not result.is_answered:
-            raise NoAnswerError(f"no answer: {_reason(result)}; `result` of this error holds what was found", result)
+            raise NoAnswerError(f"no answer: {_reason(result)}; look at `result` of this error for what was found", result)
         return result
 
 
@@ -119,7 +131,7 @@ def run(
         DescriptionError, RecordingError, InputError: Bad input, with the message of the program.
         NoAnswerError: There is no estimate, and no mode of a bare recording. Its ``result`` holds what was found.
     """
-    call = _Call("run")
+    call = _Call("run", test)
     call.arguments.append(call.path_of(test))
     zoomed = None if zoom is None else f"{zoom[0]}:{zoom[1]}"
     call.add(out=out, reading=reading, method=method, hammer=hammer, block=block, zoom=zoomed, window=window)
@@ -148,7 +160,7 @@ def identify(
         DescriptionError, RecordingError, InputError: Bad input, with the message of the program.
         NoAnswerError: There is no estimate. Its ``result`` holds what was found.
     """
-    call = _Call("identify")
+    call = _Call("identify", test)
     call.arguments.append(call.path_of(test))
     call.add(frequencies=frequencies, half_line=half_line, method=method)
     return call.result(threads)
@@ -168,8 +180,8 @@ def diagnose(
 
     Args:
         test: A description.
-        frequencies: Frequencies of the modes 1, 2, ... (Hz) in the place of those of the test.
-        half_line: Half of the line spacing (Hz): one number, or one for each frequency.
+        frequencies: As :func:`identify` takes them, like `half_line`.
+        half_line: Half of the line spacing (Hz).
         model: File for the description with the effect that was found.
         force: Overwrite a file that tapjoint has not made.
         seed: Seed of the random numbers.
@@ -179,7 +191,7 @@ def diagnose(
         DescriptionError, RecordingError, InputError: Bad input, with the message of the program.
         NoAnswerError: There is too little data. Its ``result`` holds what was found.
     """
-    call = _Call("diagnose")
+    call = _Call("diagnose", test)
     call.arguments.append(call.path_of(test))
     call.add(frequencies=frequencies, half_line=half_line, model=model, force=force, seed=seed)
     return call.result(threads)
@@ -214,20 +226,20 @@ def compare(
     Raises:
         DescriptionError, RecordingError, InputError: Bad input, with the message of the program.
     """
-    call = _Call("compare")
-    call.add(test=None if test is None else call.path_of(test), repeatability=repeatability, out=out, force=force)
     if (before is None) != (after is None):
         raise InputError("before and after: one of them is missing; give both, `pairs`, or `series`")
-    for name, tests in (("--before", before), ("--after", after), ("--series", series)):
-        if tests is not None:
-            call.arguments += [name, *(call.path_of(one) for one in _listed(tests))]
-    for one, other in pairs or []:
-        call.arguments += ["--pair", call.path_of(one), call.path_of(other)]
+    given = [("--before", before), ("--after", after), ("--series", series), *(("--pair", pair) for pair in pairs or [])]
+    groups = [(name, _listed(tests)) for name, tests in given if tests is not None]
+    template = [] if test is None else [test]
+    call = _Call("compare", *template, *(one for _, tests in groups for one in tests))
+    call.add(test=None if test is None else call.path_of(test), repeatability=repeatability, out=out, force=force)
+    for name, tests in groups:
+        call.arguments += [name, *map(call.path_of, tests)]
     return call.result(threads)
 
 
-def _listed(tests: Described | Sequence[Described]) -> Sequence[Described]:
-    return [tests] if isinstance(tests, (str, os.PathLike, Test)) else tests
+def _listed(tests: Described | Sequence[Described]) -> list[Described]:
+    return [tests] if isinstance(tests, (str, os.PathLike, Test)) else list(tests)
 
 
 def predict(
@@ -252,7 +264,7 @@ def predict(
     Raises:
         DescriptionError, InputError: Bad input, with the message of the program.
     """
-    call = _Call("predict")
+    call = _Call("predict", *([] if test is None else [test]))
     if test is not None:
         call.arguments.append(call.path_of(test))
     call.add(joint=joint, kx=kx, ky=ky, kz=kz, modes=modes)
@@ -295,7 +307,7 @@ def simulate(
 
     temporary = mkdtemp(prefix="tapjoint-") if out is None else None
     folder = Path(os.fspath(out or temporary or ""))
-    call = _Call("simulate")
+    call = _Call("simulate", test)
     call.arguments.append(call.path_of(test))
     call.add(out=folder, repeatability=repeatability, seed=seed, force=force, **options)
     for name, given in (("--with", effects), ("--change", changes)):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _native, _plots
-from ._arrays import complex_values, real
+from . import _native, _plots, _tables
+from ._arrays import complex_values, real, whole
 from ._packages import package
 from .errors import InputError
 
@@ -25,9 +25,10 @@ class Spectrum:
     Attributes:
         frequency: Lines (Hz), shape (lines,).
         response: Root mean square of the transforms, shape (responses, lines), unit of the response times s.
-        force: The same of the force (N s), shape (lines,); None without a hammer.
+        force: The same of the force, unit of the force times s, shape (lines,); None without a hammer.
         names: Names of the responses.
         units: Units of the responses; None where the file gives none.
+        force_unit: Unit of the force, "N" in a described test; None where the file gives none.
         averages: Number of taps.
         window: "rectangular", "hann" or "exponential".
         window_decay: Decay (1/s) that an exponential window has added; else 0.
@@ -38,13 +39,15 @@ class Spectrum:
     force: Real | None
     names: tuple[str, ...]
     units: tuple[str | None, ...]
+    force_unit: str | None
     averages: int
     window: str
     window_decay: float
 
     def to_pandas(self) -> Any:
         """Returns a DataFrame: a row for each line, a column for each response, and ``force``."""
-        columns: dict[str, Real] = dict(zip(self.names, self.response))
+        own = [] if self.force is None else ["force"]
+        columns: dict[str, Real] = dict(zip(_tables.distinct(self.names, *own), self.response))
         if self.force is not None:
             columns["force"] = self.force
         return package("pandas").DataFrame(columns, index=_index(self.frequency))
@@ -54,12 +57,15 @@ class Spectrum:
         xarray = package("xarray")
         variables: dict[str, Any] = {"response_spectrum": (("response", "frequency"), self.response)}
         if self.force is not None:
-            variables["force_spectrum"] = ("frequency", self.force, {"units": "N s"})
+            units = {"units": f"{self.force_unit} s"} if self.force_unit else {}
+            variables["force_spectrum"] = ("frequency", self.force, units)
         return xarray.Dataset(variables, _coordinates(self), _attributes(self))
 
     def plot(self, axes: Any = None) -> Any:
         """Draws the spectra, and returns the matplotlib axes."""
-        return _plots.spectrum(self, axes)
+        unit = _shared(self.units) or "unit of the response"
+        label = f"Root mean square of the transforms ({unit} s)"
+        return _plots.lines(axes, label, self.frequency, self.names, self.response)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +110,14 @@ class FrequencyResponses:
         band: tuple[float, float] | None = None,
         sub_bands: bool = True,
     ) -> Modes:
-        """Finds the modes of H1: :func:`tapjoint.modes` of these functions. The window's decay is taken out."""
+        """Finds the modes of H1: :func:`tapjoint.modes` of these functions. The window's decay is taken out.
+
+        Lines before the first on which all functions exist are left out: mobility and receptance have no value at 0 Hz.
+        """
+        first = np.isfinite(np.atleast_2d(self.h1)).all(axis=0).argmax()
         return modes(
-            self.frequency,
-            self.h1,
+            self.frequency[first:],
+            self.h1[..., first:],
             order=order,
             band=band,
             window_decay=self.window_decay,
@@ -117,7 +127,7 @@ class FrequencyResponses:
     def to_pandas(self) -> Any:
         """Returns a DataFrame: a row for each line, and the columns (name, quantity)."""
         columns: dict[tuple[str, str], Any] = {}
-        for number, name in enumerate(self.names):
+        for number, name in enumerate(_tables.distinct(self.names)):
             for key in ("h1", "h2", "hv", "coherence", "random_error"):
                 values = getattr(self, key)
                 if values is not None:
@@ -126,22 +136,22 @@ class FrequencyResponses:
 
     def to_xarray(self) -> Any:
         """Returns a Dataset over ``response`` and ``frequency``, with units as attributes."""
-        dimensions = ("response", "frequency")
+        of_functions = _shared(self.units)
+        units = {"h1": of_functions, "h2": of_functions, "hv": of_functions, "coherence": "1", "random_error": "1"}
         variables: dict[str, Any] = {}
-        for key in ("h1", "h2", "hv", "coherence", "random_error"):
+        for key, unit in units.items():
             values = getattr(self, key)
             if values is not None:
-                has_unit = key in ("h1", "h2", "hv") and len(set(self.units)) == 1 and self.units[0]
-                attributes = {"units": self.units[0] if has_unit else "1"}
-                if key in ("h1", "h2", "hv") and not has_unit:
-                    attributes = {}
-                variables[key] = (dimensions, np.atleast_2d(values), attributes)
+                attributes = {"units": unit} if unit else {}
+                variables[key] = (("response", "frequency"), np.atleast_2d(values), attributes)
         attributes = {**_attributes(self), "form": self.form}
         return package("xarray").Dataset(variables, _coordinates(self), attributes)
 
     def plot(self, axes: Any = None) -> Any:
         """Draws the magnitudes, and returns the matplotlib axes."""
-        return _plots.functions(self, axes)
+        unit = _shared(self.units)
+        label = self.form.capitalize() + (f" ({unit})" if unit else "")
+        return _plots.lines(axes, label, self.frequency, self.names, np.abs(np.atleast_2d(self.h1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +201,14 @@ class Modes:
 
     def plot(self, axes: Any = None) -> Any:
         """Draws the stabilisation diagram, and returns the matplotlib axes."""
-        return _plots.stabilisation(self, axes)
+        axes = _plots.axes_of(axes, "Frequency (Hz)", "Order")
+        poles, stable = self.poles, self.poles["stable"]
+        for mask, mark, label in ((~stable, "x", "new"), (stable, "o", "stable")):
+            axes.plot(poles["frequency"][mask], poles["order"][mask], mark, markersize=3, label=label)
+        for frequency in self.frequency:
+            axes.axvline(frequency, color="0.6", linewidth=0.8, zorder=0)
+        axes.legend()
+        return axes
 
 
 def frf(
@@ -241,6 +258,8 @@ def frf(
     names = names or tuple(f"response {number}" for number in range(1, count + 1))
     if len(names) != count:
         raise InputError(f"names: {len(names)} for {count} responses; give one for each")
+    block = None if block is None else whole("block", block)
+    threads = None if threads is None else whole("threads", threads)
     found = _native.average(forces, responses, rate, band, block, window, decay, threads)
     arrays = {key: found[key] for key in ("h1", "h2", "hv", "coherence", "random_error")}
     if is_single:
@@ -300,6 +319,7 @@ def modes(
     deviation = np.abs(axis - (axis[0] + spacing * np.arange(len(axis)))).max()
     if not deviation <= 1e-3 * abs(spacing):
         raise InputError("frequency: the lines are not equally spaced; give equally spaced ones")
+    order = whole("order", order)
     found = _native.find_modes(values, float(axis[0]), spacing, order, window_decay, sub_bands)
     return Modes(**found)
 
@@ -312,6 +332,7 @@ def spectrum_of(found: dict[str, Any]) -> Spectrum:
         force=found["force"],
         names=tuple(found["names"]),
         units=tuple(found["units"]),
+        force_unit=found["force_unit"],
         averages=found["averages"],
         window=found["window"],
         window_decay=found["window_decay"],
@@ -345,10 +366,15 @@ def _index(frequency: Real) -> Any:
     return package("pandas").Index(frequency, name="frequency")
 
 
+def _shared(units: tuple[str | None, ...]) -> str | None:
+    """Returns the unit that all have; None where they differ or have none."""
+    return units[0] if len(set(units)) == 1 else None
+
+
 def _coordinates(found: Spectrum | FrequencyResponses) -> dict[str, Any]:
     return {
         "frequency": ("frequency", found.frequency, {"units": "Hz"}),
-        "response": list(found.names),
+        "response": _tables.distinct(found.names),
         "unit": ("response", [unit or "" for unit in found.units]),
     }
 

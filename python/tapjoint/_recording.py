@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _native, _plots
-from ._arrays import real
+from . import _native, _plots, _tables
+from ._arrays import real, whole
 from ._functions import FrequencyResponses, Spectrum
 from ._packages import package
 from ._results import Result, Section
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ._arrays import Real
+
+
+#: Most points of a line: two for each pixel of a wide picture.
+_MOST_POINTS = 4000
 
 
 @dataclass(frozen=True)
@@ -153,16 +158,19 @@ class Recording:
         """
         settings: dict[str, Any] = {
             "hammer": self._hammer(hammer),
-            "band": band,
-            "block": block,
+            "band": None if band is None else (float(band[0]), float(band[1])),
+            "block": None if block is None else whole("block", block),
             "window": window,
             "reading": reading,
             "overload": overload,
-            "threads": threads,
         }
-        if self._measured is None or self._measured[0] != settings:
-            self._measured = (settings, Result(self._native.measure(**settings)))
-        return self._measured[1]
+        # Another thread may put its own result there meanwhile.
+        kept = self._measured
+        if kept is None or kept[0] != settings:
+            count = None if threads is None else whole("threads", threads)
+            kept = (settings, Result(self._native.measure(**settings, threads=count)))
+            self._measured = kept
+        return kept[1]
 
     def spectrum(self, hammer: str | int | None = None, **settings: Any) -> Spectrum:
         """Averages the spectra of the taps. Settings are those of :meth:`measure`.
@@ -207,14 +215,18 @@ class Recording:
     def to_pandas(self) -> Any:
         """Returns a DataFrame: a row for each sample, a column for each channel."""
         pandas = package("pandas")
-        columns = {channel["name"]: channel["data"] for channel in self.to_sep005()}
+        channels = self.to_sep005()
+        names = _tables.distinct((channel["name"] for channel in channels), "time")
+        columns = {name: channel["data"] for name, channel in zip(names, channels)}
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
     def to_xarray(self) -> Any:
         """Returns a Dataset: a variable over ``time`` for each channel, with its unit as attribute."""
+        channels = self.to_sep005()
+        names = _tables.distinct((channel["name"] for channel in channels), "time")
         variables = {
-            channel["name"]: ("time", channel["data"], {"units": channel["unit_str"]})
-            for channel in self.to_sep005()
+            name: ("time", channel["data"], {"units": channel["unit_str"]})
+            for name, channel in zip(names, channels)
         }
         time = ("time", self.time, {"units": "s"})
         attributes = {"name": self.name, "rate": self.rate}
@@ -222,7 +234,18 @@ class Recording:
 
     def plot(self, axes: Any = None) -> Any:
         """Draws the channels over time, and returns the matplotlib axes."""
-        return _plots.recording(self, axes)
+        axes = _plots.axes_of(axes, "Time (s)", "")
+        # Lowest and highest values of pieces.
+        piece = max(1, -(-self.frames // (_MOST_POINTS // 2)))
+        count = self.frames // piece
+        time = np.repeat(np.arange(count) * piece / self.rate, 2)
+        for channel in self.channels:
+            pieces = self[channel.number][: count * piece].reshape(count, piece)
+            values = np.stack([pieces.min(axis=1), pieces.max(axis=1)], axis=1).ravel()
+            name = channel.name or f"channel {channel.number}"
+            axes.plot(time, values, label=f"{name} ({channel.unit})" if channel.unit else name, linewidth=0.7)
+        axes.legend()
+        return axes
 
     def _arrays(self) -> list[Real]:
         if self._samples is None:
@@ -235,13 +258,13 @@ class Recording:
     def _index(self, channel: str | int) -> int:
         if isinstance(channel, str):
             return self._native.channel_index(channel)
-        number = int(channel)
+        try:
+            number = index(channel)
+        except TypeError:
+            raise InputError(f"channel: {channel!r} is no name and no whole number; give one of them") from None
         if not 1 <= number <= len(self):
-            raise RecordingError(
-                f"{self.name}: no channel {number}; there are channels 1 to {len(self)}; give one of them",
-                file=self.name,
-                remedy="give one of them",
-            )
+            message = f"{self.name}: no channel {number}; there are channels 1 to {len(self)}; give one of them"
+            raise RecordingError(message, file=self.name)
         return number - 1
 
     def _hammer(self, channel: str | int | None) -> int | None:

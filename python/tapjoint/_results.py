@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from . import _native, _plots, _tables
+from ._arrays import whole
 from ._functions import FrequencyResponses, Spectrum, responses_of, spectrum_of
 from ._packages import package
-from .errors import InputError
+from .errors import InputError, TapjointError
 
 
 class Section(Mapping[str, Any]):
@@ -96,6 +97,14 @@ class Result:
     def __setstate__(self, state: tuple[bool, str, str]) -> None:
         self._native = None
         self._begin(*state)
+
+    def __copy__(self) -> Result:
+        """Returns this result: nothing changes it."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Result:
+        """Returns this result: nothing changes it."""
+        return self
 
     def _measured(self) -> _native.Answer:
         """Returns what holds the arrays.
@@ -185,8 +194,9 @@ class Result:
         if table is None:
             return {name: pandas.DataFrame(rows) for name, rows in tables.items()}
         if table not in tables:
-            names = ", ".join(tables) or "none"
-            raise InputError(f"there is no table {table!r} in this result; there are: {names}")
+            names = ", ".join(tables)
+            remedy = f"give one of {names}" if tables else "it has none"
+            raise InputError(f"there is no table {table!r} in this result; {remedy}")
         return pandas.DataFrame(tables[table])
 
     def to_xarray(self) -> Any:
@@ -206,7 +216,7 @@ class Result:
         Raises:
             InputError: No tap was accepted, or there is no such recording.
         """
-        found = self._measured().spectrum(recording)
+        found = self._measured().spectrum(whole("recording", recording, 0))
         if found is None:
             raise InputError(f"recording {recording}: no tap was accepted; look at the reasons of its taps")
         return spectrum_of(found)
@@ -219,11 +229,15 @@ class Result:
             form: "accelerance", "mobility" or "receptance"; default: as measured.
 
         Raises:
-            InputError: There is no hammer, no accepted tap, or no such form.
+            InputError: There is no hammer, no accepted tap with its force, or no such form.
         """
-        found = self._measured().functions(recording, form)
+        found = self._measured().functions(whole("recording", recording, 0), form)
         if not found:
-            raise InputError(f"recording {recording}: no tap was accepted; look at the reasons of its taps")
+            # Refuses what has no accepted tap at all.
+            self.spectrum(recording)
+            raise InputError(
+                f"recording {recording}: every accepted tap drove a channel to its limit; record taps below the limit"
+            )
         return responses_of(found)
 
     def plot(self, axes: Any = None) -> Any:
@@ -232,7 +246,16 @@ class Result:
         Raises:
             MissingPackageError: matplotlib is not installed.
         """
-        return _plots.result(self, axes)
+        compared = [one for one in self.prediction if one.get("error_percent") is not None]
+        if compared:
+            axes = _plots.axes_of(axes, "Mode", "Predicted - measured (%)")
+            axes.bar([one.mode for one in compared], [one.error_percent for one in compared])
+            axes.axhline(0.0, color="0.2", linewidth=0.8)
+            return axes
+        axes = _plots.axes_of(axes, "Frequency (Hz)", "Damping (1)")
+        modes = [mode for mode in self.modes if mode.get("damping") is not None]
+        axes.plot([mode.frequency for mode in modes], [mode.damping for mode in modes], "o")
+        return axes
 
     def _repr_html_(self) -> str:
         """The first screen of the report's page, in a frame of its own, so that no style meets the notebook's."""
@@ -290,3 +313,20 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"<Simulation in {str(self.folder)!r}>"
+
+
+class NoAnswerError(TapjointError):
+    """The data give no answer.
+
+    Attributes:
+        result: What was found all the same.
+    """
+
+    result: Result
+
+    def __init__(self, message: str, result: Result) -> None:
+        super().__init__(message)
+        self.result = result
+
+    def __reduce__(self) -> tuple[type[NoAnswerError], tuple[str, Result]]:
+        return NoAnswerError, (str(self), self.result)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,20 @@ PARAMETERS = {
     "density": "kg/m3",
 }
 _VALUES = ("value", "std", "low", "high")
+
+
+def distinct(names: Iterable[str], *taken: str) -> list[str]:
+    """Returns the names of columns, with a number behind each that is taken or that an earlier column has: "a (2)"."""
+    known = set(taken)
+    columns = []
+    for name in names:
+        column, number = name, 1
+        while column in known:
+            number += 1
+            column = f"{name} ({number})"
+        known.add(column)
+        columns.append(column)
+    return columns
 
 
 def of_document(document: Row) -> dict[str, list[Row]]:

@@ -1,11 +1,9 @@
-"""Exceptions of tapjoint. Every message says what is wrong, what is allowed, and what to do."""
+"""Exceptions of tapjoint. Every message says what is wrong, what is allowed, and what to do.
+
+``tapjoint.NoAnswerError`` stands beside the result that it holds.
+"""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from ._results import Result
 
 
 class TapjointError(Exception):
@@ -14,7 +12,7 @@ class TapjointError(Exception):
     Attributes:
         file: The file with the problem, as it was named; None where no file is the cause.
         line: Its line, counted from 1; None where there is none.
-        remedy: What to do; None where the message has no such part.
+        remedy: What to do, the part of the message behind its last semicolon; None where there is none.
     """
 
     file: str | None
@@ -32,7 +30,9 @@ class TapjointError(Exception):
         super().__init__(message)
         self.file = file
         self.line = line
-        self.remedy = remedy
+        # Results that were written in spite of the error follow the remedy.
+        _, mark, part = message.partition("; written all the same: ")[0].rpartition("; ")
+        self.remedy = remedy or (part if mark else None)
 
 
 class InputError(TapjointError, ValueError):
@@ -45,23 +45,6 @@ class RecordingError(InputError):
 
 class DescriptionError(InputError):
     """A test description that is not valid, or that does not fit its recordings."""
-
-
-class NoAnswerError(TapjointError):
-    """The data give no answer.
-
-    Attributes:
-        result: What was found all the same.
-    """
-
-    result: Result
-
-    def __init__(self, message: str, result: Result) -> None:
-        super().__init__(message)
-        self.result = result
-
-    def __reduce__(self) -> tuple[type[NoAnswerError], tuple[str, Result]]:
-        return NoAnswerError, (str(self), self.result)
 
 
 class BatchError(TapjointError):

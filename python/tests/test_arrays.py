@@ -113,6 +113,12 @@ def prop_a_zoomed_band_has_the_lines_of_its_block(taps):
         ({"rate": float("nan")}, "rate"),
         ({"band": (300.0, 100.0)}, "band"),
         ({"block": 3}, "block"),
+        ({"block": -4}, "block"),
+        ({"block": 10**30}, "block"),
+        ({"block": 256.0}, "block"),
+        ({"threads": 0}, "threads"),
+        ({"threads": -1}, "threads"),
+        ({"threads": 10**6}, "threads"),
         ({"window": "flat"}, "window"),
         ({"window": "exponential"}, "decay"),
         ({"decay": 2.0}, "decay"),
@@ -122,8 +128,10 @@ def prop_a_zoomed_band_has_the_lines_of_its_block(taps):
 def limit_bad_arrays_are_refused(taps, change, words):
     force, response = taps
     arguments = {"force": force, "response": response, "rate": RATE, **change}
-    with pytest.raises(tapjoint.InputError, match=words):
+    with pytest.raises(tapjoint.InputError, match=words) as found:
         tapjoint.frf(**arguments)
+    # No file is the cause.
+    assert found.value.file is None and found.value.line is None and found.value.remedy
 
 
 def accelerances(spacing=0.5):
@@ -164,10 +172,30 @@ def limit_bad_functions_are_refused():
     ):
         with pytest.raises(tapjoint.InputError, match=words):
             tapjoint.modes(*arguments)
-    with pytest.raises(tapjoint.InputError, match="order"):
-        tapjoint.modes(axis, response, order=10**6)
+    for order in (10**6, 10**30, 1, -1, 12.0):
+        with pytest.raises(tapjoint.InputError, match="order"):
+            tapjoint.modes(axis, response, order=order)
     with pytest.raises(tapjoint.InputError, match="wider"):
         tapjoint.modes(axis, response, band=(20.1, 20.2))
+
+
+def limit_shapes_without_a_mode_keep_their_functions():
+    random = np.random.default_rng(3)
+    response = random.standard_normal((6, 2, 400)) + 1j * random.standard_normal((6, 2, 400))
+    found = tapjoint.modes(np.arange(400.0), response, order=8, sub_bands=False)
+    assert len(found) == 0
+    assert found.shape.shape == (0, 6) and found.participation.shape == (0, 2)
+
+
+def regress_columns_of_one_name_are_kept(taps):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    force, response = taps
+    found = tapjoint.frf(force, response, RATE, names=("a", "a"))
+    table = found.to_pandas()
+    assert isinstance(table, pandas.DataFrame) and table.shape == (801, 10)
+    assert np.array_equal(table[("a (2)", "h1")], found.h1[1])
+    assert np.array_equal(found.to_xarray().h1.sel(response="a (2)"), found.h1[1])
 
 
 def resident() -> int:

@@ -86,6 +86,47 @@ def recover_a_change_between_two_tests(bar, command, tmp_path):
     assert tapjoint.compare(pairs=[(bar, lighter), (bar, lighter)]).compare.modes
 
 
+def regress_a_description_in_memory_hides_no_file(tmp_path, monkeypatch):
+    def described(share: float) -> tapjoint.Test:
+        frequencies = [share * f for f in FREQUENCIES]
+        measured = {"frequencies": frequencies, "half_line": 0.125}
+        return tapjoint.Test(name="Bar", beam=BEAM, joint={"kind": "cantilever"}, measured=measured)
+
+    def change(*tests: object, **others: object) -> float:
+        return round(tapjoint.compare(*tests, **others).compare.modes[0].change_percent, 6)
+
+    monkeypatch.chdir(tmp_path)
+    described(1.0).save("test.toml")
+    # A description in memory is called test.toml as well.
+    lighter = described(0.99)
+    for file in ("test.toml", Path("test.toml"), "./test.toml", tmp_path / "test.toml"):
+        assert change(file, lighter) == -1.0
+        assert change(lighter, file) == round(100 / 0.99 - 100, 6)
+    assert -1.01 < change(["test.toml", described(1.0001)], [lighter, described(0.9901)]) < -0.99
+    assert change(pairs=[(lighter, "test.toml"), (lighter, "test.toml")]) > 1.0
+    series = tapjoint.compare(series=[lighter, "test.toml", described(1.0001), lighter]).series
+    assert len(set(series.tests)) == 3
+
+
+def regress_warnings_name_the_line_of_the_caller(tmp_path):
+    heavy = tapjoint.Test(
+        beam={**BEAM, "density": 30000},
+        joint={"kind": "cantilever"},
+        measured={"frequencies": FREQUENCIES, "half_line": 0.125},
+    )
+    calls = [
+        lambda: tapjoint.identify(heavy),
+        lambda: tapjoint.run(heavy),
+        lambda: tapjoint.compare(heavy, heavy),
+        lambda: tapjoint.predict(heavy, kx=1400, ky=4.8),
+    ]
+    for call in calls:
+        with pytest.warns(tapjoint.TapjointWarning) as caught:
+            call()
+        assert {one.filename for one in caught} == {__file__}
+        assert {one.lineno for one in caught} == {call.__code__.co_firstlineno}
+
+
 def val_predicted_frequencies_are_those_of_the_command(bar, command, tmp_path):
     expected = command("predict", "--joint", "cantilever", "--kx", 500, "--ky", 100)
     found = tapjoint.predict(joint="cantilever", kx=500, ky=100)
@@ -128,8 +169,10 @@ def regress_errors_have_their_class_place_and_remedy(tmp_path, cantilever):
         tapjoint.predict(joint="cantilever", kx=1, ky=1, modes=10**9)
     with pytest.raises(tapjoint.InputError, match="TOML"):
         tapjoint.Test(beam={"length": float("nan")})
-    with pytest.raises(tapjoint.InputError, match="threads"):
-        tapjoint.identify(cantilever / "test.toml", threads=0)
+    for threads in (0, -1, 10**30, 10**5000, 1.5):
+        with pytest.raises(tapjoint.InputError, match="threads") as found:
+            tapjoint.identify(cantilever / "test.toml", threads=threads)
+        assert found.value.file is None and found.value.remedy.startswith("give")
 
 
 def limit_too_few_modes_are_no_answer(tmp_path):
@@ -138,7 +181,7 @@ def limit_too_few_modes_are_no_answer(tmp_path):
     )
     with pytest.raises(tapjoint.NoAnswerError) as found:
         tapjoint.identify(test)
-    assert not found.value.result.is_answered
+    assert not found.value.result.is_answered and found.value.remedy
     assert found.value.result.modes[0].frequency == 17.0
 
 
@@ -161,25 +204,35 @@ def prop_four_threads_give_what_one_gives(bar, cantilever):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
-def regress_a_forked_process_has_threads_of_its_own(bar):
-    expected = tapjoint.identify(bar).estimate.kr.value
+@pytest.mark.parametrize("records", [6, 40])
+@pytest.mark.parametrize("window", ["rectangular", "hann"])
+def regress_a_forked_process_has_threads_of_its_own(bar, records, window):
+    force = np.random.default_rng(1).standard_normal((records, 512))
+
+    def compute() -> tuple[float, bytes]:
+        functions = tapjoint.frf(force, force[:, ::-1], 5120.0, window=window, threads=1)
+        return tapjoint.identify(bar).estimate.kr.value, functions.h1.tobytes()
+
+    expected = compute()
     child = os.fork()
     if child == 0:
-        found = tapjoint.identify(bar).estimate.kr.value
-        os._exit(0 if found == expected else 1)
+        # Ends a child that waits for the threads of its parent.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(120)
+        os._exit(0 if compute() == expected else 1)
     assert os.waitpid(child, 0)[1] == 0
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def limit_ctrl_c_ends_a_long_call(cantilever):
-    test = str(cantilever / "test.toml")
+def limit_ctrl_c_ends_a_long_call_and_nothing_is_written(cantilever, tmp_path):
+    test, out = str(cantilever / "test.toml"), tmp_path / "report"
     code = (
         "import tapjoint\n"
-        f"test = {test!r}\n"
+        f"test, out = {test!r}, {str(out)!r}\n"
         "tapjoint.identify(test)\n"
         "print('ready', flush=True)\n"
         "try:\n"
-        "    tapjoint.compare(series=[test] * 500)\n"
+        "    tapjoint.compare(series=[test] * 500, out=out)\n"
         "except KeyboardInterrupt:\n"
         "    print('interrupted', flush=True)\n"
         "print(tapjoint.identify(test).is_answered, flush=True)\n"
@@ -191,3 +244,4 @@ def limit_ctrl_c_ends_a_long_call(cantilever):
     process.send_signal(signal.SIGINT)
     rest, _ = process.communicate(timeout=120)
     assert rest == "interrupted\nTrue\n"
+    assert not out.exists()

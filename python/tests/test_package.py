@@ -30,6 +30,11 @@ def limit_packages_are_loaded_when_they_are_used():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def regress_the_module_of_errors_is_there_after_an_import():
+    code = "import tapjoint; assert issubclass(tapjoint.errors.InputError, tapjoint.TapjointError)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def prop_the_command_has_the_exit_codes_of_the_program(tmp_path):
     def code(*arguments: str) -> int:
         line = [sys.executable, "-m", "tapjoint._cli", *arguments]

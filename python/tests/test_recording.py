@@ -46,10 +46,27 @@ def prop_samples_are_read_once_and_shared_read_only(cantilever):
     force = recording[1]
     assert force.dtype == np.float64 and force.shape == (recording.frames,)
     assert recording[1] is force and not force.flags.writeable
-    assert force.base is not None or force.flags.owndata
     assert recording.time[1] == 1 / recording.rate
     assert [len(channel) for channel in recording] == [recording.frames] * 3
     assert recording.measure(1) is recording.measure(1)
+    assert recording.measure(1, threads=1) is recording.measure(1, band=None)
+    assert recording.measure(1, band=np.array([0, 200])) is recording.measure(1, band=(0, 200))
+
+
+def regress_threads_take_the_results_of_their_own_settings(cantilever):
+    class Shared(tapjoint.Recording):
+        """Another thread measures with other settings just after each measurement."""
+
+        @property
+        def _measured(self):
+            return self.kept
+
+        @_measured.setter
+        def _measured(self, found):
+            self.kept = found and ({}, None)
+
+    recording = Shared(tapjoint.read(cantilever / "low.wav")._native)
+    assert recording.measure(1, band=(0, 200)).modes
 
 
 def recover_a_recording_of_arrays(cantilever):
@@ -108,21 +125,76 @@ def limit_bad_recordings_are_refused(tmp_path, cantilever):
         tapjoint.read(table)
     assert found.value.line == 4
     recording = tapjoint.read(cantilever / "low.wav")
-    for channel in ("force", 0, 4):
-        with pytest.raises(tapjoint.RecordingError, match="there are"):
+    for channel in ("force", 0, 4, -1):
+        with pytest.raises(tapjoint.RecordingError, match="there are") as found:
             recording[channel]
-    with pytest.raises(tapjoint.InputError):
+        assert found.value.file == "low.wav" and found.value.remedy
+    for channel in (1.9, None, (1,)):
+        with pytest.raises(tapjoint.InputError, match="whole number"):
+            recording[channel]
+    with pytest.raises(tapjoint.InputError, match="band"):
         recording.measure(1, band=(300, 200))
+    for name in ("block", "threads"):
+        with pytest.raises(tapjoint.InputError, match=name):
+            recording.measure(1, **{name: -1})
     with pytest.raises(tapjoint.InputError, match="window"):
         recording.measure(1, window="flat")
     for arrays, words in (
         ({"a": [1.0, np.inf]}, "finite"),
-        ({"a": [1.0], "b": [1.0, 2.0]}, "."),
+        ({"a": [1.0], "b": [1.0, 2.0]}, "samples"),
         ({"a": [[1.0]]}, "dimension"),
-        ({}, "."),
+        ({}, "no samples"),
     ):
         with pytest.raises(tapjoint.InputError, match=words):
             tapjoint.from_arrays(arrays, 100.0)
+
+
+def regress_channels_of_one_name_are_kept():
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    rows = np.arange(12.0).reshape(4, 3)
+    channels = [{"name": n, "data": x, "fs": 2.0} for n, x in zip(("a", "a", "time", "b"), rows)]
+    recording = tapjoint.from_sep005(channels)
+    names = ["a", "a (2)", "time (2)", "b"]
+    assert list(recording.to_pandas()) == names
+    assert list(recording.to_xarray().data_vars) == names
+    assert np.array_equal(recording.to_pandas()["a (2)"], rows[1])
+    assert [one["name"] for one in recording.to_sep005()] == ["a", "a", "time", "b"]
+
+
+def tapped(unit: str, response_name: str = "a", limit: float = np.inf) -> tapjoint.Recording:
+    """Two taps of a force in this unit; responses ring at 75 Hz, and the force stays below the limit."""
+    rate, frames = 5120.0, 20480
+    random = np.random.default_rng(1)
+    force = 1e-3 * random.standard_normal(frames)
+    for start in (1024, 11264):
+        force[start : start + 12] += 30.0 * np.sin(np.pi * np.arange(12) / 12)
+    time = np.arange(5120) / rate
+    ringing = np.exp(-12.0 * time) * np.sin(2 * np.pi * 75.0 * time)
+    response = np.convolve(force, ringing)[:frames] + 1e-3 * random.standard_normal(frames)
+    arrays = {"hammer": np.clip(force, -limit, limit), response_name: response}
+    return tapjoint.from_arrays(arrays, rate, units={"hammer": unit, response_name: "m/s2"})
+
+
+def regress_spectra_keep_the_unit_of_the_force_and_all_columns():
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    for unit in ("N", "V"):
+        spectrum = tapped(unit, "force").spectrum("hammer")
+        assert spectrum.force_unit == unit
+        assert spectrum.to_xarray().force_spectrum.attrs["units"] == f"{unit} s"
+        table = spectrum.to_pandas()
+        assert np.array_equal(table["force"], spectrum.force)
+        assert np.array_equal(table["force (2)"], spectrum.response[0])
+
+
+def regress_functions_of_overloaded_taps_say_why_there_are_none():
+    recording = tapped("N", limit=20.0)
+    with pytest.raises(tapjoint.InputError, match="no tap was accepted"):
+        recording.frf("hammer")
+    assert any(tap.accepted for tap in recording.taps("hammer", overload="keep"))
+    with pytest.raises(tapjoint.InputError, match="every accepted tap drove a channel to its limit"):
+        recording.frf("hammer", overload="keep")
 
 
 def prop_a_recording_becomes_a_table_and_axes(cantilever):

@@ -24,12 +24,16 @@ def prop_attributes_are_the_keys_of_the_document(bar):
     with pytest.raises(AttributeError, match="there are"):
         result.estimate.nothing
     assert "Kr" in str(result) and "Bar" in repr(result)
+    with pytest.raises(tapjoint.InputError) as found:
+        result.to_pandas("nothing")
+    assert found.value.file is None and found.value.remedy.startswith("give one of modes, ")
 
 
 def prop_results_sections_and_errors_are_copied_and_pickled(bar):
     result = tapjoint.identify(bar)
     estimate = result.estimate
     assert copy.deepcopy(estimate) == estimate
+    assert copy.copy(result).to_dict() == copy.deepcopy(result).to_dict() == result.to_dict()
     assert pickle.loads(pickle.dumps(estimate)).kr.value == estimate.kr.value
     again = pickle.loads(pickle.dumps(result))
     assert again.to_dict() == result.to_dict() and str(again) == str(result)
@@ -54,7 +58,7 @@ def prop_tables_hold_the_numbers_of_the_document(cantilever):
     parameters = result.to_pandas("parameters").set_index("parameter")
     assert parameters.loc["kr", "value"] == result.estimate.kr.value
     assert parameters.loc["kr", "unit"] == "N m/rad"
-    with pytest.raises(tapjoint.InputError, match="there are"):
+    with pytest.raises(tapjoint.InputError, match="give one of modes, parameters, taps"):
         result.to_pandas("nothing")
 
 
@@ -67,6 +71,8 @@ def prop_axes_have_names_and_units(cantilever):
     functions = result.frf(0).to_xarray()
     assert functions.h1.dims == ("response", "frequency")
     assert functions.h1.attrs["units"] == "(m/s2)/N"
+    assert functions.coherence.attrs["units"] == "1"
+    assert result.spectrum(0).to_xarray().force_spectrum.attrs["units"] == "N s"
 
 
 def prop_arrays_of_a_result_are_those_of_its_recordings(cantilever):
@@ -78,10 +84,29 @@ def prop_arrays_of_a_result_are_those_of_its_recordings(cantilever):
     omega = 2 * np.pi * functions.frequency[1:]
     assert np.allclose(receptance.h1[:, 1:] * -(omega**2), functions.h1[:, 1:])
     assert result.spectrum(1).response.shape == (2, 801)
-    with pytest.raises(tapjoint.InputError, match="recording"):
-        result.frf(7)
+    assert np.array_equal(copy.copy(result).frf(0).h1, functions.h1)
+    assert np.array_equal(copy.deepcopy(result).frf(0).h1, functions.h1)
+    for recording in (7, -1, 10**30, 0.5):
+        with pytest.raises(tapjoint.InputError, match="recording"):
+            result.frf(recording)
+        with pytest.raises(tapjoint.InputError, match="recording"):
+            result.spectrum(recording)
     with pytest.raises(tapjoint.InputError, match="form"):
         result.frf(0, form="compliance")
+
+
+def recover_modes_of_every_form(cantilever):
+    result = tapjoint.run(cantilever / "test.toml")
+    expected = result.frf(0).modes().frequency
+    for form in ("mobility", "receptance"):
+        functions = result.frf(0, form=form)
+        assert np.isnan(functions.h1[:, 0]).all()
+        found = functions.modes().frequency
+        # Each form weighs the lines in its own way.
+        assert all(abs(found / one - 1).min() < 1e-3 for one in expected)
+    functions.h1[:] = np.nan
+    with pytest.raises(tapjoint.InputError, match="finite"):
+        functions.modes()
 
 
 def prop_a_notebook_shows_the_first_screen(cantilever):

@@ -19,9 +19,9 @@ pub mod summary;
 pub mod tables;
 pub mod words;
 
-pub use answer::{Analysed, BatchError, analyse, answer, answer_watched, record_of};
+pub use answer::{Analysed, BatchError, analyse, answer, answer_watched, failed, record_of};
 pub use input_table::{InputTable, TableError};
-pub use journal::{JOURNAL_HEAD, Journal, Key, journal_line, record_in};
+pub use journal::{JOURNAL_HEAD, Journal, JournalEntry, Key};
 pub use record::{
     BatchRecord, Estimated, HypothesisRow, ModeRow, Parameters, TestOutcome, TestRow,
 };

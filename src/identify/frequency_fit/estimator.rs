@@ -598,9 +598,7 @@ impl ConsistentEstimator {
             quick.discrepancy = LEAST_DISCREPANCY;
         }
         let minima = quick.promising_minima(&quick.problem(&quick.models, &quick.frequencies()));
-        minima
-            .first()
-            .map_or(f64::INFINITY, |best| best.state.cost)
+        minima.first().map_or(f64::INFINITY, |best| best.state.cost)
     }
 
     /// Returns the minima that lie downhill of where the frequency equation nearly holds, the deepest first.

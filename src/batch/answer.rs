@@ -56,8 +56,14 @@ pub fn answer_watched(
     let identify = IdentifySettings::unperturbed();
     match analyse(test, settings, &identify, watch) {
         Ok(found) => record_of(test, &found),
-        Err(error) => BatchRecord::failed(&test.file, &test.carried, error.to_string()),
+        Err(error) => failed(test, &error),
     }
+}
+
+/// Returns the record of a test that cannot be analysed.
+pub fn failed(test: &BatchTest, error: &BatchError) -> BatchRecord {
+    let files = test.file_names();
+    BatchRecord::failed(&test.file, &test.carried, error.to_string(), &files)
 }
 
 /// Analyses one test, and diagnoses it where the settings ask for it. The stages are announced to `watch`.
@@ -89,10 +95,10 @@ pub fn analyse(
                 seed: settings.seed,
                 ..GapSettings::default()
             };
-            let _work = Work::begin(watch, Stage::Diagnosis);
-            let diagnosis = settings
-                .diagnosis
-                .then(|| diagnose_test(&described.test, &analysis, &gap));
+            let diagnosis = settings.diagnosis.then(|| {
+                let _work = Work::begin(watch, Stage::Diagnosis);
+                diagnose_test(&described.test, &analysis, &gap)
+            });
             Ok(Analysed {
                 analysis,
                 diagnosis,
@@ -161,6 +167,7 @@ fn test_row(test: &BatchTest, analysis: &Analysis, document: &Document) -> TestR
             false => TestOutcome::NoAnswer,
         },
         error: (!is_answered).then(|| no_answer(document)),
+        reason: None,
         kind: document.kind().and_then(kind_name),
         recordings: recordings.len() as u64,
         taps_accepted: accepted.len() as u64,

@@ -1,7 +1,9 @@
 //! The input table: a row for each recording, with what differs between the tests.
 
-use crate::WITHOUT_PARQUET;
+use crate::table_file::WITHOUT_PARQUET;
+use std::collections::BTreeMap;
 use std::fmt;
+use std::str::FromStr;
 use tapjoint_description::{DescriptionError, TestDescription};
 use toml::{Table, Value};
 
@@ -76,6 +78,20 @@ struct KeyColumn {
     column: usize,
     /// Way to the key: "beam", "length".
     path: Vec<String>,
+}
+
+impl KeyColumn {
+    /// Returns the last part of the key.
+    fn last(&self) -> &str {
+        self.path.last().map_or("", String::as_str)
+    }
+
+    /// Returns true if a problem may belong to this key. Problems number the tables of a list: `sensor[2].name`.
+    fn is_of(&self, problem: &DescriptionError) -> bool {
+        let first = problem.key.split(['.', '[']).next();
+        let last = problem.key.rsplit('.').next();
+        first == self.path.first().map(String::as_str) && last == Some(self.last())
+    }
 }
 
 impl InputTable {
@@ -241,6 +257,35 @@ impl InputTable {
         row.and_then(|row| row.get(column)).unwrap_or_default()
     }
 
+    /// Returns true if a column names files of the description.
+    pub fn names_files(&self) -> bool {
+        let mut keys = self.keys.iter();
+        keys.any(|key| matches!(key.last(), "file" | "files" | "free_test"))
+    }
+
+    /// Refuses columns that name the recordings of a description: the column `file` does.
+    ///
+    /// # Errors
+    /// There is such a column.
+    pub fn check_sets_no_recording(&self) -> Result<(), TableError> {
+        let mut keys = self.keys.iter();
+        let found = keys.find(|key| {
+            key.path.first().is_some_and(|table| table == "recording")
+                && matches!(key.last(), "file" | "files")
+        });
+        match found {
+            None => Ok(()),
+            Some(key) => Err(TableError {
+                file: self.name.clone(),
+                line: 1,
+                problem: format!(
+                    "the column `{}` names recordings, and with --test the column `{FILE}` does; remove it",
+                    self.heads[key.column]
+                ),
+            }),
+        }
+    }
+
     /// Returns a description with the keys that a row sets. Empty cells leave the description as it is. `text` is the valid
     /// description, `file` its name. The second value is the text of the changed description.
     ///
@@ -259,32 +304,52 @@ impl InputTable {
             problem,
         };
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let mut table: Table = text
+        let described: Table = text
             .parse()
             .map_err(|problem: toml::de::Error| error(format!("{file}: {}", problem.message())))?;
-        for key in &self.keys {
-            let cell = self.cell(row, key.column);
-            if cell.is_empty() {
-                continue;
+        // Columns whose cells are taken as text, and why: a name may look like a number, as 17 does.
+        let mut texts: BTreeMap<usize, DescriptionError> = BTreeMap::new();
+        loop {
+            let mut table = described.clone();
+            for key in &self.keys {
+                let cell = self.cell(row, key.column);
+                let value = match texts.contains_key(&key.column) {
+                    _ if cell.is_empty() => continue,
+                    true => Value::String(cell.to_owned()),
+                    false => value_of(cell),
+                };
+                set(&mut table, &key.path, &value).map_err(|missing| {
+                    error(format!(
+                        "`{}`: {file} has no {missing}; add it there, or remove the column",
+                        self.heads[key.column]
+                    ))
+                })?;
             }
-            set(&mut table, &key.path, &value_of(cell)).map_err(|missing| {
-                error(format!(
-                    "`{}`: {file} has no {missing}; add it there, or remove the column",
-                    self.heads[key.column]
-                ))
-            })?;
+            let changed = toml::to_string(&table).map_err(|problem| error(problem.to_string()))?;
+            let problem = match TestDescription::parse(&changed, file) {
+                Ok(test) => return Ok((test, changed)),
+                Err(problem) => problem,
+            };
+            let mut own = self.keys.iter().filter(|key| key.is_of(&problem));
+            let is_number = |key: &&KeyColumn| {
+                let cell = self.cell(row, key.column);
+                !texts.contains_key(&key.column) && !cell.is_empty() && !value_of(cell).is_str()
+            };
+            match own.clone().find(is_number) {
+                Some(key) => texts.insert(key.column, problem),
+                // What was wrong with the number says more than what is wrong with its text.
+                None => {
+                    let first = own.find_map(|key| texts.get(&key.column));
+                    return Err(error(self.in_words(first.unwrap_or(&problem))));
+                }
+            };
         }
-        let changed = toml::to_string(&table).map_err(|problem| error(problem.to_string()))?;
-        let test = TestDescription::parse(&changed, file)
-            .map_err(|problem| error(self.in_words(&problem)))?;
-        Ok((test, changed))
     }
 
     /// Returns an error of a changed description, with the column that it belongs to.
     fn in_words(&self, problem: &DescriptionError) -> String {
         let mut keys = self.keys.iter();
-        let column = keys.find(|key| key.path.join(".") == problem.key);
-        match column {
+        match keys.find(|key| key.path.join(".") == problem.key) {
             Some(key) => format!("`{}`: {}", self.heads[key.column], problem.problem),
             None => format!(
                 "{} with this row: `{}`: {}",
@@ -296,10 +361,10 @@ impl InputTable {
 
 /// Returns the value that a cell writes: a number, true or false, or a list in TOML's notation; any other text as text.
 fn value_of(cell: &str) -> Value {
-    let line = format!("value = {cell}");
-    let found = line.parse::<Table>().ok();
-    let found = found.filter(|table| table.len() == 1);
-    match found.and_then(|mut table| table.remove("value")) {
+    // A comment of TOML is a part of the text here.
+    let found = Value::from_str(cell).ok();
+    let found = found.filter(|_| !cell.contains('#'));
+    match found {
         Some(Value::Datetime(_)) | None => Value::String(cell.to_owned()),
         Some(value) => value,
     }
@@ -395,6 +460,47 @@ mod tests {
         assert_eq!(first.sensors[0].position, Some(0.3));
         let (second, _) = found.described(1, STRIP, "test.toml").unwrap();
         assert_eq!((second.beam.length, second.beam.modulus), (0.423, 210e9));
+    }
+
+    #[test]
+    fn regress_a_text_that_looks_like_a_number_is_a_text() {
+        for name in ["17", "true", "1e5", "[1]", "1 # x", "2024-05-17", "\"17\""] {
+            let quoted = name.replace('"', "\"\"");
+            let found = table(&format!("file,name,sheet.number\na.wav,\"{quoted}\",17\n")).unwrap();
+            let (test, _) = found.described(0, STRIP, "test.toml").unwrap();
+            assert_eq!(
+                (&*test.name, test.sheet.number.as_deref()),
+                (name.trim_matches('"'), Some("17"))
+            );
+        }
+        let found = table("file,length\na.wav,1 # x\n").unwrap();
+        let error = found
+            .described(0, STRIP, "test.toml")
+            .expect_err("no length");
+        assert!(error.to_string().contains("1 # x"), "{error}");
+        // The message on the number, not on its text.
+        let found = table("file,length\na.wav,-1\n").unwrap();
+        let error = found
+            .described(0, STRIP, "test.toml")
+            .expect_err("negative");
+        assert!(
+            error.to_string().starts_with("table.csv:2: `length`: "),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn limit_recordings_of_a_template_are_named_by_the_column_file() {
+        let found = table("file,length,recording.files\na.wav,1,b.wav\n").unwrap();
+        let error = found.check_sets_no_recording().expect_err("two names");
+        assert!(
+            error
+                .to_string()
+                .starts_with("table.csv:1: the column `recording.files`"),
+            "{error}"
+        );
+        assert!(found.names_files());
+        assert!(!table("file,length\na.wav,1\n").unwrap().names_files());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The journal of a batch: a line of JSON for each finished test.
 //!
 //! Lines are only appended. A process that is killed leaves at most one torn line, which is dropped. A line holds the key of
-//! a test, so the journal says which tests need not be analysed again.
+//! a test, so the journal says which tests need not be analysed again. Of two lines with one key the newer counts.
 
 use crate::record::BatchRecord;
 use serde::{Deserialize, Serialize};
@@ -44,10 +44,23 @@ impl Key {
 }
 
 /// A line of the journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalEntry {
+    /// Key of the test.
+    pub key: Key,
+    /// Its record.
+    pub record: BatchRecord,
+    /// True of a test that was not analysed to its end: the next run tries it again.
+    pub again: bool,
+}
+
+/// A line of the journal as it is written.
 #[derive(Serialize)]
 struct Line<'a> {
     key: String,
     record: &'a BatchRecord,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    again: bool,
 }
 
 /// A line of the journal that is read.
@@ -55,31 +68,53 @@ struct Line<'a> {
 struct OwnedLine {
     key: String,
     record: BatchRecord,
+    #[serde(default)]
+    again: bool,
 }
 
-/// Returns the line of a record, its end included.
-///
-/// # Errors
-/// The record is no JSON.
-pub fn journal_line(key: Key, record: &BatchRecord) -> Result<String, serde_json::Error> {
-    let key = key.to_string();
-    let mut line = serde_json::to_string(&Line { key, record })?;
-    line.push('\n');
-    Ok(line)
+impl JournalEntry {
+    /// Returns the line, its end included.
+    ///
+    /// # Errors
+    /// The record is no JSON.
+    pub fn line(&self) -> Result<String, serde_json::Error> {
+        let mut line = serde_json::to_string(&Line {
+            key: self.key.to_string(),
+            record: &self.record,
+            again: self.again,
+        })?;
+        line.push('\n');
+        Ok(line)
+    }
+
+    /// Reads a line; `None` of a torn line, and of the first.
+    pub fn read(line: &[u8]) -> Option<Self> {
+        let found: OwnedLine = serde_json::from_slice(line.strip_suffix(b"\n")?).ok()?;
+        Some(Self {
+            key: Key::read(&found.key)?,
+            record: found.record,
+            again: found.again,
+        })
+    }
 }
 
-/// Returns the key and the record of a line; `None` of a torn line, and of the first.
-pub fn record_in(line: &[u8]) -> Option<(Key, BatchRecord)> {
-    let line = line.strip_suffix(b"\n")?;
-    let found: OwnedLine = serde_json::from_slice(line).ok()?;
-    Some((Key::read(&found.key)?, found.record))
+/// Place of a record in a journal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct KeyPlace {
+    key: u128,
+    /// True if the test was analysed to its end.
+    is_final: bool,
+    /// Distance from the beginning (bytes).
+    offset: u64,
+    /// True once a test has asked for it.
+    is_asked: bool,
 }
 
 /// Places of the records of a journal: 32 bytes a record.
 #[derive(Debug, Clone, Default)]
 pub struct Journal {
-    /// Keys and places (bytes from the beginning of the file), ascending in the key.
-    places: Vec<(u128, u64)>,
+    /// The newest place of each key, ascending in the key.
+    places: Vec<KeyPlace>,
     /// Length of the whole lines (bytes). What follows was torn.
     pub length: u64,
 }
@@ -96,21 +131,56 @@ impl Journal {
             line.clear();
             let count = from.read_until(b'\n', &mut line)? as u64;
             if !line.ends_with(b"\n") {
-                journal.places.sort_unstable();
-                return Ok(journal);
+                break;
             }
-            if let Some((key, _)) = record_in(&line) {
-                journal.places.push((key.short(), journal.length));
+            if let Some(found) = JournalEntry::read(&line) {
+                journal.places.push(KeyPlace {
+                    key: found.key.short(),
+                    is_final: !found.again,
+                    offset: journal.length,
+                    is_asked: false,
+                });
             }
             journal.length += count;
         }
+        // The last of a key is the newest, and one of a test that was analysed to its end comes after the others.
+        journal.places.sort_unstable();
+        journal.places.reverse();
+        journal.places.dedup_by_key(|place| place.key);
+        journal.places.reverse();
+        Ok(journal)
     }
 
-    /// Returns the place of the record of a test (bytes from the beginning); `None` of a test that is not in the journal.
-    pub fn place(&self, key: Key) -> Option<u64> {
-        let first = self.places.partition_point(|(own, _)| *own < key.short());
-        let (own, place) = self.places.get(first)?;
-        (*own == key.short()).then_some(*place)
+    /// Returns the place of the record of a test (bytes from the beginning). `None` of a test that is not in the journal, or
+    /// was not analysed to its end. The record counts as asked for.
+    pub fn place(&mut self, key: Key) -> Option<u64> {
+        let index = self.index(key)?;
+        let place = self.places.get_mut(index)?;
+        place.is_asked = true;
+        place.is_final.then_some(place.offset)
+    }
+
+    /// Returns the place of the record of a test, also of one that was not analysed to its end.
+    pub fn any_place(&self, key: Key) -> Option<u64> {
+        let place = self.places.get(self.index(key)?)?;
+        Some(place.offset)
+    }
+
+    fn index(&self, key: Key) -> Option<usize> {
+        let key = key.short();
+        self.places
+            .binary_search_by_key(&key, |place| place.key)
+            .ok()
+    }
+
+    /// Returns the places of the records that no test has asked for, ascending. Those of tests that were not analysed to
+    /// their end are left out.
+    pub fn others(&self) -> Vec<u64> {
+        let others = self.places.iter();
+        let others = others.filter(|place| place.is_final && !place.is_asked);
+        let mut others: Vec<u64> = others.map(|place| place.offset).collect();
+        others.sort_unstable();
+        others
     }
 
     /// Returns the number of records.
@@ -149,6 +219,15 @@ mod tests {
         Key([number; 32])
     }
 
+    fn line(number: u8, record: BatchRecord) -> String {
+        let entry = JournalEntry {
+            key: key(number),
+            record,
+            again: false,
+        };
+        entry.line().unwrap()
+    }
+
     proptest! {
         #[test]
         fn prop_a_record_goes_through_its_line_without_loss(
@@ -157,13 +236,13 @@ mod tests {
         ) {
             let frequency = Some(f64::from_bits(bits)).filter(|value| value.is_finite());
             let own = record(&file, frequency);
-            let line = journal_line(key(7), &own).unwrap();
+            let line = line(7, own.clone());
             prop_assert_eq!(line.matches('\n').count(), 1);
-            let (found, again) = record_in(line.as_bytes()).unwrap();
-            prop_assert_eq!(found, key(7));
-            let [before, after] = [&own, &again].map(|one| one.modes[0].frequency.map(f64::to_bits));
+            let found = JournalEntry::read(line.as_bytes()).unwrap();
+            prop_assert_eq!((found.key, found.again), (key(7), false));
+            let [before, after] = [&own, &found.record].map(|one| one.modes[0].frequency.map(f64::to_bits));
             prop_assert_eq!(before, after);
-            prop_assert_eq!(own, again);
+            prop_assert_eq!(own, found.record);
         }
     }
 
@@ -172,12 +251,11 @@ mod tests {
         let mut text = JOURNAL_HEAD.to_owned();
         let mut ends = vec![text.len()];
         for number in 0..3 {
-            text +=
-                &journal_line(key(number), &record("a", Some(0.1 + f64::from(number)))).unwrap();
+            text += &line(number, record("a", Some(0.1 + f64::from(number))));
             ends.push(text.len());
         }
         for cut in 0..=text.len() {
-            let found = Journal::read(&text.as_bytes()[..cut]).unwrap();
+            let mut found = Journal::read(&text.as_bytes()[..cut]).unwrap();
             let whole = ends.iter().filter(|end| **end <= cut).count();
             assert_eq!(found.len(), whole.saturating_sub(1), "{cut}");
             let length = ends[..whole].last().copied().unwrap_or(0);
@@ -193,12 +271,38 @@ mod tests {
 
     #[test]
     fn limit_lines_of_other_content_are_passed_over() {
-        let good = journal_line(key(1), &record("a", None)).unwrap();
+        let good = line(1, record("a", None));
         let text = format!("{JOURNAL_HEAD}\u{0}\u{0}\n{{\"key\":1}}\n{good}");
-        let found = Journal::read(text.as_bytes()).unwrap();
+        let mut found = Journal::read(text.as_bytes()).unwrap();
         assert_eq!((found.len(), found.length), (1, text.len() as u64));
         let place = found.place(key(1)).unwrap() as usize;
         assert_eq!(&text[place..], good);
         assert_eq!(found.place(key(2)), None);
+    }
+
+    #[test]
+    fn regress_the_newest_record_of_a_key_counts_and_others_are_kept() {
+        let begun = |number| {
+            let entry = JournalEntry {
+                key: key(number),
+                record: record("begun", None),
+                again: true,
+            };
+            entry.line().unwrap()
+        };
+        let lines = [
+            line(2, record("old", None)),
+            line(1, record("other", None)),
+            begun(3),
+            line(2, record("new", None)),
+            begun(2),
+        ];
+        let mut found = Journal::read(lines.concat().as_bytes()).unwrap();
+        let start = |line: usize| lines[..line].concat().len() as u64;
+        assert_eq!(found.place(key(2)), Some(start(3)));
+        // A test that was not analysed to its end is tried again, and has a row where nothing better is there.
+        assert_eq!(found.place(key(3)), None);
+        assert_eq!(found.any_place(key(3)), Some(start(2)));
+        assert_eq!(found.others(), [start(1)]);
     }
 }

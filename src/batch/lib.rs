@@ -18,23 +18,20 @@ pub mod parquet_table;
 pub mod record;
 pub mod settings;
 pub mod summary;
+pub mod table_file;
 pub mod tables;
 pub mod words;
 
-pub use answer::{Analysed, BatchError, analyse, answer, answer_watched, record_of};
+pub use answer::{Analysed, BatchError, analyse, answer, answer_watched, failed, record_of};
 pub use input_table::{InputTable, TableError};
-pub use journal::{JOURNAL_HEAD, Journal, Key, journal_line, record_in};
-#[cfg(feature = "parquet")]
-pub use parquet_table::ParquetWriter;
+pub use journal::{JOURNAL_HEAD, Journal, JournalEntry, Key};
 pub use record::{
     BatchRecord, Estimated, HypothesisRow, ModeRow, Parameters, TestOutcome, TestRow,
 };
 pub use settings::{BatchSettings, BatchTest, DescribedTest, InputFile, Subject};
 pub use summary::{Collector, Distribution, Outlier, Quantity, Summary};
+pub use table_file::{HAS_PARQUET, TableFile, WITHOUT_PARQUET};
 pub use tables::{TABLES, TableKind, TableWriter};
 
 /// Most tests of one batch. Their names and places stay in memory.
 pub const MOST_TESTS: usize = 10_000_000;
-
-/// What to do where a build lacks the feature `parquet`.
-pub const WITHOUT_PARQUET: &str = "this build of tapjoint has no Parquet; build it with `cargo build --release --features parquet`, or use the command of the Python package";

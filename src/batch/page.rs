@@ -12,7 +12,7 @@ use tapjoint_report::{BatchPage, BatchSection, ReportError, render_batch_page};
 
 /// Height of a panel (pixels).
 const HEIGHT: f64 = 190.0;
-/// Most points of a panel. Of more tests, all outliers and every few of the others are drawn.
+/// Most points of a series. Of more, the farthest outliers are drawn, and one in several of the other tests.
 const MOST_POINTS: usize = 2000;
 /// Quantities that are drawn.
 const MOST_PANELS: usize = 12;
@@ -25,7 +25,7 @@ pub trait TestNames {
     /// Returns the name of a test.
     fn name(&self, test: u32) -> String;
 
-    /// Returns the address of a test's report, seen from the page; `None` without a report.
+    /// Returns the address of a test's report, seen from the page; `None` of a test without a report.
     fn report(&self, test: u32) -> Option<String>;
 }
 
@@ -104,18 +104,20 @@ fn chart(summary: &Summary, names: &dyn TestNames) -> Chart {
     let mut all: Vec<&Distribution> = summary.distributions.iter().collect();
     all.sort_by_key(|one| matches!(one.quantity, Quantity::Mode(_)));
     let panels = all.iter().take(MOST_PANELS);
-    let panels = panels.map(|one| panel(one, summary.tests, names));
+    let panels: Vec<Panel> = panels.map(|one| panel(one, summary.tests, names)).collect();
+    let mut series = panels.iter().flat_map(|panel| &panel.series);
+    let is_linked = series.any(|series| !series.links.is_empty());
     Chart {
         kind: "batch",
         title: "Tests in their order".to_owned(),
         subtitle: "values in the band are no outliers".to_owned(),
-        caption: match names.report(0) {
-            Some(_) => format!("{CAPTION} A click on a point opens its report."),
-            None => CAPTION.to_owned(),
+        caption: match is_linked {
+            true => format!("{CAPTION} A click on a point opens its report."),
+            false => CAPTION.to_owned(),
         },
         blocks: vec![Block {
             in_page: InPage::Together,
-            ..Block::new(2, panels.collect())
+            ..Block::new(2, panels)
         }],
         ..Chart::default()
     }
@@ -125,21 +127,34 @@ fn panel(found: &Distribution, count: u64, names: &dyn TestNames) -> Panel {
     let limits = found.limits();
     let is_outlier =
         |point: &Point| limits.is_some_and(|[low, high]| !(low..=high).contains(&point.value));
-    let stride = found.points.len().div_ceil(MOST_POINTS).max(1);
-    let mut inside = Series::new("test", Color::Blue, Mark::Dot(2.5));
-    let mut outside = Series::new("outlier", Color::Vermilion, Mark::Ring(4.0));
-    for (index, point) in found.points.iter().enumerate() {
-        let own = match is_outlier(point) {
-            true => &mut outside,
-            false if index % stride == 0 => &mut inside,
-            false => continue,
-        };
-        own.push(f64::from(point.test) + 1.0, point.value);
-        own.words.push(names.name(point.test));
-        own.links.extend(names.report(point.test));
-        let (value, unit) = (significant(point.value, 5), unit_words(found.unit));
-        own.said.push(format!("{value} {unit}"));
-    }
+    let (mut outliers, others): (Vec<Point>, Vec<Point>) =
+        found.points.iter().partition(|point| is_outlier(point));
+    let distance = |point: &Point| (point.value - found.median).abs();
+    outliers.sort_by(|a, b| {
+        distance(b)
+            .total_cmp(&distance(a))
+            .then(a.test.cmp(&b.test))
+    });
+    outliers.truncate(MOST_POINTS);
+    outliers.sort_by_key(|point| point.test);
+    let stride = others.len().div_ceil(MOST_POINTS).max(1);
+    let others: Vec<Point> = others.into_iter().step_by(stride).collect();
+    let series = |name, color, mark, points: &[Point]| {
+        let mut own = Series::new(name, color, mark);
+        for point in points {
+            own.push(f64::from(point.test) + 1.0, point.value);
+            own.words.push(names.name(point.test));
+            own.links.push(names.report(point.test).unwrap_or_default());
+            let (value, unit) = (significant(point.value, 5), unit_words(found.unit));
+            own.said.push(format!("{value} {unit}"));
+        }
+        if own.links.iter().all(String::is_empty) {
+            own.links.clear();
+        }
+        own
+    };
+    let inside = series("test", Color::Blue, Mark::Dot(2.5), &others);
+    let outside = series("outlier", Color::Vermilion, Mark::Ring(4.0), &outliers);
     let last = count as f64 + 0.5;
     let ends = extent([found.min, found.max]).unwrap_or((0.0, 1.0));
     let mut band = Series::new("no outliers", Color::Data, Mark::Band);
@@ -152,12 +167,16 @@ fn panel(found: &Distribution, count: u64, names: &dyn TestNames) -> Panel {
     let y = padded(ends, 0.1).of(quantity.clone(), found.unit);
     let mut shown = vec![band, inside, outside];
     shown.retain(|series| !series.low.is_empty() || !series.y.is_empty());
-    let note = match stride {
-        1 => String::new(),
-        stride => format!("All outliers are drawn, and every {stride}th of the other tests."),
-    };
+    let mut note = Vec::new();
+    if outliers.len() < found.outlier_count {
+        let (drawn, all) = (outliers.len(), found.outlier_count);
+        note.push(format!("The farthest {drawn} of {all} outliers are drawn."));
+    }
+    if stride > 1 {
+        note.push(format!("One in {stride} of the other tests is drawn."));
+    }
     Panel {
-        note,
+        note: note.join(" "),
         ..Panel::new(HEIGHT, Axis::linear(0.5, last).of("test", ""), y)
             .titled(quantity)
             .with(shown)

@@ -14,7 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field as Value;
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::Arc;
 
 /// Rows that are turned into columns at once.
@@ -27,6 +27,8 @@ const GROUP_ROWS: usize = 1 << 16;
 pub struct ParquetWriter<W: Write + Send> {
     kind: TableKind,
     schema: Arc<Schema>,
+    /// Records so far.
+    count: u64,
     rows: Vec<Vec<Cell>>,
     writer: ArrowWriter<W>,
 }
@@ -36,7 +38,7 @@ impl<W: Write + Send> ParquetWriter<W> {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn new(kind: TableKind, carried: &[String], to: W) -> Result<Self, ParquetError> {
+    pub fn new(kind: TableKind, carried: &[String], to: W) -> io::Result<Self> {
         let fields = kind.columns(carried).into_iter().map(|column| {
             let holds = match column.kind {
                 CellKind::Text => DataType::Utf8,
@@ -57,33 +59,36 @@ impl<W: Write + Send> ParquetWriter<W> {
             .build();
         Ok(Self {
             kind,
-            writer: ArrowWriter::try_new(to, schema.clone(), Some(properties))?,
+            writer: ArrowWriter::try_new(to, schema.clone(), Some(properties))
+                .map_err(system_error)?,
             schema,
+            count: 0,
             rows: Vec::new(),
         })
     }
 
-    /// Writes the rows of a record.
+    /// Writes the rows of the next record.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn add(&mut self, record: &BatchRecord) -> Result<(), ParquetError> {
-        self.rows.extend(self.kind.rows(record));
+    pub fn add(&mut self, record: &BatchRecord) -> io::Result<()> {
+        self.count += 1;
+        self.rows.extend(self.kind.rows(self.count, record));
         match self.rows.len() < ROWS_AT_ONCE {
             true => Ok(()),
             false => self.write_rows(),
         }
     }
 
-    fn write_rows(&mut self) -> Result<(), ParquetError> {
+    fn write_rows(&mut self) -> io::Result<()> {
         let fields = self.schema.fields().iter().enumerate();
         let columns = fields.map(|(index, field)| {
             let cells = self.rows.iter().map(|row| &row[index]);
             column_of(field.data_type(), cells)
         });
         let columns: Vec<ArrayRef> = columns.collect();
-        let batch = RecordBatch::try_new(self.schema.clone(), columns)?;
-        self.writer.write(&batch)?;
+        let batch = RecordBatch::try_new(self.schema.clone(), columns).map_err(io::Error::other)?;
+        self.writer.write(&batch).map_err(system_error)?;
         self.rows.clear();
         Ok(())
     }
@@ -92,10 +97,20 @@ impl<W: Write + Send> ParquetWriter<W> {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn finish(mut self) -> Result<(), ParquetError> {
+    pub fn finish(mut self) -> io::Result<()> {
         self.write_rows()?;
-        self.writer.into_inner()?.flush()?;
-        Ok(())
+        self.writer.into_inner().map_err(system_error)?.flush()
+    }
+}
+
+/// Returns the error of the system that is the cause, such as a full disk.
+fn system_error(cause: ParquetError) -> io::Error {
+    match cause {
+        ParquetError::External(cause) => match cause.downcast::<io::Error>() {
+            Ok(cause) => *cause,
+            Err(cause) => io::Error::other(cause),
+        },
+        cause => io::Error::other(cause),
     }
 }
 
@@ -192,7 +207,7 @@ mod tests {
         let mut bytes = Vec::new();
         let mut table = ParquetWriter::new(kind, &["serial".to_owned()], &mut bytes).unwrap();
         for record in records {
-            table.add(record).unwrap();
+            table.add(number, record).unwrap();
         }
         table.finish().unwrap();
         bytes

@@ -15,12 +15,13 @@ pub struct BatchRecord {
 }
 
 impl BatchRecord {
-    /// The record of a test that cannot be analysed.
-    pub fn failed(file: &str, carried: &[String], error: String) -> Self {
+    /// The record of a test that cannot be analysed. `files` names the files that it reads, as the error may name them.
+    pub fn failed(file: &str, carried: &[String], error: String, files: &[String]) -> Self {
         Self {
             test: TestRow {
                 file: file.to_owned(),
                 outcome: TestOutcome::Failed,
+                reason: Some(reason_of(&error, file, files)),
                 error: Some(error),
                 carried: carried.to_vec(),
                 ..TestRow::default()
@@ -28,6 +29,43 @@ impl BatchRecord {
             ..Self::default()
         }
     }
+}
+
+/// Returns an error without the names of files, and without the line after the first of them.
+fn reason_of(error: &str, file: &str, files: &[String]) -> String {
+    let mut names: Vec<&str> = files.iter().map(String::as_str).chain([file]).collect();
+    // A name may begin with another one.
+    names.sort_by_key(|name| std::cmp::Reverse(name.len()));
+    let mut reason = error.to_owned();
+    for name in names {
+        reason = without(&reason, name);
+    }
+    let after = reason.strip_prefix("FILE:");
+    let after = after.map(|after| after.trim_start_matches(|c: char| c.is_ascii_digit()));
+    match after.filter(|after| after.starts_with(": ")) {
+        Some(after) => format!("FILE{after}"),
+        None => reason,
+    }
+}
+
+/// Replaces a name by FILE. A name without folder and ending may be a word, so it counts at the beginning alone.
+fn without(text: &str, name: &str) -> String {
+    let is_word = !name.contains(['/', '\\', '.']);
+    let in_name = |c: char| c.is_alphanumeric() || "/\\_-".contains(c);
+    let (mut kept, mut end) = (String::new(), 0);
+    for (place, _) in text.match_indices(name).filter(|_| !name.is_empty()) {
+        let (before, after) = (&text[..place], &text[place + name.len()..]);
+        let is_name = match is_word {
+            true => place == 0 && after.starts_with(':'),
+            false => !before.ends_with(in_name) && !after.starts_with(in_name),
+        };
+        if is_name {
+            kept.push_str(&text[end..place]);
+            kept.push_str("FILE");
+            end = place + name.len();
+        }
+    }
+    kept + &text[end..]
 }
 
 /// How a test ended.
@@ -114,6 +152,8 @@ pub struct TestRow {
     pub outcome: TestOutcome,
     /// Why there is no answer.
     pub error: Option<String>,
+    /// The same without the names and lines that differ from test to test, where they are known. FILE stands for each.
+    pub reason: Option<String>,
     /// "cantilever", "lap" or "free"; `None` of a bare recording.
     pub kind: Option<String>,
     /// Number of recordings.
@@ -162,7 +202,7 @@ pub struct TestRow {
     pub carried: Vec<String>,
 }
 
-/// One mode of a test, or a peak that is none.
+/// One mode of a test, or a peak that belongs to no mode.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ModeRow {
     /// Number of the mode; `None` for a peak that belongs to no mode.
@@ -239,4 +279,37 @@ pub struct ParameterRow {
     pub value: Option<f64>,
     /// Standard uncertainty (SI), where the data bound it.
     pub std: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_equal_reasons_are_equal_whatever_the_names() {
+        let low = ["tests/a/test.toml", "tests/a/low.wav"].map(str::to_owned);
+        let cases = [
+            ("a.wav", "a.wav: is empty", "FILE: is empty"),
+            (
+                "e",
+                "e: cannot be read: there is no e",
+                "FILE: cannot be read: there is no e",
+            ),
+            (
+                "tests/a/test.toml",
+                "tests/a/test.toml:35: `recording.file`: tests/a/low.wav cannot be read",
+                "FILE: `recording.file`: FILE cannot be read",
+            ),
+            (
+                "tests/a/test.toml",
+                "tests/a/low.wav:1: no line of numbers",
+                "FILE: no line of numbers",
+            ),
+            ("a.wav", "aa.wav: is empty", "aa.wav: is empty"),
+            ("", "is empty", "is empty"),
+        ];
+        for (file, error, expected) in cases {
+            assert_eq!(reason_of(error, file, &low), expected);
+        }
+    }
 }

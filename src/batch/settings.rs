@@ -17,6 +17,16 @@ pub struct BatchTest {
     pub carried: Vec<String>,
 }
 
+impl BatchTest {
+    /// Returns the names of the files that it reads, as messages name them.
+    pub fn file_names(&self) -> Vec<String> {
+        match &self.subject {
+            Subject::Described(described) => described.file_names(),
+            Subject::Bare(path) => vec![path.display().to_string()],
+        }
+    }
+}
+
 /// What is analysed.
 #[derive(Debug, Clone)]
 pub enum Subject {
@@ -37,6 +47,17 @@ pub struct DescribedTest {
     pub folder: PathBuf,
     /// The description of the free bar's test, where `free_test` names one.
     pub free: Option<Box<DescribedTest>>,
+}
+
+impl DescribedTest {
+    fn file_names(&self) -> Vec<String> {
+        let recordings = self.test.recordings.iter();
+        let recordings = recordings.flat_map(|recording| recording.files());
+        let mut names = vec![self.name.clone()];
+        names.extend(recordings.map(|file| self.folder.join(file).display().to_string()));
+        names.extend(self.free.iter().flat_map(|free| free.file_names()));
+        names
+    }
 }
 
 /// Settings of all tests of a batch.

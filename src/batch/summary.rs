@@ -4,7 +4,7 @@
 //! from it, which is the standard deviation where values are normal. The trend is the median of the slopes between all pairs
 //! of values (Theil 1950, Sen 1968), over the order of the tests.
 
-use crate::record::{BatchRecord, Estimated, TestOutcome, TestRow};
+use crate::record::{BatchRecord, Estimated, TestOutcome};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,7 +15,7 @@ const NORMAL_RATIO: f64 = 1.4826;
 /// A value is an outlier if it is more than this many spreads from the median (Iglewicz and Hoaglin 1993).
 pub const OUTLIER_LIMIT: f64 = 3.5;
 /// Fewest values with outliers and with a trend: below, a spread says little.
-const LEAST_VALUES: usize = 8;
+pub const LEAST_VALUES: usize = 8;
 /// Most values between which slopes are taken. Of more, medians of consecutive groups are taken.
 const MOST_SLOPED: usize = 1000;
 /// A trend is clear if the statistic of Mann and Kendall exceeds this, as one in 1000 does by chance.
@@ -254,7 +254,7 @@ pub struct Summary {
     pub no_answer: u64,
     /// Number of tests that could not be analysed.
     pub failed: u64,
-    /// Reasons of those without an answer, the most frequent first. FILE stands for the name of the test.
+    /// Reasons of those without an answer, the most frequent first. FILE stands for the name of a file.
     pub reasons: Vec<Counted>,
     /// Verdicts of the diagnoses with what they name, the most frequent first.
     pub verdicts: Vec<Counted>,
@@ -296,7 +296,8 @@ impl Collector {
         let row = &record.test;
         self.outcomes[row.outcome as usize] += 1;
         if let Some(error) = &row.error {
-            let mut reason = reason_of(row, error);
+            let reason = row.reason.as_ref().unwrap_or(error);
+            let mut reason: String = reason.chars().take(LONGEST_REASON).collect();
             if self.reasons.len() >= MOST_REASONS && !self.reasons.contains_key(&reason) {
                 reason = "other reasons".to_owned();
             }
@@ -366,18 +367,12 @@ impl Collector {
     }
 }
 
-/// Returns the reason of a test without an answer, without the names that differ from test to test.
-fn reason_of(row: &TestRow, error: &str) -> String {
-    let reason = error.replace(&row.file, "FILE");
-    reason.chars().take(LONGEST_REASON).collect()
-}
-
 const _: () = assert!(TestOutcome::Answered as usize == 0 && TestOutcome::Failed as usize == 2);
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::ModeRow;
+    use crate::record::{ModeRow, TestRow};
 
     fn record(frequency: f64) -> BatchRecord {
         BatchRecord {
@@ -459,7 +454,7 @@ mod tests {
         let mut collector = Collector::default();
         for file in ["a.wav", "b.wav"] {
             let error = format!("{file}: is empty");
-            collector.add(&BatchRecord::failed(file, &[], error));
+            collector.add(&BatchRecord::failed(file, &[], error, &[]));
         }
         let summary = collector.finish(|test| test.to_string());
         assert_eq!(summary.failed, 2);

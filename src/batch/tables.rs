@@ -13,7 +13,7 @@ use tapjoint_report::data_files::{cell, number};
 pub enum TableKind {
     /// A row for each test.
     Tests,
-    /// A row for each mode, and for each peak that is none.
+    /// A row for each mode, and for each peak that belongs to no mode.
     Modes,
     /// A row for each hypothesis of each diagnosis.
     Hypotheses,
@@ -108,7 +108,7 @@ impl TableKind {
 
     /// Returns its columns. `carried` names the carried columns of the input table, which stand last in the table of tests.
     pub fn columns(self, carried: &[String]) -> Vec<Column> {
-        let mut columns = vec![text("test")];
+        let mut columns = vec![count("number"), text("test")];
         match self {
             Self::Tests => {
                 columns.extend([
@@ -189,22 +189,23 @@ impl TableKind {
         columns
     }
 
-    /// Returns the rows that a record has in this table.
-    pub fn rows(self, record: &BatchRecord) -> Vec<Vec<Cell>> {
-        let file = || Cell::Text(Some(record.test.file.clone()));
-        match self {
+    /// Returns the rows that a record has in this table. `number` is the place of its test in the batch, from 1: rows of one
+    /// file have the same name.
+    pub fn rows(self, number: u64, record: &BatchRecord) -> Vec<Vec<Cell>> {
+        let rows = match self {
             Self::Tests => vec![test_cells(&record.test)],
-            Self::Modes => {
-                let modes = record.modes.iter();
-                modes.map(|mode| mode_cells(file(), mode)).collect()
-            }
+            Self::Modes => record.modes.iter().map(mode_cells).collect(),
             Self::Hypotheses => {
                 let ranked = (1..).zip(&record.hypotheses);
                 ranked
-                    .map(|(rank, one)| hypothesis_cells(file(), rank, one))
+                    .map(|(rank, one)| hypothesis_cells(rank, one))
                     .collect()
             }
-        }
+        };
+        let file = Cell::Text(Some(record.test.file.clone()));
+        let first = [Cell::Count(Some(number)), file];
+        let whole = rows.into_iter().map(|row| [&first[..], &row].concat());
+        whole.collect()
     }
 }
 
@@ -240,7 +241,6 @@ fn listed<T: ToString>(items: &[T]) -> Cell {
 fn test_cells(row: &TestRow) -> Vec<Cell> {
     use Cell::{Count, Number, Text};
     let mut cells = vec![
-        Text(Some(row.file.clone())),
         Text(Some(row.outcome.name().to_owned())),
         Text(row.error.clone()),
         Text(Some(row.name.clone())),
@@ -280,10 +280,9 @@ fn test_cells(row: &TestRow) -> Vec<Cell> {
     cells
 }
 
-fn mode_cells(file: Cell, row: &ModeRow) -> Vec<Cell> {
+fn mode_cells(row: &ModeRow) -> Vec<Cell> {
     use Cell::{Count, Number, Text};
     vec![
-        file,
         Count(row.mode),
         Text(row.label.clone()),
         Text(row.recording.clone()),
@@ -305,11 +304,10 @@ fn mode_cells(file: Cell, row: &ModeRow) -> Vec<Cell> {
     ]
 }
 
-fn hypothesis_cells(file: Cell, rank: u64, row: &HypothesisRow) -> Vec<Cell> {
+fn hypothesis_cells(rank: u64, row: &HypothesisRow) -> Vec<Cell> {
     use Cell::{Count, Number, Text};
     let parameters: Vec<String> = row.parameters.iter().map(parameter).collect();
     vec![
-        file,
         Count(Some(rank)),
         Text(Some(row.effect.clone())),
         Text(row.group.clone()),
@@ -338,6 +336,8 @@ fn parameter(row: &ParameterRow) -> String {
 #[derive(Debug)]
 pub struct TableWriter<W: Write> {
     kind: TableKind,
+    /// Number of records so far.
+    count: u64,
     writer: csv::Writer<W>,
 }
 
@@ -350,15 +350,20 @@ impl<W: Write> TableWriter<W> {
         let mut writer = csv::Writer::from_writer(to);
         let columns = kind.columns(carried).into_iter();
         writer.write_record(columns.map(|column| cell(column.head)))?;
-        Ok(Self { kind, writer })
+        Ok(Self {
+            kind,
+            count: 0,
+            writer,
+        })
     }
 
-    /// Writes the rows of a record.
+    /// Writes the rows of the next record.
     ///
     /// # Errors
     /// A row cannot be written.
     pub fn add(&mut self, record: &BatchRecord) -> io::Result<()> {
-        for row in self.kind.rows(record) {
+        self.count += 1;
+        for row in self.kind.rows(self.count, record) {
             self.writer.write_record(row.into_iter().map(Cell::text))?;
         }
         Ok(())
@@ -389,7 +394,7 @@ mod tests {
         };
         for kind in TABLES {
             let columns = kind.columns(&["serial".to_owned()]);
-            for row in kind.rows(&record) {
+            for row in kind.rows(1, &record) {
                 assert_eq!(row.len(), columns.len(), "{kind:?}");
                 for (cell, column) in row.iter().zip(&columns) {
                     let kind = match cell {
@@ -413,6 +418,7 @@ mod tests {
                 "a.wav",
                 &["=B1".to_owned()],
                 "bad".to_owned(),
+                &[],
             ))
             .unwrap();
         table.finish().unwrap();

@@ -1,19 +1,17 @@
 //! What a batch shows, in words and tables: for the terminal and for the page.
 
-use crate::summary::{Counted, Distribution, OUTLIER_LIMIT, Quantity, Summary};
+use crate::summary::{Counted, Distribution, LEAST_VALUES, OUTLIER_LIMIT, Quantity, Summary};
 use tapjoint_report::Screen;
 use tapjoint_report::format::{
     MISSING, capital, optional, signed_percent, significant, unit_words,
 };
 use tapjoint_report::tables::{Table, number, words};
 
-/// Most lines of an answer on a terminal of 80 columns.
-pub const MOST_LINES: usize = 25;
 /// Quantities, outliers and reasons that the terminal shows.
 const MOST_QUANTITIES: usize = 8;
 const MOST_SHOWN: usize = 3;
 
-/// Returns the summary in at most [`MOST_LINES`] lines. `page` is the path of the page.
+/// Returns the summary in at most [`MOST_LINES`](tapjoint_report::MOST_LINES) lines. `page` is the path of the page.
 pub fn answer(summary: &Summary, page: &str, screen: Screen) -> String {
     let mut text = screen.wrapped(&counts(summary), 2);
     for reason in summary.reasons.iter().take(2) {
@@ -32,9 +30,8 @@ pub fn answer(summary: &Summary, page: &str, screen: Screen) -> String {
         }
     }
     let mut tail = Vec::new();
-    let outliers = worst_outliers(summary);
-    let count = outliers.len();
-    for (found, outlier) in outliers.into_iter().take(MOST_SHOWN) {
+    let count = outlier_count(summary);
+    for (found, outlier) in worst_outliers(summary).into_iter().take(MOST_SHOWN) {
         tail.push(format!(
             "! {}: {} {} {}, {} spreads from the median",
             outlier.file,
@@ -129,7 +126,13 @@ fn worst_codes(summary: &Summary) -> Vec<String> {
     lines
 }
 
-/// Returns all outliers with their distributions, the farthest first.
+/// Returns the number of all outliers, also of those that are not listed.
+fn outlier_count(summary: &Summary) -> usize {
+    let all = summary.distributions.iter();
+    all.map(|one| one.outlier_count).sum()
+}
+
+/// Returns all outliers that are listed, with their distributions, the farthest first.
 pub fn worst_outliers(summary: &Summary) -> Vec<(&Distribution, &crate::summary::Outlier)> {
     let all = summary.distributions.iter();
     let mut all: Vec<_> = all
@@ -150,12 +153,7 @@ pub fn findings(summary: &Summary) -> Vec<String> {
             signed_percent(one.trend_percent)
         ));
     }
-    let outliers: usize = summary
-        .distributions
-        .iter()
-        .map(|one| one.outlier_count)
-        .sum();
-    sentences.push(match outliers {
+    sentences.push(match outlier_count(summary) {
         0 => format!("No value is more than {OUTLIER_LIMIT} spreads from its median."),
         1 => format!("1 value is more than {OUTLIER_LIMIT} spreads from its median."),
         count => {
@@ -190,7 +188,7 @@ pub fn distributions<'a>(all: impl IntoIterator<Item = &'a Distribution>) -> Tab
              from the first to the last test, by the median slope between all pairs of tests (Theil and Sen); of more than \
              1,000 tests, between medians of consecutive groups. A trend is clear where fewer than one in 1,000 would be as \
              clear by chance (Mann and Kendall). Outliers: values more than {OUTLIER_LIMIT} spreads from the median (Iglewicz \
-             and Hoaglin)."
+             and Hoaglin). Fewer than {LEAST_VALUES} tests have no trend (a dash) and no outliers."
         ),
     )
 }

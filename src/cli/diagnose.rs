@@ -5,14 +5,14 @@
 use super::Outcome;
 use super::arguments::FullAnswer;
 use super::identify::{FrequencyArguments, resolve};
-use super::input::{TestFile, file_name};
+use super::input::file_name;
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::TestDescription;
-use crate::gap::{Diagnosis, GapSettings, Verdict};
+use crate::gap::{Diagnosis, GapError, GapSettings, Verdict};
 use crate::pipeline::{Analysis, IdentifySettings, Stage, Work, diagnose_test};
-use crate::report::document::{GapSection, UpdatedModelSection};
+use crate::report::document::{Document, GapSection, SheetSection, UpdatedModelSection};
 use crate::report::{MODEL_FILE, document_of, gap_section};
 use crate::study::updated_model::{described_frequencies, updated_model};
 use clap::Args;
@@ -63,7 +63,13 @@ pub(super) fn run(
     let mut document = document_of(&analysis);
     let mut gap = gap_section(diagnosis.as_ref());
     let name = arguments.model.as_deref().map(file_name);
-    let text = add_model(&mut gap, &file, name, &analysis, diagnosis.as_ref().ok());
+    let text = add_model(
+        &mut gap,
+        &file.test,
+        name,
+        &analysis,
+        diagnosis.as_ref().ok(),
+    );
     document.add_gap(gap);
     work.go_on(Stage::Files);
     match (output, text) {
@@ -91,16 +97,43 @@ pub(super) fn run(
     Ok(Outcome::of(diagnosis.is_ok()))
 }
 
+/// What a report shows of a test.
+#[derive(Debug)]
+pub(super) struct Reported {
+    /// The document.
+    pub(super) document: Document,
+    /// Text of the model with the diagnosed effects; `None` without such a model.
+    pub(super) model: Option<String>,
+}
+
+/// Returns what a report shows of an analysed test. `test` is its description; the diagnosis is that of this description.
+pub(super) fn reported(
+    analysis: &Analysis,
+    test: Option<&TestDescription>,
+    diagnosis: Option<&Result<Diagnosis, GapError>>,
+) -> Reported {
+    let mut document = document_of(analysis);
+    document.sheet = test.map(SheetSection::of);
+    let mut model = None;
+    if let (Some(test), Some(diagnosis)) = (test, diagnosis) {
+        let mut gap = gap_section(diagnosis.as_ref());
+        let name = Some(MODEL_FILE.to_owned());
+        model = add_model(&mut gap, test, name, analysis, diagnosis.as_ref().ok());
+        document.add_gap(gap);
+    }
+    Reported { document, model }
+}
+
 /// Adds the model with the diagnosed effects to a section of report.json, and returns its text; `None` without
 /// such a model. `name` is the name of the file that will hold the text.
-pub(super) fn add_model(
+fn add_model(
     gap: &mut GapSection,
-    file: &TestFile,
+    test: &TestDescription,
     name: Option<String>,
     analysis: &Analysis,
     diagnosis: Option<&Diagnosis>,
 ) -> Option<String> {
-    let model = updated_model(&file.test, diagnosis?)?;
+    let model = updated_model(test, diagnosis?)?;
     let highest = analysis.modes.iter().filter_map(|mode| mode.mode).max()?;
     // The text is read back, so that report.json holds the frequencies of the file.
     let written = TestDescription::parse(&model.text, MODEL_FILE).ok()?;

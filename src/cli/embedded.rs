@@ -105,13 +105,13 @@ impl Session {
     }
 
     /// Returns the receiver of the stages of the work.
-    pub(super) fn watch(&self) -> &dyn Watch {
-        self.host.watch.as_ref()
+    pub(super) fn watch(&self) -> &Arc<dyn Watch + Send + Sync> {
+        &self.host.watch
     }
 
     /// Announces that a long task goes on, so that the caller can end it.
     pub(super) fn goes_on(&self) {
-        drop(Work::begin(self.watch(), Stage::Files));
+        drop(Work::begin(self.watch().as_ref(), Stage::Files));
     }
 
     /// Returns the text of a description in memory; `None` for a file.

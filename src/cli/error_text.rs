@@ -5,6 +5,19 @@ use super::staging::ledger;
 /// Returns the text of an error, with the causes that the message does not contain yet, and the results that are written
 /// all the same.
 pub(super) fn error_text(error: &anyhow::Error) -> String {
+    let mut text = chained(error);
+    let ledger = ledger();
+    let names = ledger.written.iter().map(|path| path.display().to_string());
+    let names: Vec<String> = names.collect();
+    if !names.is_empty() {
+        text.push_str("; written all the same: ");
+        text.push_str(&listed(&names));
+    }
+    shortened(&text)
+}
+
+/// Returns the text of an error, with the causes that the message does not contain yet.
+pub(super) fn chained(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
         let cause = cause.to_string();
@@ -13,16 +26,19 @@ pub(super) fn error_text(error: &anyhow::Error) -> String {
             text.push_str(&cause);
         }
     }
-    let written = &ledger().written;
-    if !written.is_empty() {
-        let names: Vec<_> = written
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect();
-        text.push_str("; written all the same: ");
-        text.push_str(&names.join(", "));
+    text
+}
+
+/// Most names that a message lists.
+pub(super) const MOST_NAMES: usize = 10;
+
+/// Returns the first names in one text.
+pub(super) fn listed(names: &[String]) -> String {
+    let mut text = names[..names.len().min(MOST_NAMES)].join(", ");
+    if names.len() > MOST_NAMES {
+        text.push_str(", ...");
     }
-    shortened(&text)
+    text
 }
 
 /// Returns the text of the error of a wrong command line, without "error: " and without the hints of a terminal.

@@ -133,7 +133,7 @@ impl OutputFile {
                 .write(bytes, &path)
                 .map_err(|cause| failed(&path, &cause))?,
         }
-        ledger().written.push(path);
+        ledger().note(path);
         Ok(())
     }
 }

@@ -306,9 +306,9 @@ const CSV_HEADS: [&str; 14] = [
     "quantity,name,method,unit,block,lines,window,reading,",
     "name,planted,detectable,refutable,verdict,named,",
     "name,changed,item,visible,repeatability,verdict,named,",
-    "test,outcome,error,name,kind,recordings,",
-    "test,mode,label,recording,method,frequency_Hz,",
-    "test,rank,hypothesis,group,probability,",
+    "number,test,outcome,error,name,kind,recordings,",
+    "number,test,mode,label,recording,method,frequency_Hz,",
+    "number,test,rank,hypothesis,group,probability,",
 ];
 /// First words of the test descriptions that the program writes.
 const DESCRIPTION_HEADS: [&str; 3] = [
@@ -394,9 +394,11 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
     if head.starts_with(UFF) {
         return Ok(tail.ends_with(UFF_HEADER));
     }
-    // The head of a journal may be all that a killed process has written of it.
+    // The head of a journal may be all that a killed process has written of it. Any other JSON may begin alike.
     let journal = JOURNAL_HEAD.as_bytes();
-    if head.starts_with(journal) || !head.is_empty() && journal.starts_with(&head) {
+    let is_begun = !head.is_empty() && journal.starts_with(&head);
+    let is_named = path.extension().is_some_and(|ending| ending == "jsonl");
+    if head.starts_with(journal) || is_begun && is_named {
         return Ok(true);
     }
     if head.starts_with(PARQUET) {
@@ -539,6 +541,7 @@ mod tests {
         for other in [
             "",
             "{\"version\": 1}",
+            "{",
             "time,force,a\n0,1,2\n",
             "[beam]\n",
             "$ a deck\n",

@@ -32,7 +32,7 @@ const TASKS: &[(&str, &[&str])] = &[
         &["identify", "predict", "perturb", "resolution", "export"],
     ),
     ("Effects that the model lacks", &["plan", "diagnose"]),
-    ("Many tests", &["compare", "batch"]),
+    ("Several tests", &["compare", "batch"]),
     ("Virtual tests", &["simulate", "blind-check", "reproduce"]),
     (OTHER, &["completions", "man", "help"]),
 ];

@@ -286,7 +286,7 @@ impl OutputFolder {
         let written = journal.write(self.staging.path());
         written.map_err(|cause| failed(&self.path, &cause))?;
         let left = journal.carry_out(&mut self.staging, &self.files, &mut ledger)?;
-        ledger.written.push(self.path.clone());
+        ledger.note(self.path.clone());
         drop(ledger);
         Ok((self.path, left))
     }

@@ -4,7 +4,7 @@ use super::Outcome;
 use super::arguments::{
     FullAnswer, RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
 };
-use super::diagnose::add_model;
+use super::diagnose::{Reported, reported};
 use super::input::{TestFile, check_file, file_name, read_test, stem};
 use super::overwrite::{Expanded, carries_mark, checksum, files_of};
 use super::place::{FolderContents, RECORDINGS, is_description, report_in};
@@ -16,10 +16,10 @@ use crate::description::{ReadBy, TestDescription};
 use crate::gap::GapSettings;
 use crate::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use crate::recording::{MOST_FILES, ReadSettings};
-use crate::report::document::{FileSection, SheetSection};
+use crate::report::document::FileSection;
 use crate::report::{
-    EXCHANGED, MODEL_FILE, VERSION_FILE, document_of, draw_run, earlier_files, exchange_files,
-    gap_section, run_files, watched_files,
+    EXCHANGED, MODEL_FILE, VERSION_FILE, draw_run, earlier_files, exchange_files, run_files,
+    watched_files,
 };
 use anyhow::{Context, bail};
 use clap::Args;
@@ -357,29 +357,28 @@ pub(super) fn run(
             analyse_together(name, files, bare, spectrum, reading, &measuring)?
         }
     };
-    let mut document = document_of(&analysis);
-    document.sheet = described.as_ref().map(|file| SheetSection::of(&file.test));
-    if let Some(files) = summed {
-        // A file that a recorder still writes would have the checksum of other content than was analysed.
-        if summed_files(subject.files(), described.as_ref())? != files {
-            bail!(
-                "a file has changed while it was analysed, so --sheet has no checksum for it; run again"
-            );
-        }
-        document.sheet.get_or_insert_default().files = files;
+    // A file that a recorder still writes would have the checksum of other content than was analysed.
+    if let Some(files) = &summed
+        && summed_files(subject.files(), described.as_ref())? != *files
+    {
+        bail!(
+            "a file has changed while it was analysed, so --sheet has no checksum for it; run again"
+        );
     }
-    let mut model = None;
-    if let Some(file) = &described {
-        let settings = GapSettings {
-            seed,
-            ..GapSettings::default()
-        };
-        let _work = Work::begin(terminal.watch(), Stage::Diagnosis);
-        let diagnosis = diagnose_test(&file.test, &analysis, &settings);
-        let mut gap = gap_section(diagnosis.as_ref());
-        let name = Some(MODEL_FILE.to_owned());
-        model = add_model(&mut gap, file, name, &analysis, diagnosis.as_ref().ok());
-        document.add_gap(gap);
+    let test = described.as_ref().map(|file| &file.test);
+    let work = test.map(|_| Work::begin(terminal.watch(), Stage::Diagnosis));
+    let settings = GapSettings {
+        seed,
+        ..GapSettings::default()
+    };
+    let diagnosis = test.map(|test| diagnose_test(test, &analysis, &settings));
+    let Reported {
+        mut document,
+        model,
+    } = reported(&analysis, test, diagnosis.as_ref());
+    drop(work);
+    if let Some(files) = summed {
+        document.sheet.get_or_insert_default().files = files;
     }
     drop(measuring);
     terminal.keep(&analysis);

@@ -28,12 +28,24 @@ const LOCK: &str = "lock";
 const TRIALS: usize = 20;
 const PAUSE: Duration = Duration::from_millis(50);
 
+/// Results that are noted. A message lists fewer.
+const MOST_NOTED: usize = 100;
+
 /// What this process has written, and what it has to remove before it ends.
 #[derive(Debug)]
 pub(super) struct Ledger {
     temporary: BTreeSet<PathBuf>,
-    /// Results that are in their place.
+    /// Results that are in their place; of many the first.
     pub(super) written: Vec<PathBuf>,
+}
+
+impl Ledger {
+    /// Notes a result that is in its place. More than a message lists are not kept.
+    pub(super) fn note(&mut self, path: PathBuf) {
+        if self.written.len() < MOST_NOTED {
+            self.written.push(path);
+        }
+    }
 }
 
 static LEDGER: Mutex<Ledger> = Mutex::new(Ledger {
@@ -204,7 +216,7 @@ impl Staging {
         let mut ledger = ledger();
         match fs::create_dir(path) {
             Err(cause) if cause.kind() != io::ErrorKind::AlreadyExists => Err(cause),
-            _ => Self::lock(path, &mut ledger),
+            _ => Self::lock(path, true, &mut ledger),
         }
     }
 
@@ -213,10 +225,11 @@ impl Staging {
     /// # Errors
     /// It cannot be locked, or belongs to another user.
     pub(super) fn take(path: &Path) -> io::Result<Option<Self>> {
-        Self::lock(path, &mut ledger())
+        Self::lock(path, false, &mut ledger())
     }
 
-    fn lock(path: &Path, ledger: &mut Ledger) -> io::Result<Option<Self>> {
+    /// Locks the folder. One that is to be filled is taken without a lock where the file system has none.
+    fn lock(path: &Path, is_to_fill: bool, ledger: &mut Ledger) -> io::Result<Option<Self>> {
         // Whose it is: somebody else's could hold a journal that moves files of this user.
         let found = fs::symlink_metadata(path)?;
         let own = tempfile::tempfile_in(path)?.metadata()?;
@@ -234,6 +247,7 @@ impl Staging {
         match lock.try_lock() {
             Ok(()) if is_at(&lock, &place) => {}
             Ok(()) | Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(_)) if is_to_fill => {}
             Err(TryLockError::Error(cause)) => return Err(cause),
         }
         ledger.temporary.insert(path.to_owned());

@@ -70,9 +70,18 @@ impl Terminal {
     /// Returns the receiver of the stages of the work.
     pub(super) fn watch(&self) -> &dyn Watch {
         match (&self.session, &self.stopwatch) {
-            (Some(session), _) => session.watch(),
+            (Some(session), _) => session.watch().as_ref(),
             (None, Some(stopwatch)) => stopwatch.as_ref(),
             (None, None) => &(),
+        }
+    }
+
+    /// Returns the same for threads that may outlive the command.
+    pub(super) fn shared_watch(&self) -> Arc<dyn Watch + Send + Sync> {
+        match (&self.session, &self.stopwatch) {
+            (Some(session), _) => session.watch().clone(),
+            (None, Some(stopwatch)) => stopwatch.clone(),
+            (None, None) => Arc::new(()),
         }
     }
 

@@ -66,6 +66,7 @@ struct Page<'a> {
 }
 
 /// Parts of the method that were applied.
+#[derive(Default)]
 struct Method {
     recordings: bool,
     joint: bool,
@@ -101,12 +102,8 @@ pub struct BatchSection {
     pub id: &'static str,
     /// Title.
     pub title: &'static str,
-    /// Paragraphs before the tables.
-    pub story: Vec<String>,
     /// Tables.
     pub tables: Vec<Table>,
-    /// Long tables that open on demand.
-    pub folded: Vec<Table>,
     /// Charts.
     pub charts: Vec<Chart>,
 }
@@ -124,9 +121,7 @@ pub fn render_batch_page(page: BatchPage) -> Result<String, ReportError> {
         sections.push(Section {
             id: section.id,
             title: section.title,
-            story: section.story,
             tables: section.tables,
-            folded: section.folded,
             ..Section::default()
         });
     }
@@ -159,12 +154,7 @@ pub fn render_batch_page(page: BatchPage) -> Result<String, ReportError> {
         hidden_warnings: 0,
         findings: page.findings,
         sections,
-        method: Method {
-            recordings: false,
-            joint: false,
-            comparison: false,
-            series: false,
-        },
+        method: Method::default(),
         live: live_of(&figures),
         reload: None,
         version: env!("CARGO_PKG_VERSION"),
@@ -228,12 +218,7 @@ pub(crate) fn render_first_screen_html(
     let mut page = page_of(document, &answer, &figures);
     page.sections.clear();
     page.sheet = None;
-    page.method = Method {
-        recordings: false,
-        joint: false,
-        comparison: false,
-        series: false,
-    };
+    page.method = Method::default();
     page.render().map_err(ReportError::Html)
 }
 

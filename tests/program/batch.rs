@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tapjoint::batch::JOURNAL_HEAD;
 
@@ -236,13 +236,13 @@ fn val_reports_are_those_of_run_and_the_page_leads_to_them() {
         ],
     );
     tapjoint(place, &["run", test, "--out", "alone", "-q"], 0);
-    let own = place.join("made/reports/000001-t02");
+    let own = report_of(place, "made", "000001-t02-").unwrap();
     for file in ["report.json", "report.html", "updated-model.toml"] {
         let [one, other] =
             [&own, &place.join("alone")].map(|folder| fs::read(folder.join(file)).ok());
         assert!(one == other, "{file}");
     }
-    assert!(!place.join("made/reports/000002-missing").exists());
+    assert!(report_of(place, "made", "000002-missing-").is_none());
     // With and without reports the tables are the same, and so are those of a second call.
     let expected = tables(&place.join("made"));
     batch(
@@ -258,6 +258,239 @@ fn val_reports_are_those_of_run_and_the_page_leads_to_them() {
     batch(place, &[test, "tests/missing/test.toml", "--out", "plain"]);
     assert_eq!(tables(&place.join("made")), expected);
     assert_eq!(tables(&place.join("plain")), expected);
+}
+
+/// The folder of a report whose name begins so.
+fn report_of(place: &Path, out: &str, begins: &str) -> Option<PathBuf> {
+    let folders = fs::read_dir(place.join(out).join("reports")).unwrap();
+    let mut folders = folders.map(|folder| folder.unwrap().path());
+    folders.find(|folder| {
+        folder
+            .file_name()
+            .unwrap()
+            .to_string_lossy()
+            .starts_with(begins)
+    })
+}
+
+/// Runs a batch that ends with this code; its standard error.
+fn refused(place: &Path, arguments: &[&str], code: i32) -> String {
+    let run = Command::new(program())
+        .current_dir(place)
+        .arg("batch")
+        .args(arguments)
+        .output();
+    let output = run.unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
+    error
+}
+
+#[test]
+fn regress_a_report_belongs_to_its_test_whatever_the_order() {
+    let folder = tests();
+    let place = folder.path();
+    let [one, two] = ["tests/t00/test.toml", "tests/t01/test.toml"];
+    let made = |files: &[&str]| {
+        let options = ["--reports", "--no-diagnosis", "--out", "made"];
+        batch(place, &[files, &options].concat())
+    };
+    made(&[one, two]);
+    // Both folders of the first place stay; the page leads to that of the test.
+    made(&[two, one]);
+    for begins in ["000001-t00-", "000002-t01-", "000001-t01-", "000002-t00-"] {
+        assert!(report_of(place, "made", begins).is_some(), "{begins}");
+    }
+    let page = fs::read_to_string(place.join("made/batch.html")).unwrap();
+    assert!(page.contains("reports/000001-t01-") && page.contains("reports/000002-t00-"));
+    assert!(
+        !page.contains("reports/000001-t00-"),
+        "a link to the report of another test"
+    );
+    // A folder that cannot be written ends the batch, and leaves no record of a failure.
+    fs::create_dir(place.join("blocked")).unwrap();
+    fs::write(place.join("blocked/reports"), "in the way").unwrap();
+    let error = refused(place, &[one, "--reports", "--out", "blocked"], 2);
+    assert!(
+        error.contains("is a file, but a folder is needed"),
+        "{error}"
+    );
+    let journal = fs::read_to_string(place.join("blocked/batch.jsonl")).unwrap();
+    assert_eq!(journal, JOURNAL_HEAD);
+    fs::remove_file(place.join("blocked/reports")).unwrap();
+    batch(place, &[one, "--reports", "--out", "blocked"]);
+}
+
+#[test]
+fn prop_a_journal_in_any_order_keeps_what_others_have_written() {
+    let folder = tests();
+    let place = folder.path();
+    let names: Vec<String> = (0..5)
+        .map(|test| format!("tests/t{test:02}/test.toml"))
+        .collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let run = |files: &[&str], out: &str| {
+        batch(place, &[files, &["--no-diagnosis", "--out", out]].concat());
+        tables(&place.join(out))
+    };
+    let expected = run(&names[..4], "one");
+    let other = run(&names[4..], "other");
+    let lines = |bytes: &[u8]| -> Vec<String> {
+        let text = String::from_utf8(bytes.to_vec()).unwrap();
+        text.lines()
+            .skip(1)
+            .map(|line| format!("{line}\n"))
+            .collect()
+    };
+    let mut mixed = lines(&expected["batch.jsonl"]);
+    mixed.reverse();
+    let foreign = lines(&other["batch.jsonl"]);
+    // An older record of a test, as an earlier version would have left it.
+    let stale = mixed[0].replace("\"answered\"", "\"failed\"");
+    mixed.splice(0..0, [stale, "no record\n".to_owned(), foreign[0].clone()]);
+    let out = place.join("mixed");
+    fs::create_dir(&out).unwrap();
+    let journal = JOURNAL_HEAD.to_owned() + &mixed.concat();
+    fs::write(out.join("batch.jsonl"), journal).unwrap();
+    let found = run(&names[..4], "mixed");
+    for file in ["tests.csv", "modes.csv"] {
+        assert!(found[file] == expected[file], "{file}");
+    }
+    let kept = [&expected["batch.jsonl"][..], foreign[0].as_bytes()].concat();
+    assert_eq!(
+        String::from_utf8_lossy(&found["batch.jsonl"]),
+        String::from_utf8_lossy(&kept)
+    );
+    // The parts of a batch join the journal as well.
+    for shard in ["1/2", "2/2"] {
+        let own = [
+            &names[..4],
+            &["--no-diagnosis", "--shard", shard, "--out", "mixed"],
+        ];
+        batch(place, &own.concat());
+    }
+    let own = [
+        &names[..4],
+        &["--no-diagnosis", "--merge", "--out", "mixed"],
+    ];
+    batch(place, &own.concat());
+    assert_eq!(fs::read(out.join("batch.jsonl")).unwrap(), kept);
+}
+
+#[test]
+fn val_a_list_of_the_tests_names_them_again() {
+    let folder = tests();
+    let place = folder.path();
+    let listed = batch(place, &["tests", "--list"]);
+    assert!(!place.join("batch-report").exists());
+    assert_eq!(listed.lines().count(), TESTS + 2);
+    batch(place, &["tests", "--no-diagnosis", "--out", "one"]);
+    fs::write(place.join("list.txt"), &listed).unwrap();
+    batch(
+        place,
+        &["--from", "list.txt", "--no-diagnosis", "--out", "two"],
+    );
+    assert_eq!(tables(&place.join("one")), tables(&place.join("two")));
+    let names = rows(&place.join("one/tests.csv"));
+    for (number, (row, line)) in (1..).zip(names.iter().zip(listed.lines())) {
+        assert_eq!(
+            (&*row["test"], &*row["number"]),
+            (line, &*number.to_string())
+        );
+    }
+    let part = batch(place, &["tests", "--list", "--shard", "2/2"]);
+    let half: Vec<&str> = listed.lines().skip(1).step_by(2).collect();
+    assert_eq!(part.lines().collect::<Vec<_>>(), half);
+    fs::write(
+        place.join("table.csv"),
+        "file,length\ntests/t00/low.wav,1\n",
+    )
+    .unwrap();
+    let rows = [
+        "--test",
+        "tests/t00/test.toml",
+        "--table",
+        "table.csv",
+        "--list",
+    ];
+    assert_eq!(batch(place, &rows), "tests/t00/low.wav\n");
+}
+
+#[test]
+#[cfg(unix)]
+fn limit_a_test_that_hangs_is_given_up() {
+    let folder = tests();
+    let place = folder.path();
+    let made = Command::new("mkfifo").arg(place.join("pipe.wav")).status();
+    assert!(made.unwrap().success());
+    let files = [
+        "pipe.wav",
+        "tests/t00/high.wav",
+        "pipe.wav",
+        "tests/t00/low.wav",
+    ];
+    let options = ["--hammer", "1", "--jobs", "1", "--out", "made"];
+    // The others are analysed before: their time does not count then.
+    batch(place, &[&[files[1], files[3]], &options[..]].concat());
+    let all = [&files[..], &options].concat();
+    batch(place, &[&all[..], &["--limit", "2"]].concat());
+    let check = || {
+        let rows = rows(&place.join("made/tests.csv"));
+        let outcomes: Vec<&str> = rows.iter().map(|row| row["outcome"].as_str()).collect();
+        assert_eq!(outcomes, ["failed", "answered", "failed", "answered"]);
+        assert_eq!(rows[0]["error"], "not analysed within 2 s (--limit)");
+    };
+    check();
+    // The next call tries such a test again.
+    let journal = fs::read_to_string(place.join("made/batch.jsonl")).unwrap();
+    assert_eq!(journal.matches("\"again\":true").count(), 2);
+    // Parts with such a test can be joined.
+    let part = [&all[..], &["--limit", "2", "--shard", "1/2"]].concat();
+    refused(place, &part, 1);
+    batch(place, &[&all[..], &["--shard", "2/2"]].concat());
+    batch(place, &[&all[..], &["--merge"]].concat());
+    check();
+}
+
+#[test]
+fn limit_a_refused_call_writes_nothing() {
+    let folder = tests();
+    let place = folder.path();
+    fs::write(place.join("sub.csv"), "file,recording.file\na.wav,b.wav\n").unwrap();
+    let test = "tests/t00/test.toml";
+    let calls: [&[&str]; 4] = [
+        &["--test", test, "--table", "sub.csv"],
+        &["tests", "--limit", "0"],
+        &["tests", "--merge", "--list"],
+        &["nothing", "--shard", "1/0"],
+    ];
+    for arguments in calls {
+        refused(place, arguments, 2);
+        assert!(!place.join("batch-report").exists(), "{arguments:?}");
+    }
+    // A file that a cell names is an input.
+    fs::create_dir(place.join("out")).unwrap();
+    let outputs = "file,measured.file\ntests/t00/test.toml,../../out/modes.csv\n";
+    fs::write(place.join("cells.csv"), outputs).unwrap();
+    let error = refused(place, &["--table", "cells.csv", "--out", "out"], 2);
+    assert!(error.contains("modes.csv"), "{error}");
+    assert_eq!(fs::read_dir(place.join("out")).unwrap().count(), 0);
+}
+
+#[test]
+fn limit_a_part_without_an_answer_says_so() {
+    let folder = tests();
+    let place = folder.path();
+    let part = [
+        "tests/missing/test.toml",
+        "tests/t00/test.toml",
+        "--no-diagnosis",
+        "--out",
+        "made",
+    ];
+    refused(place, &[&part[..], &["--shard", "1/2"]].concat(), 1);
+    batch(place, &[&part[..], &["--shard", "2/2"]].concat());
+    batch(place, &[&part[..], &["--merge"]].concat());
 }
 
 #[test]

@@ -1,17 +1,19 @@
 //! The tests of a batch: which they are, and what each reads.
 
+use super::super::error_text::chained;
 use super::super::input::{
     TestFile, check_file, file_name, read_bytes, read_test, read_text, stem, text_of,
 };
 use super::super::overwrite::{carries_mark, checksum_bytes, described, files_of};
 use super::super::place::{FolderContents, is_description};
 use super::super::terminal::Terminal;
-use super::BatchArguments;
 use crate::batch::{
-    BatchRecord, BatchSettings, BatchTest, DescribedTest, InputFile, InputTable, Key, MOST_TESTS,
-    Subject,
+    BatchRecord, BatchSettings, BatchTest, DescribedTest, InputFile, InputTable, JournalEntry, Key,
+    MOST_TESTS, Subject,
 };
+use crate::description::{FreeTestFile, TestDescription};
 use anyhow::{Context, anyhow, bail, ensure};
+use clap::Args;
 use sha2::{Digest, Sha256};
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -20,6 +22,24 @@ use std::path::{Path, PathBuf};
 
 /// Longest list of names, and largest table (bytes).
 const LARGEST_LIST: u64 = 1 << 30;
+
+/// The arguments that name the tests.
+#[derive(Debug, Args)]
+pub(super) struct TestArguments {
+    /// Test descriptions (.toml), folders, recordings, or files of functions
+    #[arg(value_name = "FILE", conflicts_with = "table")]
+    files: Vec<PathBuf>,
+    /// File with a list of further tests, a name on each line; `-` is standard input
+    #[arg(long, value_name = "FILE", conflicts_with = "table")]
+    from: Option<PathBuf>,
+    /// Description for recordings that have none
+    #[arg(long, value_name = "TEST")]
+    test: Option<PathBuf>,
+    /// Table (CSV) with a row for each test: a column `file`, columns named by keys of the description (`length`,
+    /// `sensor.A.position`), and others, which are carried into tests.csv
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+}
 
 /// All tests of a batch. Only their names are kept; [`load`](Self::load) reads what belongs to one.
 #[derive(Debug)]
@@ -44,8 +64,10 @@ enum Listed {
 struct Template {
     file: TestFile,
     text: String,
-    /// Its test of the free bar, and that test's files.
-    free: Option<(DescribedTest, Vec<InputFile>)>,
+    /// Its test of the free bar.
+    free: Option<DescribedTest>,
+    /// Files of that test.
+    free_files: Vec<InputFile>,
 }
 
 /// A test that is ready to be analysed, or the record of one that cannot be.
@@ -58,12 +80,13 @@ pub(super) struct Loaded {
 }
 
 impl Tests {
-    /// Lists the tests that the arguments name.
+    /// Lists the tests that the arguments name. `out` is the folder of the tables, where no tests are looked for.
     ///
     /// # Errors
     /// A list, table, template or folder that cannot be read; no test, or too many.
     pub(super) fn listed(
-        arguments: &BatchArguments,
+        arguments: &TestArguments,
+        out: &Path,
         settings: BatchSettings,
         terminal: &Terminal,
     ) -> anyhow::Result<Self> {
@@ -74,8 +97,11 @@ impl Tests {
                 read_table(path)?,
                 path.parent().map(Path::to_owned).unwrap_or_default(),
             ),
-            None => Listed::Files(files(arguments)?),
+            None => Listed::Files(files(arguments, out)?),
         };
+        if let (Listed::Rows(table, _), Some(_)) = (&list, &template) {
+            table.check_sets_no_recording()?;
+        }
         let tests = Self {
             list,
             template: template.transpose()?,
@@ -100,11 +126,42 @@ impl Tests {
     /// Returns the files that a test reads.
     fn files(&self, test: usize) -> Vec<PathBuf> {
         let path = self.path(test);
-        let test = Some(&path).filter(|path| is_description(path));
-        let test = test.and_then(|path| described(path));
-        let mut files = test.map_or_else(Vec::new, |test| files_of(&path, &test));
+        let mut files = match (is_description(&path), &self.template) {
+            (true, _) => match described(&path) {
+                Some(own) => {
+                    let text = || fs::read_to_string(&path).ok();
+                    let changed = self.changed(test, text, &path);
+                    files_of(&path, changed.as_ref().unwrap_or(&own))
+                }
+                None => Vec::new(),
+            },
+            // Files of the template are known; a row may name another test of the free bar.
+            (false, Some(template)) => {
+                let place = Path::new(&template.file.name);
+                let changed = self.changed(test, || Some(template.text.clone()), place);
+                changed.map_or_else(Vec::new, |mut test| {
+                    test.recordings.clear();
+                    test.measured = None;
+                    files_of(place, &test)
+                })
+            }
+            (false, None) => Vec::new(),
+        };
         files.push(path);
         files
+    }
+
+    /// Returns the description in a text with the files that a row names; `None` where it names none.
+    fn changed(
+        &self,
+        test: usize,
+        text: impl Fn() -> Option<String>,
+        file: &Path,
+    ) -> Option<TestDescription> {
+        let table = self.row(test).filter(|table| table.names_files())?;
+        let file = file.display().to_string();
+        let (changed, _) = table.described(test, &text()?, &file).ok()?;
+        Some(changed)
     }
 
     /// Returns the number of tests.
@@ -134,6 +191,13 @@ impl Tests {
         }
     }
 
+    fn carried(&self, test: usize) -> Vec<String> {
+        match &self.list {
+            Listed::Files(_) => Vec::new(),
+            Listed::Rows(table, _) => table.carried(test),
+        }
+    }
+
     fn path(&self, test: usize) -> PathBuf {
         match &self.list {
             Listed::Files(files) => files.get(test).cloned().unwrap_or_default(),
@@ -151,10 +215,7 @@ impl Tests {
     /// Reads what belongs to a test, its recordings excepted.
     pub(super) fn load(&self, test: usize) -> Loaded {
         let (file, path) = (self.name(test), self.path(test));
-        let carried = match &self.list {
-            Listed::Files(_) => Vec::new(),
-            Listed::Rows(table, _) => table.carried(test),
-        };
+        let carried = self.carried(test);
         let mut inputs = Vec::new();
         let subject = self.subject(test, &path, &mut inputs);
         let key = self.settings.key(&file, &carried, &inputs);
@@ -164,9 +225,46 @@ impl Tests {
                 subject,
                 carried,
             }),
-            Err(problem) => Err(BatchRecord::failed(&file, &carried, words(&problem))),
+            Err(problem) => {
+                let files: Vec<String> = inputs.into_iter().map(|input| input.name).collect();
+                let error = chained(&problem);
+                Err(BatchRecord::failed(&file, &carried, error, &files))
+            }
         };
         Loaded { key, test }
+    }
+
+    /// Returns the record of a test that was not analysed to its end, for its journal. Nothing of the test is read.
+    pub(super) fn unfinished(&self, test: usize, error: String) -> JournalEntry {
+        let (file, carried) = (self.name(test), self.carried(test));
+        JournalEntry {
+            key: self.bare_key(test),
+            record: BatchRecord::failed(&file, &carried, error, &[]),
+            again: true,
+        }
+    }
+
+    /// Returns the key of a test of which nothing is read.
+    pub(super) fn bare_key(&self, test: usize) -> Key {
+        self.settings
+            .key(&self.name(test), &self.carried(test), &[])
+    }
+
+    /// Returns the names of these tests, a line each, as `--from` reads them.
+    ///
+    /// # Errors
+    /// A name that no such list can hold.
+    pub(super) fn names(&self, tests: &[usize]) -> anyhow::Result<Vec<String>> {
+        let names = tests.iter().map(|test| {
+            let (name, path) = (self.name(*test), self.path(*test));
+            ensure!(
+                path.to_str().is_some() && !name.contains('\n') && !name.ends_with('\r'),
+                "{}: holds a line break or is no UTF-8 text, so that no list can hold it; rename it",
+                name.escape_debug()
+            );
+            Ok(name)
+        });
+        names.collect()
     }
 
     /// Returns what is analysed. The files that it reads are added to `inputs`, also if it cannot be analysed.
@@ -205,18 +303,16 @@ impl Template {
             "{}: describes no recording; add a [[recording]] with the settings for the recordings of the batch",
             file.name
         );
-        let free = match &file.test.beam.free_test {
-            Some(named) => {
-                let free = file.free_test(named)?;
-                free.check_recordings()?;
-                let path = file.path_of(&named.path);
-                let mut inputs = vec![summed(&path)];
-                inputs.extend(files_of(&path, &free.test).iter().map(|file| summed(file)));
-                Some((undressed(free), inputs))
-            }
-            None => None,
-        };
-        Ok(Self { file, text, free })
+        let mut free_files = Vec::new();
+        let named = file.test.beam.free_test.as_ref();
+        let free = named.map(|named| read_free(&file, named, &mut free_files));
+        let free = free.transpose()?;
+        Ok(Self {
+            file,
+            text,
+            free,
+            free_files,
+        })
     }
 
     /// Returns the description with a recording in the place of its own.
@@ -242,17 +338,39 @@ impl Template {
         if !own_name {
             test.name = stem(path);
         }
-        if let (Some(named), Some((free, files))) = (&test.beam.free_test, &self.free) {
-            named.check(name, &test, &free.test)?;
-            inputs.extend(files.iter().cloned());
-        }
+        let free = self.free_of(&test, inputs)?;
         Ok(DescribedTest {
             test,
             name: name.clone(),
             // The recording is seen from here, not from the folder of the description.
             folder: PathBuf::new(),
-            free: self.free.as_ref().map(|(free, _)| Box::new(free.clone())),
+            free: free.map(Box::new),
         })
+    }
+
+    /// Returns the free bar's test of a changed description: that of the template, or another that a row names.
+    fn free_of(
+        &self,
+        test: &TestDescription,
+        inputs: &mut Vec<InputFile>,
+    ) -> anyhow::Result<Option<DescribedTest>> {
+        let Some(named) = &test.beam.free_test else {
+            return Ok(None);
+        };
+        let own = self.file.test.beam.free_test.as_ref();
+        if let Some(free) = &self.free
+            && own.is_some_and(|own| own.path == named.path)
+        {
+            named.check(&self.file.name, test, &free.test)?;
+            inputs.extend(self.free_files.iter().cloned());
+            return Ok(Some(free.clone()));
+        }
+        let changed = TestFile {
+            test: test.clone(),
+            name: self.file.name.clone(),
+            folder: self.file.folder.clone(),
+        };
+        read_free(&changed, named, inputs).map(Some)
     }
 }
 
@@ -295,6 +413,20 @@ fn read_described(
     })
 }
 
+/// Reads the test of the free bar that a description names. Its files are added to `inputs`.
+fn read_free(
+    file: &TestFile,
+    named: &FreeTestFile,
+    inputs: &mut Vec<InputFile>,
+) -> anyhow::Result<DescribedTest> {
+    let path = file.path_of(&named.path);
+    inputs.push(summed(&path));
+    let free = file.free_test(named)?;
+    inputs.extend(files_of(&path, &free.test).iter().map(|file| summed(file)));
+    free.check_recordings()?;
+    Ok(undressed(free))
+}
+
 fn undressed(file: TestFile) -> DescribedTest {
     DescribedTest {
         test: file.test,
@@ -313,17 +445,6 @@ fn summed(path: &Path) -> InputFile {
     }
 }
 
-/// Returns an error with its causes, as the command line prints it.
-pub(super) fn words(problem: &anyhow::Error) -> String {
-    let mut text = problem.to_string();
-    for cause in problem.chain().skip(1).map(ToString::to_string) {
-        if !text.contains(&cause) {
-            text = format!("{text}: {cause}");
-        }
-    }
-    text
-}
-
 fn read_table(path: &Path) -> anyhow::Result<InputTable> {
     let name = path.display().to_string();
     let mut bytes = Vec::new();
@@ -338,7 +459,7 @@ fn read_table(path: &Path) -> anyhow::Result<InputTable> {
 }
 
 /// Returns the files that the arguments name, one by one, in a list, or by their folder.
-fn files(arguments: &BatchArguments) -> anyhow::Result<Vec<PathBuf>> {
+fn files(arguments: &TestArguments, out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut named = arguments.files.clone();
     match arguments.from.as_deref() {
         None => {}
@@ -351,7 +472,7 @@ fn files(arguments: &BatchArguments) -> anyhow::Result<Vec<PathBuf>> {
             named.extend(listed_in(BufReader::new(file), &name)?);
         }
     }
-    let out = fs::canonicalize(&arguments.out).ok();
+    let out = fs::canonicalize(out).ok();
     let mut files = Vec::new();
     for path in named {
         match path.is_dir() {

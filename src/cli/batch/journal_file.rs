@@ -1,12 +1,15 @@
 //! The journal of a batch on disk, and those of its parts.
 
+use super::super::error_text::listed;
 use super::super::output::not_writable;
-use crate::batch::{BatchRecord, JOURNAL_HEAD, Journal, Key, journal_line, record_in};
+use super::super::place::node_of;
+use super::shard::Shard;
+use crate::batch::{JOURNAL_HEAD, Journal, JournalEntry, Key};
 use anyhow::{Context, anyhow, bail};
-use std::cell::RefCell;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Place of a record.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -17,12 +20,38 @@ pub(super) struct Place {
     offset: u64,
 }
 
+/// A line of a journal with what it says.
+#[derive(Debug)]
+pub(super) struct Line {
+    /// The line, its end included.
+    pub(super) bytes: Vec<u8>,
+    /// What it says.
+    pub(super) entry: JournalEntry,
+}
+
+/// What a journal held when it was opened, for several threads.
+#[derive(Debug, Clone)]
+pub(super) struct Known(Arc<Mutex<Journal>>);
+
+impl Known {
+    /// Returns the place of a test's record of an earlier run; `None` of a test that was not analysed to its end.
+    pub(super) fn place(&self, key: Key) -> Option<Place> {
+        let offset = self.journal().place(key)?;
+        Some(Place { journal: 0, offset })
+    }
+
+    /// A panic elsewhere leaves the places as they are.
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// A journal to which records are appended.
 #[derive(Debug)]
 pub(super) struct JournalFile {
     path: PathBuf,
     file: File,
-    found: Journal,
+    known: Known,
     /// Length (bytes).
     length: u64,
 }
@@ -36,17 +65,24 @@ impl JournalFile {
         let path = folder.join(name);
         let unwritable = |cause: io::Error| not_writable(&path, folder, &cause);
         fs::create_dir_all(folder).map_err(unwritable)?;
-        let mut options = File::options();
-        let options = options.read(true).write(true).create(true).truncate(false);
-        let mut file = options.open(&path).map_err(unwritable)?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => bail!(
-                "{}: another run of tapjoint is writing there; wait until it has ended, or choose another folder",
-                path.display()
-            ),
-            Err(TryLockError::Error(cause)) => return Err(unwritable(cause)),
-        }
+        let mut file = loop {
+            let mut options = File::options();
+            let options = options.read(true).write(true).create(true).truncate(false);
+            let file = options.open(&path).map_err(unwritable)?;
+            match file.try_lock() {
+                // Any other error: this file system has no locks. The batch goes on without one.
+                Ok(()) | Err(TryLockError::Error(_)) => {}
+                Err(TryLockError::WouldBlock) => bail!(
+                    "{}: another run of tapjoint is writing there; wait until it has ended, or choose another folder",
+                    path.display()
+                ),
+            }
+            // Before the lock another run may have put its own journal there.
+            let [own, named] = [file.metadata(), fs::metadata(&path)];
+            if node_of(&own.map_err(unwritable)?) == named.ok().and_then(|named| node_of(&named)) {
+                break file;
+            }
+        };
         let found = found_in(&file).map_err(unwritable)?;
         let found = match found {
             Some(found) => found,
@@ -66,23 +102,43 @@ impl JournalFile {
         Ok(Self {
             path,
             file,
-            found,
+            known: Known(Arc::new(Mutex::new(found))),
             length,
         })
     }
 
-    /// Returns the place of a test's record of an earlier run.
-    pub(super) fn place(&self, key: Key) -> Option<Place> {
-        let offset = self.found.place(key)?;
-        Some(Place { journal: 0, offset })
+    /// Opens a journal as [`open`](Self::open) does; `None` where there is none.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub(super) fn open_existing(
+        folder: &Path,
+        name: &str,
+        force: bool,
+    ) -> anyhow::Result<Option<Self>> {
+        let is_there = folder.join(name).is_file();
+        is_there
+            .then(|| Self::open(folder, name, force))
+            .transpose()
+    }
+
+    /// Returns what it held when it was opened.
+    pub(super) fn known(&self) -> Known {
+        self.known.clone()
+    }
+
+    /// Returns the places of the records that no test has asked for: those of other batches.
+    pub(super) fn others(&self) -> Vec<Place> {
+        let others = self.known.journal().others().into_iter();
+        others.map(|offset| Place { journal: 0, offset }).collect()
     }
 
     /// Appends a record, and returns its place.
     ///
     /// # Errors
     /// It cannot be written.
-    pub(super) fn append(&mut self, key: Key, record: &BatchRecord) -> anyhow::Result<Place> {
-        let line = journal_line(key, record)?;
+    pub(super) fn append(&mut self, entry: &JournalEntry) -> anyhow::Result<Place> {
+        let line = entry.line()?;
         let offset = self.length;
         // One call for the whole line: what a killed process has begun is torn, and is cut off by the next run.
         self.file.write_all(line.as_bytes()).with_context(|| {
@@ -95,12 +151,12 @@ impl JournalFile {
         Ok(Place { journal: 0, offset })
     }
 
-    /// Returns the line and the record at a place.
+    /// Returns the line at a place.
     ///
     /// # Errors
     /// It cannot be read, or was changed meanwhile.
-    pub(super) fn line(&self, place: Place) -> anyhow::Result<(Vec<u8>, BatchRecord)> {
-        read_line(BufReader::new(&self.file), place, &self.path)
+    pub(super) fn line(&self, place: Place) -> anyhow::Result<Line> {
+        read_line(&self.file, place, &self.path)
     }
 }
 
@@ -116,81 +172,61 @@ fn found_in(file: &File) -> io::Result<Option<Journal>> {
     Ok(expected.starts_with(head).then(Journal::default))
 }
 
-fn read_line(
-    mut reader: impl BufRead + Seek,
-    place: Place,
-    path: &Path,
-) -> anyhow::Result<(Vec<u8>, BatchRecord)> {
-    let mut line = Vec::new();
-    reader.seek(SeekFrom::Start(place.offset))?;
-    reader.read_until(b'\n', &mut line)?;
-    let (_, record) = record_in(&line).ok_or_else(|| {
+fn read_line(file: impl Read + Seek, place: Place, path: &Path) -> anyhow::Result<Line> {
+    let mut bytes = Vec::new();
+    let mut reader = BufReader::new(file);
+    let read = reader.seek(SeekFrom::Start(place.offset));
+    let read = read.and_then(|_| reader.read_until(b'\n', &mut bytes));
+    read.with_context(|| format!("{}: cannot be read", path.display()))?;
+    let entry = JournalEntry::read(&bytes).ok_or_else(|| {
         let path = path.display();
         anyhow!("{path}: was changed while this command worked; run again")
     })?;
-    Ok((line, record))
+    Ok(Line { bytes, entry })
 }
 
 /// The journals of all parts.
 #[derive(Debug)]
 pub(super) struct ShardJournals {
-    journals: Vec<(PathBuf, RefCell<BufReader<File>>, Journal)>,
+    journals: Vec<PartJournal>,
+}
+
+/// The journal of a part. It is opened for each line: there may be more parts than files that a process may open.
+#[derive(Debug)]
+struct PartJournal {
+    path: PathBuf,
+    found: Journal,
 }
 
 impl ShardJournals {
-    /// Opens the journals of all parts in a folder, of `tests` tests.
+    /// Looks through the journals of all parts in a folder, of `tests` tests.
     ///
     /// # Errors
     /// There are none, one of them is missing or cannot be read, or they are of different numbers of parts.
     pub(super) fn open(folder: &Path, tests: usize) -> anyhow::Result<Self> {
-        let shown = folder.display();
-        let entries = fs::read_dir(folder).with_context(|| format!("{shown}: cannot be read"))?;
-        let names = entries.flatten().map(|entry| entry.file_name());
-        let mut counts: Vec<usize> = names
-            .filter_map(|name| parts_of(&name.to_string_lossy()))
-            .collect();
-        counts.sort_unstable();
-        counts.dedup();
-        let parts = match counts[..] {
-            [parts] => parts,
-            [] => bail!(
-                "{shown}: holds no journal of a part (batch-1-of-2.jsonl); analyse the parts first, with --shard I/N and this folder"
-            ),
-            [first, second, ..] => bail!(
-                "{shown}: holds journals of {first} and of {second} parts; remove those that are not wanted"
-            ),
-        };
-        let shards: Vec<super::Shard> = (1..=parts)
-            .map(|part| super::Shard { part, parts })
-            .collect();
+        let parts = parts_in(folder)?;
         // A part without tests need not have been run.
-        let needed = shards.into_iter().take(tests.max(1));
+        let needed = (1..=parts).take(tests.max(1));
         let (mut journals, mut missing) = (Vec::new(), Vec::new());
-        for shard in needed {
-            let path = folder.join(shard.journal());
-            match File::open(&path) {
-                Ok(file) => {
-                    let found = found_in(&file)?.ok_or_else(|| {
-                        anyhow!(
-                            "{}: is no journal of tapjoint; remove it, and analyse its part again",
-                            path.display()
-                        )
-                    })?;
-                    journals.push((path, RefCell::new(BufReader::new(file)), found));
-                }
+        for part in needed {
+            let path = folder.join(Shard { part, parts }.journal());
+            let shown = path.display();
+            match File::open(&path).and_then(|file| found_in(&file)) {
+                Ok(Some(found)) => journals.push(PartJournal { path, found }),
+                Ok(None) => bail!(
+                    "{shown}: is no journal of tapjoint; remove it, and analyse its part again"
+                ),
                 Err(cause) if cause.kind() == io::ErrorKind::NotFound => {
-                    missing.push(format!("{}/{parts}", shard.part));
+                    missing.push(format!("{part}/{parts}"));
                 }
-                Err(cause) => {
-                    return Err(cause)
-                        .with_context(|| format!("{}: cannot be read", path.display()));
-                }
+                Err(cause) => return Err(cause).context(format!("{shown}: cannot be read")),
             }
         }
         if !missing.is_empty() {
-            let missing = missing.join(", ");
             bail!(
-                "{shown}: the journals of these parts are missing: {missing}; analyse them with --shard"
+                "{}: the journals of these parts are missing: {}; analyse them with --shard",
+                folder.display(),
+                listed(&missing)
             );
         }
         Ok(Self { journals })
@@ -201,29 +237,47 @@ impl ShardJournals {
         self.journals.len()
     }
 
-    /// Returns the place of a test's record.
-    pub(super) fn place(&self, key: Key) -> Option<Place> {
-        let mut journals = (0..).zip(&self.journals);
-        journals.find_map(|(journal, (_, _, found))| {
-            let offset = found.place(key)?;
+    /// Returns the place of a test's record. The journal of its own part comes first.
+    pub(super) fn place(&self, test: usize, key: Key) -> Option<Place> {
+        let own = test % self.parts();
+        let others = (0..self.parts()).filter(|journal| *journal != own);
+        [own].into_iter().chain(others).find_map(|journal| {
+            let offset = self.journals[journal].found.any_place(key)?;
+            let journal = u32::try_from(journal).ok()?;
             Some(Place { journal, offset })
         })
     }
 
-    /// Returns the line and the record at a place.
+    /// Returns the line at a place.
     ///
     /// # Errors
     /// It cannot be read, or was changed meanwhile.
-    pub(super) fn line(&self, place: Place) -> anyhow::Result<(Vec<u8>, BatchRecord)> {
-        let (path, reader, _) = &self.journals[place.journal as usize];
-        read_line(&mut *reader.borrow_mut(), place, path)
+    pub(super) fn line(&self, place: Place) -> anyhow::Result<Line> {
+        let path = &self.journals[place.journal as usize].path;
+        let file = File::open(path);
+        let file = file.with_context(|| format!("{}: cannot be read", path.display()))?;
+        read_line(file, place, path)
     }
 }
 
-/// Returns the number of parts in the name of a part's journal; `None` of another name.
-fn parts_of(name: &str) -> Option<usize> {
-    let name = name.strip_prefix("batch-")?.strip_suffix(".jsonl")?;
-    let (part, parts) = name.split_once("-of-")?;
-    let shard: super::Shard = format!("{part}/{parts}").parse().ok()?;
-    Some(shard.parts)
+/// Returns the number of parts of which a folder holds journals.
+fn parts_in(folder: &Path) -> anyhow::Result<usize> {
+    let shown = folder.display();
+    let entries = fs::read_dir(folder).with_context(|| format!("{shown}: cannot be read"))?;
+    let names = entries.flatten().map(|entry| entry.file_name());
+    let mut counts: Vec<usize> = names
+        .filter_map(|name| Shard::of_journal(&name.to_string_lossy()))
+        .map(|shard| shard.parts)
+        .collect();
+    counts.sort_unstable();
+    counts.dedup();
+    match counts[..] {
+        [parts] => Ok(parts),
+        [] => bail!(
+            "{shown}: holds no journal of a part (batch-1-of-2.jsonl); analyse the parts first, with --shard I/N and this folder"
+        ),
+        [first, second, ..] => bail!(
+            "{shown}: holds journals of {first} and of {second} parts; remove those that are not wanted"
+        ),
+    }
 }

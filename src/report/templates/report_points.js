@@ -191,14 +191,15 @@ function pointOptions(figure, panel, holder) {
   function scale(key) {
     return { time: false, auto: false, distr: logarithmic(panel[key]) ? 3 : 1, range: function () { return panel.view[key]; } };
   }
-  function room(axis) {
-    var longest = Math.max.apply(null, (axis.names || [""]).map(function (name) { return name.length; }));
-    return Math.min(Math.max(7 * longest + 12, 58), 0.45 * holder.clientWidth);
+  function room(names) {
+    var longest = Math.max.apply(null, [0].concat((names || []).map(function (name) { return name.length; })));
+    return Math.min(Math.max(7 * longest + 16, 58), 0.45 * holder.clientWidth);
   }
   function axis(key) {
     var at = panel[key].at;
     return {
-      label: named(panel[key], key === "x" ? holder.clientWidth - room(panel.y) : panel.height), labelSize: 20, size: key === "x" ? 32 : room(panel.y), stroke: color("--ink"),
+      label: named(panel[key], key === "x" ? holder.clientWidth - room(panel.y.names) : panel.height), labelSize: 20, stroke: color("--ink"),
+      size: key === "x" ? 32 : function (u, names) { return room(panel.y.names || names); },
       grid: { stroke: color("--rule"), width: 1 }, ticks: { stroke: color("--rule"), width: 1 },
       splits: function (u, index, low, high) {
         return at ? at.filter(function (place) { return place >= low && place <= high; }) : ticks(low, high, logarithmic(panel[key]), key === "x" && innerWidth < 600);
@@ -266,7 +267,9 @@ function buildPoints(figure) {
     u.over.appendChild(panel.tip);
     fingers(u, { x: panel.x.range, y: panel.y.range }, function (x, y) { look(figure, u, panel, x, y); });
     u.over.addEventListener("click", function () {
-      if (panel.lit && panel.lit.set.links) location.href = panel.lit.set.links[panel.lit.index];
+      // A point without an address has an empty one.
+      var link = panel.lit && panel.lit.set.links && panel.lit.set.links[panel.lit.index];
+      if (link) location.href = link;
     });
     if (choosesPoles(figure)) u.over.addEventListener("click", function () {
       if (!panel.lit || panel.lit.set.mark === "square") return;

@@ -16,7 +16,7 @@ pub const WITHOUT_PARQUET: &str = "this build of tapjoint has no Parquet; build 
 #[derive(Debug)]
 pub enum TableFile<W: Write + Send> {
     /// Comma separated values.
-    Csv(TableWriter<BufWriter<W>>),
+    Csv(Box<TableWriter<BufWriter<W>>>),
     /// Parquet.
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetWriter<W>>),
@@ -28,7 +28,8 @@ impl<W: Write + Send> TableFile<W> {
     /// # Errors
     /// The file cannot be written.
     pub fn csv(kind: TableKind, carried: &[String], to: W) -> io::Result<Self> {
-        TableWriter::new(kind, carried, BufWriter::new(to)).map(Self::Csv)
+        let table = TableWriter::new(kind, carried, BufWriter::new(to))?;
+        Ok(Self::Csv(Box::new(table)))
     }
 
     /// Begins a Parquet table. `carried` names the carried columns of the input table.

@@ -7,6 +7,7 @@ again asks for what they lack.
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -68,9 +69,9 @@ def analyse(
     check_versions(client)
     has_table = any(argument.startswith("--table=") for argument in shared)
     listing = [] if has_table else ["--from=-"]
-    printed = program([*shared, *listing, "--list", f"--out={out}"], "" if has_table else "\n".join(tests) + "\n")
-    names = printed.splitlines()
-    parts = parts_of(names, size)
+    given = "" if has_table else "".join(f"{test}\n" for test in tests)
+    printed = program([*shared, *listing, "--list", "--json=-", f"--out={out}"], given)
+    parts = parts_of(json.loads(printed)["tests"], size)
     if has_table:
         # Each task reads the table, and takes its rows.
         for part in parts:

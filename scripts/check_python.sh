@@ -73,7 +73,7 @@ PYTHON
 step "import time, at most $most_import ms more than numpy" "$bin/python" "$work/import_time.py" "$most_import"
 
 step 'packages of the tests' "$bin/pip" install --quiet --disable-pip-version-check \
-    pytest mypy pandas xarray matplotlib nbclient nbformat ipykernel pandas-stubs sdypy_sep005
+    pytest mypy pandas pyarrow 'dask[distributed]' xarray matplotlib nbclient nbformat ipykernel pandas-stubs sdypy_sep005
 cd "$OLDPWD"
 step 'types of the package' "$bin/mypy" --config-file python/pyproject.toml python/tapjoint
 cd "$work"

@@ -3,11 +3,17 @@
 use super::{golden::assert_snapshot, program, tapjoint};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::thread;
 use tapjoint::batch::JOURNAL_HEAD;
+use tapjoint::cli::{Host, call};
+use tapjoint::pipeline::{Stage, Watch};
 
 /// Files of a batch, except the page.
 const FILES: [&str; 4] = ["tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl"];
@@ -475,6 +481,46 @@ fn limit_a_refused_call_writes_nothing() {
     let error = refused(place, &["--table", "cells.csv", "--out", "out"], 2);
     assert!(error.contains("modes.csv"), "{error}");
     assert_eq!(fs::read_dir(place.join("out")).unwrap().count(), 0);
+}
+
+/// What ends a call.
+struct End;
+
+/// Ends a call at the first stage of a recording.
+struct Ending;
+
+impl Watch for Ending {
+    fn pass(&self, _: Option<Stage>, to: Option<Stage>) {
+        if matches!(to, Some(Stage::Taps)) && !thread::panicking() {
+            resume_unwind(Box::new(End));
+        }
+    }
+}
+
+#[test]
+fn limit_another_program_ends_a_batch_without_a_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let recordings = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/cantilever");
+    let called = |watch: Arc<dyn Watch + Send + Sync>| {
+        let files = ["low.wav", "high.wav"].map(|name| recordings.join(name).into_os_string());
+        let words = ["--hammer", "1", "--out"].map(OsString::from);
+        let first = [OsString::from("batch")].into_iter();
+        let arguments = first
+            .chain(files)
+            .chain(words)
+            .chain([out.clone().into_os_string()]);
+        let host = Host {
+            descriptions: Vec::new(),
+            watch,
+        };
+        catch_unwind(AssertUnwindSafe(|| call(arguments, host)))
+    };
+    let ended = called(Arc::new(Ending)).expect_err("the call was ended");
+    assert!(ended.is::<End>());
+    let journal = fs::read_to_string(out.join("batch.jsonl")).unwrap();
+    assert_eq!(journal, JOURNAL_HEAD);
+    assert!(called(Arc::new(())).unwrap().unwrap().is_answered);
 }
 
 #[test]

@@ -328,59 +328,52 @@ impl Drop for Workers {
     }
 }
 
-/// Analyses one test after the other, until none is left.
+/// Analyses one test after the other, until none is left, and says how it ended.
 ///
 /// Each worker is a pool of one thread: a test is analysed by one thread, and several tests at the same time.
 fn serve(shared: &Arc<Shared>, worker: u64, sender: &SyncSender<Message>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
-    let mut ended = Message::Ended {
-        was_left: false,
-        problem: None,
+    let ended = match pool.use_current_thread().build() {
+        Ok(_pool) => work_off(shared, worker, sender),
+        Err(cause) => Message::Ended {
+            was_left: false,
+            problem: Some(cause.into()),
+        },
     };
-    match pool.use_current_thread().build() {
-        Err(cause) => {
-            ended = Message::Ended {
-                was_left: false,
-                problem: Some(cause.into()),
-            };
-        }
-        Ok(_pool) => {
-            let is_left = Arc::new(AtomicBool::new(false));
-            while let Some(slot) = shared.begin(worker, &is_left) {
-                let watch = Stoppable {
-                    shared,
-                    is_left: &is_left,
-                };
-                let found = catch_unwind(AssertUnwindSafe(|| shared.work.find(slot, &watch)));
-                if !shared.end(worker) {
-                    ended = Message::Ended {
-                        was_left: true,
-                        problem: None,
-                    };
-                    break;
-                }
-                let message = match found {
-                    Ok(found) => Message::Finished(Finished { slot, found }),
-                    Err(panic) if panic.is::<Stopped>() => break,
-                    Err(panic) if shared.work.is_embedded => {
-                        ended = Message::Unwound(panic);
-                        break;
-                    }
-                    // Our fault, and no reason to lose the other tests.
-                    Err(_) => {
-                        let reason = "internal error; please report it with this test".to_owned();
-                        let found = Found::Unfinished(reason);
-                        Message::Finished(Finished { slot, found })
-                    }
-                };
-                if sender.send(message).is_err() {
-                    return;
-                }
-            }
-        }
-    }
     // Where nobody waits any more, nobody has to know.
     let _ = sender.send(ended);
+}
+
+fn work_off(shared: &Shared, worker: u64, sender: &SyncSender<Message>) -> Message {
+    let ended = |was_left| Message::Ended {
+        was_left,
+        problem: None,
+    };
+    let is_left = Arc::new(AtomicBool::new(false));
+    while let Some(slot) = shared.begin(worker, &is_left) {
+        let watch = Stoppable {
+            shared,
+            is_left: &is_left,
+        };
+        let found = catch_unwind(AssertUnwindSafe(|| shared.work.find(slot, &watch)));
+        if !shared.end(worker) {
+            return ended(true);
+        }
+        let found = match found {
+            Ok(found) => found,
+            Err(panic) if panic.is::<Stopped>() => break,
+            Err(panic) if shared.work.is_embedded => return Message::Unwound(panic),
+            // Our fault, and no reason to lose the other tests.
+            Err(_) => {
+                Found::Unfinished("internal error; please report it with this test".to_owned())
+            }
+        };
+        let sent = sender.send(Message::Finished(Finished { slot, found }));
+        if sent.is_err() {
+            break;
+        }
+    }
+    ended(false)
 }
 
 impl Work {

@@ -43,7 +43,6 @@ pub fn render(summary: &Summary, names: &dyn TestNames) -> Result<String, Report
             title: "All tests together",
             tables: own,
             charts: vec![chart(summary, names)],
-            ..BatchSection::default()
         });
     }
     let (reasons, verdicts) = (&summary.reasons, &summary.verdicts);

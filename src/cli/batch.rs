@@ -278,7 +278,7 @@ fn merged_places(
 ) -> anyhow::Result<Vec<Place>> {
     let read = AtomicUsize::new(0);
     let places = (0..tests.len()).into_par_iter().map(|index| {
-        let key = tests.load(index).key;
+        let key = tests.key(index);
         terminal.count(
             "tests",
             read.fetch_add(1, Ordering::Relaxed) + 1,

@@ -193,7 +193,7 @@ function pointOptions(figure, panel, holder) {
   }
   function room(names) {
     var longest = Math.max.apply(null, [0].concat((names || []).map(function (name) { return name.length; })));
-    return Math.min(Math.max(7 * longest + 16, 58), 0.45 * holder.clientWidth);
+    return Math.min(Math.max(7.5 * longest + 22, 58), 0.45 * holder.clientWidth);
   }
   function axis(key) {
     var at = panel[key].at;

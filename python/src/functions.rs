@@ -76,7 +76,9 @@ pub fn average<'py>(
     if !(rate.is_finite() && rate > 0.0) {
         return Err(refused(
             py,
-            "rate: give the samples per second, a number above 0 Hz",
+            &format!(
+                "rate: {rate} is not allowed; give the samples per second, a number above 0 Hz"
+            ),
         ));
     }
     let window = window_of(window, decay).map_err(|text| refused(py, &text))?;

@@ -48,11 +48,15 @@ static KEPT: Mutex<Option<KeptPool>> = Mutex::new(None);
 
 /// Checks a number of threads.
 fn check(py: Python<'_>, threads: Option<usize>) -> PyResult<()> {
-    if threads.is_some_and(|count| !(1..=MOST_THREADS).contains(&count)) {
-        let text = format!("threads: give 1 to {MOST_THREADS}, or None for one to each processor");
-        return Err(refused(py, &text));
+    match threads.filter(|count| !(1..=MOST_THREADS).contains(count)) {
+        Some(count) => {
+            let text = format!(
+                "threads: {count} is not allowed; give 1 to {MOST_THREADS}, or None for one to each processor"
+            );
+            Err(refused(py, &text))
+        }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Returns a pool with so many threads; `None` = one for each processor, or as RAYON_NUM_THREADS says.

@@ -1,36 +1,35 @@
 //! Tables of a batch as Parquet, and input tables that are Parquet.
 //!
-//! The unit of a column stands in the metadata of its field, as `unit`. Apache Arrow's schema carries it: pyarrow shows it
-//! as `schema.field("frequency_Hz").metadata`. The columns are those of the comma separated tables.
+//! The columns are those of the comma separated tables. Their units stand in the schema's metadata, under `units`: a JSON
+//! object of heads and units. pyarrow shows it as `schema.metadata[b"units"]`.
 
 use crate::record::BatchRecord;
-use crate::tables::{Cell, CellKind, TableKind};
-use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array};
-use arrow_schema::{DataType, Field, Schema};
+use crate::tables::{Cell, CellKind, Column, TableKind};
 use bytes::Bytes;
-use parquet::arrow::ArrowWriter;
-use parquet::basic::Compression;
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::record::Field as Value;
+use parquet::schema::types::Type;
 use std::io::{self, Write};
 use std::sync::Arc;
 
-/// Rows that are turned into columns at once.
-const ROWS_AT_ONCE: usize = 4096;
-/// Most rows of a row group. A group is held in memory until it is full.
-const GROUP_ROWS: usize = 1 << 16;
+/// Rows of a row group. A group is held in memory until it is full: 30 MB of the widest table.
+const GROUP_ROWS: usize = 8192;
 
 /// Writes one table as Parquet, record by record.
 #[derive(Debug)]
 pub struct ParquetWriter<W: Write + Send> {
     kind: TableKind,
-    schema: Arc<Schema>,
+    columns: Vec<Column>,
     /// Records so far.
     count: u64,
     rows: Vec<Vec<Cell>>,
-    writer: ArrowWriter<W>,
+    writer: SerializedFileWriter<W>,
 }
 
 impl<W: Write + Send> ParquetWriter<W> {
@@ -39,31 +38,30 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// # Errors
     /// The file cannot be written.
     pub fn new(kind: TableKind, carried: &[String], to: W) -> io::Result<Self> {
-        let fields = kind.columns(carried).into_iter().map(|column| {
-            let holds = match column.kind {
-                CellKind::Text => DataType::Utf8,
-                CellKind::Number => DataType::Float64,
-                CellKind::Count => DataType::UInt64,
-            };
-            let field = Field::new(column.head, holds, true);
-            match column.unit {
-                "" => field,
-                unit => field.with_metadata([("unit", unit)]),
-            }
-        });
-        let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        let columns = kind.columns(carried);
+        let mut units = serde_json::Map::new();
+        for column in columns.iter().filter(|column| !column.unit.is_empty()) {
+            units.insert(column.head.clone(), column.unit.into());
+        }
+        let units = KeyValue::new("units".to_owned(), serde_json::to_string(&units)?);
         let properties = WriterProperties::builder()
             .set_created_by(format!("tapjoint batch {}", env!("CARGO_PKG_VERSION")))
             .set_compression(Compression::SNAPPY)
-            .set_max_row_group_row_count(Some(GROUP_ROWS))
+            .set_key_value_metadata(Some(vec![units]))
             .build();
+        let fields = columns.iter().map(field_of).collect::<Result<_, _>>();
+        let schema = fields.and_then(|fields| {
+            let schema = Type::group_type_builder("tapjoint");
+            schema.with_fields(fields).build()
+        });
+        let schema = Arc::new(schema.map_err(system_error)?);
+        let writer = SerializedFileWriter::new(to, schema, Arc::new(properties));
         Ok(Self {
             kind,
-            writer: ArrowWriter::try_new(to, schema.clone(), Some(properties))
-                .map_err(system_error)?,
-            schema,
+            columns,
             count: 0,
             rows: Vec::new(),
+            writer: writer.map_err(system_error)?,
         })
     }
 
@@ -74,21 +72,43 @@ impl<W: Write + Send> ParquetWriter<W> {
     pub fn add(&mut self, record: &BatchRecord) -> io::Result<()> {
         self.count += 1;
         self.rows.extend(self.kind.rows(self.count, record));
-        match self.rows.len() < ROWS_AT_ONCE {
+        match self.rows.len() < GROUP_ROWS {
             true => Ok(()),
-            false => self.write_rows(),
+            false => self.write_group().map_err(system_error),
         }
     }
 
-    fn write_rows(&mut self) -> io::Result<()> {
-        let fields = self.schema.fields().iter().enumerate();
-        let columns = fields.map(|(index, field)| {
-            let cells = self.rows.iter().map(|row| &row[index]);
-            column_of(field.data_type(), cells)
-        });
-        let columns: Vec<ArrayRef> = columns.collect();
-        let batch = RecordBatch::try_new(self.schema.clone(), columns).map_err(io::Error::other)?;
-        self.writer.write(&batch).map_err(system_error)?;
+    fn write_group(&mut self) -> Result<(), ParquetError> {
+        let mut group = self.writer.next_row_group()?;
+        for (place, column) in self.columns.iter().enumerate() {
+            let Some(mut writer) = group.next_column()? else {
+                break;
+            };
+            let cells = self.rows.iter().map(|row| &row[place]);
+            match column.kind {
+                CellKind::Text => write_column::<ByteArrayType>(&mut writer, cells, |cell| {
+                    let Cell::Text(Some(text)) = cell else {
+                        return None;
+                    };
+                    Some(ByteArray::from(text.as_str()))
+                }),
+                CellKind::Number => write_column::<DoubleType>(&mut writer, cells, |cell| {
+                    let Cell::Number(value) = cell else {
+                        return None;
+                    };
+                    *value
+                }),
+                // Parquet keeps whole numbers from 0 in the bits of those with a sign.
+                CellKind::Count => write_column::<Int64Type>(&mut writer, cells, |cell| {
+                    let Cell::Count(Some(count)) = cell else {
+                        return None;
+                    };
+                    Some(count.cast_signed())
+                }),
+            }?;
+            writer.close()?;
+        }
+        group.close()?;
         self.rows.clear();
         Ok(())
     }
@@ -98,9 +118,40 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// # Errors
     /// The file cannot be written.
     pub fn finish(mut self) -> io::Result<()> {
-        self.write_rows()?;
+        if !self.rows.is_empty() {
+            self.write_group().map_err(system_error)?;
+        }
         self.writer.into_inner().map_err(system_error)?.flush()
     }
+}
+
+/// Returns the description of a column, whose cells may be empty.
+fn field_of(column: &Column) -> Result<Arc<Type>, ParquetError> {
+    let (physical, logical) = match column.kind {
+        CellKind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        CellKind::Number => (Physical::DOUBLE, None),
+        CellKind::Count => (Physical::INT64, Some(LogicalType::integer(64, false))),
+    };
+    Type::primitive_type_builder(&column.head, physical)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(logical)
+        .build()
+        .map(Arc::new)
+}
+
+/// Writes the cells of a column. Of an empty one only its level is written, 0.
+fn write_column<'a, T: DataType>(
+    writer: &mut SerializedColumnWriter,
+    cells: impl Iterator<Item = &'a Cell>,
+    value: impl Fn(&Cell) -> Option<T::T>,
+) -> Result<(), ParquetError> {
+    let (mut values, mut levels) = (Vec::new(), Vec::new());
+    for found in cells.map(value) {
+        levels.push(i16::from(found.is_some()));
+        values.extend(found);
+    }
+    let writer = writer.typed::<T>();
+    writer.write_batch(&values, Some(&levels), None).map(drop)
 }
 
 /// Returns the error of the system that is the cause, such as a full disk.
@@ -111,24 +162,6 @@ fn system_error(cause: ParquetError) -> io::Error {
             Err(cause) => io::Error::other(cause),
         },
         cause => io::Error::other(cause),
-    }
-}
-
-/// Returns cells of one kind as a column.
-fn column_of<'a>(holds: &DataType, cells: impl Iterator<Item = &'a Cell>) -> ArrayRef {
-    match holds {
-        DataType::Float64 => Arc::new(Float64Array::from_iter(cells.map(|cell| match cell {
-            Cell::Number(value) => *value,
-            Cell::Text(_) | Cell::Count(_) => None,
-        }))),
-        DataType::UInt64 => Arc::new(UInt64Array::from_iter(cells.map(|cell| match cell {
-            Cell::Count(count) => *count,
-            Cell::Text(_) | Cell::Number(_) => None,
-        }))),
-        _ => Arc::new(StringArray::from_iter(cells.map(|cell| match cell {
-            Cell::Text(text) => text.as_deref(),
-            Cell::Number(_) | Cell::Count(_) => None,
-        }))),
     }
 }
 
@@ -184,8 +217,7 @@ mod tests {
     use super::*;
     use crate::record::{ModeRow, TestRow};
     use crate::tables::TABLES;
-    use arrow_array::Array;
-    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    use parquet::record::RowAccessor;
 
     fn record(frequency: Option<f64>, carried: &str) -> BatchRecord {
         BatchRecord {
@@ -207,7 +239,7 @@ mod tests {
         let mut bytes = Vec::new();
         let mut table = ParquetWriter::new(kind, &["serial".to_owned()], &mut bytes).unwrap();
         for record in records {
-            table.add(number, record).unwrap();
+            table.add(record).unwrap();
         }
         table.finish().unwrap();
         bytes
@@ -218,24 +250,28 @@ mod tests {
         let values = [Some(0.1 + 0.2), None, Some(5e-324)];
         let records: Vec<BatchRecord> = values.iter().map(|value| record(*value, "=7")).collect();
         let bytes = Bytes::from(written(TableKind::Modes, &records));
-        let reader = ParquetRecordBatchReaderBuilder::try_new(bytes).unwrap();
-        let field = reader
-            .schema()
-            .field_with_name("frequency_Hz")
-            .unwrap()
-            .clone();
-        assert_eq!(field.metadata()["unit"], "Hz");
-        let batch = reader.build().unwrap().next().unwrap().unwrap();
-        let column = batch.column_by_name("frequency_Hz").unwrap();
-        let column = column.as_any().downcast_ref::<Float64Array>().unwrap();
-        let found: Vec<Option<f64>> = column.iter().collect();
+        let reader = SerializedFileReader::new(bytes).unwrap();
+        let metadata = reader.metadata().file_metadata().key_value_metadata();
+        let units = metadata.unwrap()[0].value.clone().unwrap();
+        let units: serde_json::Value = serde_json::from_str(&units).unwrap();
+        assert_eq!(units["frequency_Hz"], "Hz");
+        assert_eq!(units["damping"], "1");
+        assert!(units.get("label").is_none());
+        let place = TableKind::Modes.columns(&[]);
+        let place = place
+            .iter()
+            .position(|column| column.head == "frequency_Hz");
+        let rows = reader.get_row_iter(None).unwrap().map(Result::unwrap);
+        let found: Vec<Option<f64>> = rows
+            .map(|row| row.get_double(place.unwrap()).ok())
+            .collect();
         assert_eq!(found, values);
     }
 
-    /// The rows are more than a row group holds, and no multiple of the rows at once.
+    /// The rows are more than a row group holds.
     #[test]
     fn limit_rows_of_several_groups_are_all_there() {
-        let count = GROUP_ROWS + ROWS_AT_ONCE / 2;
+        let count = GROUP_ROWS + GROUP_ROWS / 2;
         let records = vec![record(Some(1.0), ""); count];
         let reader = SerializedFileReader::new(Bytes::from(written(TableKind::Tests, &records)));
         let metadata = reader.unwrap().metadata().clone();

@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._packages import package
+from ._program import program
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -152,22 +151,3 @@ def batch(
     listing = [] if table is not None else ["--from=-"]
     printed = program([*shared, *tables, *listing, "--json=-"], names)
     return Batch(out, json.loads(printed)["batch"])
-
-
-def program(arguments: Sequence[str], names: str, folder: str | None = None) -> str:
-    """Runs ``tapjoint batch`` in a process of its own, which may be ended without harm. Returns what it prints.
-
-    ``names`` is its standard input, and ``folder`` where it looks for files; default: the folder of this process.
-
-    Raises:
-        InputError: The program ended with an error.
-    """
-    line = [sys.executable, "-m", "tapjoint._cli", "batch", "--quiet", *arguments]
-    ended = subprocess.run(
-        line, input=names, cwd=folder, capture_output=True, encoding="utf-8", errors="surrogateescape"
-    )
-    # 1: no test has an answer.
-    if ended.returncode in (0, 1):
-        return ended.stdout
-    reason = ended.stderr.strip().removeprefix("error: ")
-    raise InputError(reason or f"tapjoint ended early, with the exit code {ended.returncode}")

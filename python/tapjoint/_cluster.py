@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from ._batch import program
 from ._packages import package
+from ._program import program
 from .errors import BatchError, InputError
 
 if TYPE_CHECKING:

@@ -93,8 +93,6 @@ const WIDENINGS: usize = 2;
 const WIDER: f64 = 4.0;
 /// Difference of log probability up to which the linearised model counts as true.
 const LINEAR_ENOUGH: f64 = 0.3;
-/// Decrease of the objective that is not searched for: a step of a fifth of a standard deviation.
-const NEXT_TO_NOTHING: f64 = 0.02;
 
 /// Fits a hypothesis from a start and integrates over all parameters, the drift's spread included.
 pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Option<LocalOptimum> {
@@ -130,8 +128,9 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
         }
         let before = &optimum.model.predicted;
         let kept = objective_at(&dataset.data, &own, &optimum.parameters, before);
-        // The linearised step leaves a bent valley, and promises next to nothing beyond the optimum that was searched.
-        if (kept - found.optimum.objective).abs() < NEXT_TO_NOTHING {
+        // The linearised step leaves a bent valley, and promises less than the linearised model may err. The optimum that was
+        // searched stands then. It may be off by three quarters of a standard deviation.
+        if (kept - found.optimum.objective).abs() < LINEAR_ENOUGH {
             found.optimum = optimum.under(&dataset.data, &own);
             return Some(found);
         }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::thread;
-use tapjoint::batch::JOURNAL_HEAD;
+use tapjoint::batch::{HAS_PARQUET, JOURNAL_HEAD, WITHOUT_PARQUET};
 use tapjoint::cli::{Host, call};
 use tapjoint::pipeline::{Stage, Watch};
 
@@ -463,6 +463,64 @@ fn limit_a_test_that_hangs_is_given_up() {
     batch(place, &[&all[..], &["--shard", "2/2"]].concat());
     batch(place, &[&all[..], &["--merge"]].concat());
     check();
+}
+
+/// The example for job arrays, which runs its parts one after the other where there is no scheduler.
+#[cfg(unix)]
+#[test]
+fn val_the_example_of_an_array_gives_the_tables_of_one_call() {
+    let folder = tests();
+    let place = folder.path();
+    fs::create_dir(place.join("taps")).unwrap();
+    for number in 0..3 {
+        let tap = place.join(format!("tests/t{number:02}/high.wav"));
+        fs::copy(tap, place.join(format!("taps/{number}.wav"))).unwrap();
+    }
+    let test = "tests/t00/test.toml";
+    batch(place, &["taps", "--test", test, "--out", "one"]);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = program();
+    let folders = [program.parent().unwrap().to_owned()].into_iter();
+    let all = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(folders.chain(std::env::split_paths(&all))).unwrap();
+    let run = Command::new(root.join("examples/many_machines/slurm_array.sh"))
+        .args([test, "taps", "array"])
+        .current_dir(place)
+        .env("PATH", path)
+        .env("PARTS", "2")
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.status.success(), "{error}");
+    assert_eq!(tables(&place.join("array")), tables(&place.join("one")));
+}
+
+#[test]
+fn val_parquet_is_written_or_refused_with_the_remedy() {
+    let folder = tests();
+    let place = folder.path();
+    let arguments = ["tests/t00", "--no-diagnosis", "--parquet"];
+    fs::write(place.join("rows.parquet"), "PAR1 and no table PAR1").unwrap();
+    let table = ["--test", "tests/t00/test.toml", "--table", "rows.parquet"];
+    let broken = refused(place, &table, 2);
+    if !HAS_PARQUET {
+        assert!(refused(place, &arguments, 2).contains(WITHOUT_PARQUET));
+        assert!(!place.join("batch-report").exists());
+        assert!(broken.contains(WITHOUT_PARQUET), "{broken}");
+        return;
+    }
+    assert!(
+        broken.contains("rows.parquet:1: cannot be read"),
+        "{broken}"
+    );
+    // The second call replaces the tables of the first.
+    for _ in 0..2 {
+        batch(place, &arguments);
+        for table in ["tests", "modes", "hypotheses"] {
+            let file = place.join(format!("batch-report/{table}.parquet"));
+            assert!(fs::read(file).unwrap().starts_with(b"PAR1"));
+        }
+    }
 }
 
 #[test]

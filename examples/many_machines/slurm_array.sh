@@ -3,8 +3,12 @@
 #
 #   sbatch slurm_array.sh TEST RECORDINGS OUT
 #
-# Each task of the array analyses one part. Then a job joins the parts. Without Slurm this file runs the parts one after the
-# other, on the machine where it is called. PARTS is the number of parts then.
+# Each task of the array analyses one part. Then a job joins the parts, if none has failed. To run part 5 of 16 again:
+#
+#   PARTS=16 sbatch --array=5 slurm_array.sh TEST RECORDINGS OUT
+#
+# and then join the parts with --merge. Without Slurm this file runs PARTS parts one after the other, on the machine where it
+# is called.
 #SBATCH --job-name=tapjoint
 #SBATCH --array=1-16
 #SBATCH --cpus-per-task=4
@@ -13,7 +17,7 @@
 set -euo pipefail
 
 test="$1" recordings="$2" out="$3"
-parts="${SLURM_ARRAY_TASK_COUNT:-${PARTS:-4}}"
+parts="${PARTS:-${SLURM_ARRAY_TASK_COUNT:-4}}"
 batch=(tapjoint batch "$recordings" --test "$test" --out "$out" --quiet)
 
 part() {

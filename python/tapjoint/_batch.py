@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._options import options_of
 from ._packages import package
 from ._program import program
 from .errors import InputError
@@ -118,34 +119,17 @@ def batch(
     """
     listed = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     tests = [os.fspath(path) for path in listed]
-    shared: list[str] = []
+    if table is not None and tests:
+        raise InputError("paths and table: give one of them")
     zoomed = None if zoom is None else f"{zoom[0]}:{zoom[1]}"
-    options = {
-        "test": test,
-        "table": table,
-        "hammer": hammer,
-        "block": block,
-        "zoom": zoomed,
-        "window": window,
-        "sample-rate": sample_rate,
-        "overload": overload,
-        "limit": limit,
-        "seed": seed,
-    }
-    for name, value in options.items():
-        if value is not None:
-            shared.append(f"--{name}={os.fspath(value) if isinstance(value, os.PathLike) else value}")
-    if not diagnosis:
-        shared.append("--no-diagnosis")
-    tables = [f"--out={os.fspath(out)}"]
-    tables += [f"--{name}" for name, wanted in (("parquet", parquet), ("force", force)) if wanted]
+    shared = options_of(test=test, table=table, hammer=hammer, block=block, zoom=zoomed, window=window, seed=seed)
+    shared += options_of(sample_rate=sample_rate, overload=overload, limit=limit, no_diagnosis=not diagnosis)
+    tables = options_of(out=out, parquet=parquet, force=force, jobs=jobs if client is None else None)
     if client is not None:
         from . import _cluster
 
         _cluster.analyse(client, shared, tests, Path(out), tests_per_task, attempts)
         tables.append("--merge")
-    elif jobs is not None:
-        tables.append(f"--jobs={jobs}")
     # The program reads no list of names from the command line that is longer than the system allows.
     names = "" if table is not None else "\n".join(tests) + "\n"
     listing = [] if table is not None else ["--from=-"]

@@ -10,10 +10,10 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from . import _native
 from ._packages import package
@@ -36,6 +36,8 @@ class Part:
     number: int
     parts: int
     names: list[str]
+    #: True for each name that is a file on the client.
+    are_there: list[bool] = field(default_factory=list)
     attempts: int = 0
     bad_workers: list[str] = field(default_factory=list)
     problem: str = ""
@@ -47,7 +49,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Done:
-    """What a task gives: the part's journal, or the reason for which its worker could not make it."""
+    """What a task gives: the part's journal as far as it came, and the problem that ended it."""
 
     worker: str
     journal: bytes | None
@@ -60,13 +62,14 @@ def analyse(
     """Writes the journals of all parts into the folder ``out``.
 
     Raises:
-        InputError: Bad arguments, or workers with another version of tapjoint.
+        InputError: Bad arguments, or a folder with another number of parts.
         BatchError: Parts failed in all their attempts. All others are kept.
     """
     distributed = package("distributed")
     if size < 1 or attempts < 1:
         raise InputError("tests_per_task and attempts: give whole numbers of 1 or more")
-    check_versions(client)
+    if not client.nthreads():
+        client.wait_for_workers(1)
     has_table = any(argument.startswith("--table=") for argument in shared)
     listing = [] if has_table else ["--from=-"]
     given = "" if has_table else "".join(f"{test}\n" for test in tests)
@@ -77,20 +80,32 @@ def analyse(
         for part in parts:
             part.names = []
     out.mkdir(parents=True, exist_ok=True)
+    end = f"-of-{len(parts)}.jsonl"
+    others = [file.name for file in out.glob("batch-*-of-*.jsonl") if not file.name.endswith(end)]
+    if others:
+        raise InputError(
+            f"{out}: holds {min(others)}, and these tests have {len(parts)} parts; give the tests_per_task of the earlier "
+            "call, or another folder"
+        )
     waiting = iter(parts)
     running: dict[Future, Part] = {}
-    finished = distributed.as_completed()
+    finished = distributed.as_completed(loop=client.loop)
+    failed = []
 
     def begin(part: Part) -> None:
         future = submit(client, shared, part, out)
         running[future] = part
         finished.add(future)
 
-    threads = sum(client.nthreads().values()) or 1
-    for _ in range(WAITING * threads):
-        for part in _next(waiting):
+    def fill() -> None:
+        """Workers may come and go: their number is asked for each time."""
+        while len(running) < WAITING * (sum(client.nthreads().values()) or 1):
+            part = next(waiting, None)
+            if part is None:
+                return
             begin(part)
-    failed = []
+
+    fill()
     try:
         for future in finished:
             part = running.pop(future)
@@ -98,10 +113,9 @@ def analyse(
                 part.attempts += 1
                 if part.attempts < attempts:
                     begin(part)
-                    continue
-                failed.append(part)
-            for following in _next(waiting):
-                begin(following)
+                else:
+                    failed.append(part)
+            fill()
     finally:
         client.cancel(list(running))
     if failed:
@@ -114,21 +128,19 @@ def analyse(
 def parts_of(names: Sequence[str], size: int) -> list[Part]:
     """Cuts the tests into parts of nearly the same size: the program takes every n-th test of a table."""
     parts = min(-(-len(names) // size), MOST_PARTS)
-    return [Part(number + 1, parts, list(names[number::parts])) for number in range(parts)]
-
-
-def _next(waiting: Iterator[Part]) -> list[Part]:
-    """Returns the next part, or nothing after the last."""
-    return [part for part in [next(waiting, None)] if part is not None]
+    own = [list(names[number::parts]) for number in range(parts)]
+    return [Part(number, parts, some, [os.path.isfile(name) for name in some]) for number, some in enumerate(own, 1)]
 
 
 def submit(client: Client, shared: Sequence[str], part: Part, out: Path) -> Future:
-    """Begins a task on a worker on which it has not failed, if there is one."""
+    """Begins a task, on a worker on which it has not failed if there is one."""
     others = [worker for worker in client.nthreads() if worker not in part.bad_workers]
+    # Only a wish: a worker that is named here may be gone before the task begins.
+    wish = {"workers": others, "allow_other_workers": True} if part.bad_workers and others else {}
     journal = out / part.journal
     known = journal.read_bytes() if journal.exists() else b""
     future: Future = client.submit(
-        journal_of, list(shared), part, known, os.getcwd(), workers=others or None, pure=False
+        journal_of, list(shared), part, known, os.getcwd(), _native.__version__, pure=False, **wish
     )
     return future
 
@@ -141,19 +153,25 @@ def take(future: Future, part: Part, out: Path) -> bool:
         part.problem = f"{type(cause).__name__}: {cause}"
         part.bad_workers.append("the cluster")
         return False
-    if done.journal is None:
+    if done.journal is not None:
+        aside = out / f".{part.journal}.tmp"
+        aside.write_bytes(done.journal)
+        os.replace(aside, out / part.journal)
+    if done.problem:
         part.problem = done.problem
         part.bad_workers.append(done.worker)
-        return False
-    aside = out / f".{part.journal}.tmp"
-    aside.write_bytes(done.journal)
-    os.replace(aside, out / part.journal)
-    return True
+    return not done.problem
 
 
-def journal_of(shared: list[str], part: Part, known: bytes, folder: str) -> Done:
+def journal_of(shared: list[str], part: Part, known: bytes, folder: str, version: str) -> Done:
     """Analyses a part in a process of its own, on a worker. ``known`` is what an earlier call has found of it."""
     worker = package("distributed").get_worker().address
+    if version != _native.__version__:
+        problem = f"has tapjoint {_native.__version__}, and the client {version}; install the same version"
+        return Done(worker, None, problem)
+    for name, is_there in zip(part.names, part.are_there):
+        if is_there and not Path(folder, name).is_file():
+            return Done(worker, None, f"{name}: this worker does not see it")
     try:
         with tempfile.TemporaryDirectory(prefix="tapjoint-") as place:
             # A list of names is cut already, and a table is cut by the program.
@@ -164,24 +182,12 @@ def journal_of(shared: list[str], part: Part, known: bytes, folder: str) -> Done
             names = "".join(f"{name}\n" for name in part.names)
             listing = ["--from=-"] if part.names else []
             shard = [f"--shard={one.number}/{one.parts}", f"--out={place}", "--jobs=1", "--threads=1"]
-            program([*shared, *listing, *shard], names, folder)
-            return Done(worker, journal.read_bytes())
-    except (OSError, InputError) as cause:
-        # The arguments are known to be good: the fault is this worker's.
+            problem = ""
+            try:
+                program([*shared, *listing, *shard, "--json=-"], names, folder)
+            except InputError as cause:
+                # The arguments are known to be good: the fault is this worker's. What is finished counts.
+                problem = str(cause)
+            return Done(worker, journal.read_bytes() if journal.exists() else None, problem)
+    except OSError as cause:
         return Done(worker, None, str(cause))
-
-
-def check_versions(client: Client) -> None:
-    """Raises InputError where a worker lacks tapjoint, or has another version of it."""
-    if not client.nthreads():
-        client.wait_for_workers(1)
-    for worker, version in client.run(version_here).items():
-        if version != _native.__version__:
-            raise InputError(
-                f"{worker}: has tapjoint {version}, and this machine {_native.__version__}; install the same version"
-            )
-
-
-def version_here() -> Any:
-    """Returns the version of tapjoint on a worker."""
-    return _native.__version__

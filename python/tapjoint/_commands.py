@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Union
 
-import numpy as np
-
 from . import _native
 from ._arrays import whole
+from ._options import options_of, text_of
 from ._results import NoAnswerError, Result, Simulation
 from ._test import Test
 from .errors import InputError, TapjointWarning
@@ -48,14 +47,9 @@ class _Call:
         self.descriptions.append((path, test.text))
         return path
 
-    def add(self, **options: Any) -> None:
-        """Adds options: True is a flag, None and False are left out, and a list is one option with commas."""
-        for key, value in options.items():
-            if value is None or value is False:
-                continue
-            name = "--" + key.strip("_").replace("_", "-")
-            # The equals sign keeps a value that begins with a hyphen from being an option.
-            self.arguments.append(name if value is True else f"{name}={_text(value)}")
+    def add(self, **values: Any) -> None:
+        """Adds options, as :func:`options_of` writes them."""
+        self.arguments += options_of(**values)
 
     def run(self, threads: int | None, callers: int = 1) -> _native.Answer:
         """Runs the command. Its function, from which warnings come, is so many callers above this method."""
@@ -70,15 +64,6 @@ class _Call:
         if not result.is_answered:
             raise NoAnswerError(f"no answer: {_reason(result)}; look at `result` of this error for what was found", result)
         return result
-
-
-def _text(value: Any) -> str:
-    """Returns a value as the command line takes it."""
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return ",".join(_text(one) for one in value)
-    if isinstance(value, np.generic):
-        return _text(value.item())
-    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
 
 
 def _reason(result: Result) -> str:
@@ -329,6 +314,6 @@ def _planted(given: Mapping[str, Mapping[str, Any]] | Sequence[str]) -> list[str
     if not isinstance(given, Mapping):
         return list(given)
     return [
-        f"{name}:" + ",".join(f"{key}={_text(value)}" for key, value in sizes.items())
+        f"{name}:" + ",".join(f"{key}={text_of(value)}" for key, value in sizes.items())
         for name, sizes in given.items()
     ]

@@ -68,6 +68,8 @@ def limit_a_table_that_does_not_exist_is_named(alone):
 def limit_bad_arguments_have_the_message_of_the_program(tmp_path):
     with pytest.raises(tapjoint.InputError, match="there is no test"):
         tapjoint.batch([], out=tmp_path / "out")
+    with pytest.raises(tapjoint.InputError, match="paths and table"):
+        tapjoint.batch(["a.wav"], table="b.csv", out=tmp_path / "out")
     with pytest.raises(tapjoint.InputError, match="'flat' for '--window"):
         tapjoint.batch("a.wav", hammer=1, window="flat", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -88,28 +90,33 @@ def prop_a_cluster_gives_the_tables_of_one_machine(alone, cluster, recordings, t
     )
     assert _sums(found.folder) == _sums(alone.folder)
     assert found.summary == alone.summary
-    # Once more, all is known.
+    # Once more, all is known: no test could be analysed within a microsecond.
     again = tapjoint.batch(
-        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=5
+        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=5, limit=1e-6
     )
     assert _sums(again.folder) == _sums(alone.folder)
+    with pytest.raises(tapjoint.InputError, match="give the tests_per_task of the earlier"):
+        tapjoint.batch(_taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=3)
+
+
+def _kill_once(mark, dask_worker):
+    """Kills the worker that has the first task."""
+
+    def watch():
+        while not os.path.exists(mark):
+            if dask_worker.state.executing_count:
+                Path(mark).touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(1e-3)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def recover_a_batch_from_a_worker_that_is_killed(alone, cluster, recordings, tmp_path):
     """The first worker that has a task kills itself, once. Its nanny starts another one."""
     mark = tmp_path / "killed"
 
-    def kill_once(dask_worker):
-        def watch():
-            while not mark.exists():
-                if dask_worker.state.executing_count:
-                    mark.touch()
-                    os.kill(os.getpid(), signal.SIGKILL)
-                time.sleep(1e-3)
-
-        threading.Thread(target=watch, daemon=True).start()
-
-    cluster.run(kill_once)
+    cluster.run(_kill_once, str(mark))
     found = tapjoint.batch(
         _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=2
     )
@@ -123,13 +130,25 @@ def _full_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
-def recover_a_batch_from_a_worker_whose_disk_is_full(alone, cluster, recordings, tmp_path):
+def recover_a_batch_from_a_worker_whose_disk_is_full(alone, cluster, recordings, tmp_path, monkeypatch):
+    from tapjoint import _cluster
+
+    problems = []
+
+    def taken(future, part, out):
+        is_taken = take(future, part, out)
+        problems.append(part.problem)
+        return is_taken
+
+    take = _cluster.take
+    monkeypatch.setattr(_cluster, "take", taken)
     cluster.wait_for_workers(2)
     first = next(iter(cluster.nthreads()))
     cluster.run(_full_disk, workers=[first])
     found = tapjoint.batch(
         _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=2
     )
+    assert any(problems)
     assert _sums(found.folder) == _sums(alone.folder)
 
 
@@ -142,6 +161,19 @@ def limit_a_test_that_takes_too_long_is_a_row_and_is_tried_again(alone, cluster,
     assert len(rows) == 12 and all("--limit" in row["error"] for row in rows[:11])
     again = tapjoint.batch(_taps(recordings), **given)
     assert _sums(again.folder) == _sums(alone.folder)
+
+
+def recover_a_batch_from_the_only_worker_that_is_killed(alone, recordings, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as local, distributed.Client(local, set_as_default=False) as client:
+        client.run(_kill_once, str(tmp_path / "killed"))
+        found = tapjoint.batch(
+            _taps(recordings), hammer=1, out=tmp_path / "out", client=client, tests_per_task=3
+        )
+    assert (tmp_path / "killed").exists()
+    assert _sums(found.folder) == _sums(alone.folder)
 
 
 def limit_tasks_that_fail_everywhere_are_an_error_and_the_rest_is_kept(recordings, tmp_path):

@@ -310,7 +310,7 @@ fn better_numbering(
                     ..*mode
                 })
                 .collect();
-            // A numbering that fits no better than one that fails cannot explain the readings.
+            // A numbering whose quick fit is no better is left out. The full fit takes ten times as long.
             if quick_misfit(&modes) >= own_misfit {
                 continue;
             }

@@ -100,8 +100,8 @@ impl InputTable {
     /// With the feature `parquet` it may be a Parquet file. Its rows then count as lines, after a line of heads.
     ///
     /// # Errors
-    /// A Parquet file that cannot be read, or a line with another number of cells than the first, a missing column `file`, a column that stands twice, an empty
-    /// name of a file, or more than `most` rows.
+    /// A Parquet file cannot be read. A line has another number of cells than the first. The column `file` is missing, a column
+    /// stands twice, or a name is empty. There are more than `most` rows.
     pub fn parse(bytes: &[u8], name: &str, most: usize) -> Result<Self, TableError> {
         let error = |line: u64, problem: String| TableError {
             file: name.to_owned(),

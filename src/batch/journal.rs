@@ -1,7 +1,8 @@
 //! The journal of a batch: a line of JSON for each finished test.
 //!
 //! Lines are only appended. A process that is killed leaves at most one torn line, which is dropped. A line holds the key of
-//! a test, so the journal says which tests need not be analysed again. Of two lines with one key the newer counts.
+//! a test, so the journal says which tests need not be analysed again. Of several lines with one key the newest counts. A line of a
+//! finished test comes before any of an unfinished one.
 
 use crate::record::BatchRecord;
 use serde::{Deserialize, Serialize};
@@ -106,8 +107,8 @@ struct KeyPlace {
     is_final: bool,
     /// Distance from the beginning (bytes).
     offset: u64,
-    /// True once a test has asked for it.
-    is_asked: bool,
+    /// True once the batch has a record of this test.
+    is_replaced: bool,
 }
 
 /// Places of the records of a journal: 32 bytes a record.
@@ -138,7 +139,7 @@ impl Journal {
                     key: found.key.short(),
                     is_final: !found.again,
                     offset: journal.length,
-                    is_asked: false,
+                    is_replaced: false,
                 });
             }
             journal.length += count;
@@ -152,12 +153,17 @@ impl Journal {
     }
 
     /// Returns the place of the record of a test (bytes from the beginning). `None` of a test that is not in the journal, or
-    /// was not analysed to its end. The record counts as asked for.
-    pub fn place(&mut self, key: Key) -> Option<u64> {
-        let index = self.index(key)?;
-        let place = self.places.get_mut(index)?;
-        place.is_asked = true;
+    /// was not analysed to its end.
+    pub fn place(&self, key: Key) -> Option<u64> {
+        let place = self.places.get(self.index(key)?)?;
         place.is_final.then_some(place.offset)
+    }
+
+    /// Notes that the batch has a record of this test: [`others`](Self::others) leaves out the one that is here.
+    pub fn replace(&mut self, key: Key) {
+        if let Some(place) = self.index(key).and_then(|index| self.places.get_mut(index)) {
+            place.is_replaced = true;
+        }
     }
 
     /// Returns the place of the record of a test, also of one that was not analysed to its end.
@@ -173,11 +179,11 @@ impl Journal {
             .ok()
     }
 
-    /// Returns the places of the records that no test has asked for, ascending. Those of tests that were not analysed to
-    /// their end are left out.
+    /// Returns the places of the records that were not replaced, ascending. Those of tests that were not analysed to their
+    /// end are left out.
     pub fn others(&self) -> Vec<u64> {
         let others = self.places.iter();
-        let others = others.filter(|place| place.is_final && !place.is_asked);
+        let others = others.filter(|place| place.is_final && !place.is_replaced);
         let mut others: Vec<u64> = others.map(|place| place.offset).collect();
         others.sort_unstable();
         others
@@ -255,7 +261,7 @@ mod tests {
             ends.push(text.len());
         }
         for cut in 0..=text.len() {
-            let mut found = Journal::read(&text.as_bytes()[..cut]).unwrap();
+            let found = Journal::read(&text.as_bytes()[..cut]).unwrap();
             let whole = ends.iter().filter(|end| **end <= cut).count();
             assert_eq!(found.len(), whole.saturating_sub(1), "{cut}");
             let length = ends[..whole].last().copied().unwrap_or(0);
@@ -273,7 +279,7 @@ mod tests {
     fn limit_lines_of_other_content_are_passed_over() {
         let good = line(1, record("a", None));
         let text = format!("{JOURNAL_HEAD}\u{0}\u{0}\n{{\"key\":1}}\n{good}");
-        let mut found = Journal::read(text.as_bytes()).unwrap();
+        let found = Journal::read(text.as_bytes()).unwrap();
         assert_eq!((found.len(), found.length), (1, text.len() as u64));
         let place = found.place(key(1)).unwrap() as usize;
         assert_eq!(&text[place..], good);
@@ -303,6 +309,9 @@ mod tests {
         // A test that was not analysed to its end is tried again, and has a row where nothing better is there.
         assert_eq!(found.place(key(3)), None);
         assert_eq!(found.any_place(key(3)), Some(start(2)));
+        // A record is kept until the batch has another one.
+        assert_eq!(found.others(), [start(1), start(3)]);
+        found.replace(key(2));
         assert_eq!(found.others(), [start(1)]);
     }
 }

@@ -6,8 +6,8 @@
 //!
 //! [`answer`] is a pure function of the test's files, its description and the settings. It may run in any thread, process or
 //! machine. [`journal`] writes a record as one line of JSON and reads it back without loss. [`tables`] writes the records of
-//! all tests as CSV, and with the feature `parquet` `parquet_table` writes them as Parquet. [`summary`] gathers what all tests together show. Nothing here prints, and nothing but recordings is
-//! read from files.
+//! all tests as CSV. With the feature `parquet`, `parquet_table` writes them as Parquet. [`summary`] gathers what all tests
+//! together show. Nothing here prints, and nothing but recordings is read from files.
 
 mod answer;
 pub mod input_table;

@@ -246,17 +246,21 @@ fn analyse_all(
         let index = own[slot];
         done.analysed += usize::from(matches!(found, Found::Analysed { .. }));
         done.places[slot] = match found {
-            Found::Known(place) => place,
+            Found::Known { key, place } => {
+                journal.known().replace(key);
+                place
+            }
             Found::Analysed { key, prepared } => {
                 if let (Some(reports), Some(report)) = (&reports, &prepared.report) {
                     let name = tests.name(index);
                     reports.publish(index, &name, key, report, terminal.files())?;
                 }
-                journal.append(&JournalEntry {
-                    key,
-                    record: prepared.record,
-                    again: false,
-                })?
+                journal.known().replace(key);
+                // The key of a pipe does not hold its content.
+                let again = !tests.is_repeatable(index);
+                let key = if again { tests.key(index) } else { key };
+                let record = prepared.record;
+                journal.append(&JournalEntry { key, record, again })?
             }
             Found::Unfinished(error) => journal.append(&tests.unfinished(index, error))?,
         };
@@ -286,7 +290,7 @@ fn merged_places(
         );
         // The new record replaces an earlier one.
         if let Some(earlier) = earlier {
-            earlier.known().place(key);
+            earlier.known().replace(key);
         }
         let place = journals.place(index, key);
         place.or_else(|| journals.place(index, tests.bare_key(index)))

@@ -524,6 +524,57 @@ fn val_parquet_is_written_or_refused_with_the_remedy() {
 }
 
 #[test]
+fn regress_parts_with_a_folder_for_a_file_are_joined() {
+    let folder = tests();
+    let place = folder.path();
+    let table = "file\ntests/t00/high.wav\ntests\nno.wav\n";
+    fs::write(place.join("table.csv"), table).unwrap();
+    let given = ["--test", "tests/t00/test.toml", "--table", "table.csv"];
+    batch(place, &[&given[..], &["--out", "one"]].concat());
+    // More parts than tests: the last two need not be run.
+    let parts = [("1/5", 0), ("2/5", 1), ("3/5", 1)];
+    for (part, code) in parts {
+        let call = [&["batch"], &given[..], &["--out", "parts", "--shard", part]].concat();
+        tapjoint(place, &call, code);
+    }
+    batch(
+        place,
+        &[&given[..], &["--out", "parts", "--merge"]].concat(),
+    );
+    assert_eq!(tables(&place.join("parts")), tables(&place.join("one")));
+    // The remedy for a changed file names the parts that there are.
+    fs::copy(
+        place.join("tests/t01/high.wav"),
+        place.join("tests/t00/high.wav"),
+    )
+    .unwrap();
+    let error = refused(
+        place,
+        &[&given[..], &["--out", "parts", "--merge"]].concat(),
+        2,
+    );
+    assert!(error.contains("--shard I/5"), "{error}");
+}
+
+#[test]
+fn regress_a_report_that_takes_too_long_leaves_the_record() {
+    let folder = tests();
+    let place = folder.path();
+    batch(place, &["tests/t00"]);
+    let journal = place.join("batch-report/batch.jsonl");
+    let record = fs::read_to_string(&journal)
+        .unwrap()
+        .lines()
+        .nth(1)
+        .unwrap()
+        .to_owned();
+    refused(place, &["tests/t00", "--reports", "--limit", "1e-6"], 1);
+    assert!(fs::read_to_string(&journal).unwrap().contains(&record));
+    batch(place, &["tests/t00"]);
+    assert!(fs::read_to_string(&journal).unwrap().contains(&record));
+}
+
+#[test]
 fn limit_a_refused_call_writes_nothing() {
     let folder = tests();
     let place = folder.path();

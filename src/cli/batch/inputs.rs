@@ -35,8 +35,8 @@ pub(super) struct TestArguments {
     /// Description for recordings that have none
     #[arg(long, value_name = "TEST")]
     test: Option<PathBuf>,
-    /// Table (CSV) with a row for each test: a column `file`, columns named by keys of the description (`length`,
-    /// `sensor.A.position`), and others, which are carried into tests.csv
+    /// Table (CSV, or Parquet in a build with the feature `parquet`) with a row for each test: a column `file`, columns
+    /// named by keys of the description (`length`, `sensor.A.position`), and others, which are carried into tests.csv
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
 }
@@ -244,12 +244,17 @@ impl Tests {
         }
     }
 
-    /// Returns the key of a test. Of a pipe, which may hang and can be read only once, nothing is read.
+    /// Returns the key of a test. Of a description in a pipe, which may hang and can be read only once, nothing is read.
     pub(super) fn key(&self, test: usize) -> Key {
-        match fs::metadata(self.path(test)) {
-            Ok(found) if !found.is_file() => self.bare_key(test),
-            _ => self.load(test).key,
+        match is_description(&self.path(test)) && !self.is_repeatable(test) {
+            true => self.bare_key(test),
+            false => self.load(test).key,
         }
+    }
+
+    /// Returns false for a pipe or a device: its key does not hold its content.
+    pub(super) fn is_repeatable(&self, test: usize) -> bool {
+        fs::metadata(self.path(test)).map_or(true, |found| found.is_file() || found.is_dir())
     }
 
     /// Returns the key of a test of which nothing is read.
@@ -258,7 +263,7 @@ impl Tests {
             .key(&self.name(test), &self.carried(test), &[])
     }
 
-    /// Returns the names of these tests, a line each, as `--from` reads them.
+    /// Returns the names of these tests. `--from` reads such a list. Names of a table are seen from its folder.
     ///
     /// # Errors
     /// A name that no such list can hold.

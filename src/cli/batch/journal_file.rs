@@ -40,6 +40,11 @@ impl Known {
         Some(Place { journal: 0, offset })
     }
 
+    /// Notes that the batch has a record of this test.
+    pub(super) fn replace(&self, key: Key) {
+        self.journal().replace(key);
+    }
+
     /// A panic elsewhere leaves the places as they are.
     fn journal(&self) -> MutexGuard<'_, Journal> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -127,7 +132,7 @@ impl JournalFile {
         self.known.clone()
     }
 
-    /// Returns the places of the records that no test has asked for: those of other batches.
+    /// Returns the places of the records that were not replaced: those of other batches.
     pub(super) fn others(&self) -> Vec<Place> {
         let others = self.known.journal().others().into_iter();
         others.map(|offset| Place { journal: 0, offset }).collect()
@@ -188,6 +193,8 @@ fn read_line(file: impl Read + Seek, place: Place, path: &Path) -> anyhow::Resul
 /// The journals of all parts.
 #[derive(Debug)]
 pub(super) struct ShardJournals {
+    parts: usize,
+    /// A part without tests need not have one.
     journals: Vec<PartJournal>,
 }
 
@@ -229,18 +236,18 @@ impl ShardJournals {
                 listed(&missing)
             );
         }
-        Ok(Self { journals })
+        Ok(Self { parts, journals })
     }
 
     /// Returns the number of parts.
     pub(super) fn parts(&self) -> usize {
-        self.journals.len()
+        self.parts
     }
 
     /// Returns the place of a test's record. The journal of its own part comes first.
     pub(super) fn place(&self, test: usize, key: Key) -> Option<Place> {
         let own = test % self.parts();
-        let others = (0..self.parts()).filter(|journal| *journal != own);
+        let others = (0..self.journals.len()).filter(|journal| *journal != own);
         [own].into_iter().chain(others).find_map(|journal| {
             let offset = self.journals[journal].found.any_place(key)?;
             let journal = u32::try_from(journal).ok()?;

@@ -47,7 +47,12 @@ pub(super) struct Work {
 #[derive(Debug)]
 pub(super) enum Found {
     /// The journal has its record.
-    Known(Place),
+    Known {
+        /// Its key.
+        key: Key,
+        /// Place of its record.
+        place: Place,
+    },
     /// It was analysed now.
     Analysed {
         /// Its key.
@@ -289,7 +294,7 @@ impl Workers {
         let seconds = limit.as_secs_f64();
         if self.left > MOST_LEFT {
             bail!(
-                "{} tests hang, which takes longer than {seconds} s (--limit); what is finished is kept: find out why they hang, and run again",
+                "{} tests still run after {seconds} s (--limit). Finished tests are kept. Find out why these hang, then run again",
                 self.left
             );
         }
@@ -386,7 +391,7 @@ impl Work {
             let name = self.tests.name(index);
             let has_report = |reports: &Reports| test.is_err() || reports.has(index, &name, key);
             if self.reports.as_ref().is_none_or(has_report) {
-                return Found::Known(place);
+                return Found::Known { key, place };
             }
         }
         let settings = &self.tests.settings;

@@ -120,25 +120,29 @@ impl Candidates<'_> {
         if !added.is_empty() {
             (accepted, fits) = self.settled(&mut starts, &mut added, &settings);
         }
-        let mut misfits: Vec<&ModeFit> = fits.iter().flatten().collect();
+        let fitted = fits.iter().enumerate();
+        let fitted = fitted.filter_map(|(index, fit)| Some((index, fit.as_ref().ok()?)));
+        let mut misfits: Vec<(usize, &ModeFit)> = fitted.collect();
         // Taps that scatter leave more than noise as well, and their interval rests on that already.
-        misfits.retain(|fit| {
+        misfits.retain(|(_, fit)| {
             let steady = fit.frequency.source == UncertaintySource::Residual;
             fit.inflation > 1.0 || (steady && fit.residual_correlation > 0.0)
         });
-        misfits.sort_by(|a, b| {
+        misfits.sort_by(|(_, a), (_, b)| {
             let inflations = b.inflation.total_cmp(&a.inflation);
             inflations.then(b.residual_correlation.total_cmp(&a.residual_correlation))
         });
-        for fit in misfits.into_iter().take(MOST_MISFITS) {
+        for (index, fit) in misfits.into_iter().take(MOST_MISFITS) {
             // One pole may leave more than noise, and no search proposed a second: it is looked for half a width away.
             // Whatever its shape, the interval holds it too.
             let (frequency, ratio) = (fit.frequency.value, fit.damping_ratio.value);
             let near = |pole: &ModeFit| {
                 (pole.frequency.value - frequency).abs() < APART * ratio * frequency
             };
-            let known = pairs.iter().flatten().any(near);
-            for side in [-0.5, 0.5].iter().filter(|_| !known) {
+            if pairs.iter().flatten().any(near) || !accepted.has_room_beside(index, fit) {
+                continue;
+            }
+            for side in [-0.5, 0.5] {
                 let (test, _) = accepted.test(&PoleStart {
                     frequency: frequency * (1.0 + side * ratio),
                     damping_ratio: Some(ratio),

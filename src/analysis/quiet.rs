@@ -5,9 +5,7 @@ use tapjoint_signal::modal::fit::SteadyLine;
 use tapjoint_signal::modal::{
     GridFrequency, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, near_mains,
 };
-use tapjoint_signal::spectral::{
-    AveragedSpectra, Lines, Window, line_amplitude, noise_beside, noise_power,
-};
+use tapjoint_signal::spectral::{AveragedSpectra, Lines, Window, line_and_noise, noise_power};
 
 /// Hum is looked for within this many half widths (zeta f) of a resonance plus this many lines: the band of its fit.
 const HUM_REACH: (f64, f64) = (10.0, 12.0);
@@ -101,10 +99,11 @@ impl PreTriggerNoise {
             true => grid.multiple(number),
             false => frequency,
         };
+        let (before, noise) = line_and_noise(samples, self.sample_rate, place)?;
         let amplitudes = LineAmplitudes {
-            before: line_amplitude(samples, self.sample_rate, place)?,
+            before,
             within,
-            noise: noise_beside(samples, self.sample_rate, place)?,
+            noise,
         };
         let harmonic = grid.nominal * number as f64;
         amplitudes.is_steady(settings).then_some(harmonic)
@@ -142,12 +141,14 @@ impl PreTriggerNoise {
                 found.extend((first..=last).map(|number| grid.line(number)));
             }
         }
-        found.retain(|line: &SteadyLine| {
+        // Readings near each other have lines in common.
+        found.sort_by(|a: &SteadyLine, b| a.frequency.total_cmp(&b.frequency));
+        found.dedup();
+        found.retain(|line| {
             self.responses.iter().any(|samples| {
                 let samples = &samples[samples.len().saturating_sub(MOST_QUIET)..];
-                let before = line_amplitude(samples, self.sample_rate, line.frequency);
-                let noise = noise_beside(samples, self.sample_rate, line.frequency);
-                (before.zip(noise)).is_some_and(|(line, noise)| line > settings.over_noise * noise)
+                let found = line_and_noise(samples, self.sample_rate, line.frequency);
+                found.is_some_and(|(line, noise)| line > settings.over_noise * noise)
             })
         });
         found.extend(labelled);

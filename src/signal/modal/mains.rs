@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 use super::ModeReading;
 use super::fit::{ModeFit, SteadyLine};
-use crate::spectral::{line_amplitudes, noise_beside};
+use crate::spectral::{line_amplitudes, line_and_noise};
 
 /// Frequencies of the grids of the world (Hz).
 pub const GRIDS: [f64; 2] = [50.0, 60.0];
@@ -203,7 +203,7 @@ fn strongest(
             0.0
         };
         let frequency = place + shift.clamp(-1.0, 1.0) * step;
-        let noise = noise_beside(samples, sample_rate, frequency)?;
+        let (_, noise) = line_and_noise(samples, sample_rate, frequency)?;
         let height = levels[highest] / noise.max(f64::MIN_POSITIVE);
         if best.is_none_or(|(_, most)| height > most) {
             best = Some((frequency, height));

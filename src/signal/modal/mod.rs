@@ -48,10 +48,52 @@ struct Subspace<T> {
     columns: DMatrix<T>,
 }
 
+/// Rows that products of tall matrices take at once. 1024: the rows of a few columns stay in the cache nearest to a core
+/// while they meet those of many.
+const ROWS_AT_ONCE: usize = 1024;
+
+/// Returns left' right of tall matrices.
+fn products<T, C: Dim>(left: &DMatrix<T>, right: &OMatrix<T, Dyn, C>) -> OMatrix<T, Dyn, C>
+where
+    T: ComplexField<RealField = f64>,
+    DefaultAllocator: Allocator<Dyn, C>,
+{
+    let columns = right.shape_generic().1;
+    let mut sums = OMatrix::zeros_generic(Dyn(left.ncols()), columns);
+    for first in (0..left.nrows()).step_by(ROWS_AT_ONCE) {
+        let rows = ROWS_AT_ONCE.min(left.nrows() - first);
+        let (left, right) = (left.rows(first, rows), right.rows(first, rows));
+        sums.gemm_ad(T::one(), &left, &right, T::one());
+    }
+    sums
+}
+
 impl<T: ComplexField<RealField = f64>> Subspace<T> {
     /// Orthonormalises columns by Gram and Schmidt's method. A column is left out where less than the share
     /// `distinct` of its length lies outside the columns before it.
     fn new(raw: &DMatrix<T>, distinct: f64) -> Self {
+        Self::none(raw.nrows()).added(raw, distinct)
+    }
+
+    /// Returns the space without a direction.
+    fn none(rows: usize) -> Self {
+        Subspace {
+            columns: DMatrix::zeros(rows, 0),
+        }
+    }
+
+    /// Returns the space that this and another span, whose columns are orthonormal to this one's.
+    fn with(&self, other: &Self) -> Self {
+        let (own, all) = (self.rank(), self.rank() + other.rank());
+        let mut columns = self.columns.clone().resize_horizontally(all, T::zero());
+        columns
+            .columns_mut(own, other.rank())
+            .copy_from(&other.columns);
+        Subspace { columns }
+    }
+
+    /// Returns what columns add to this space, as [`new`](Self::new).
+    fn added(&self, raw: &DMatrix<T>, distinct: f64) -> Self {
         let mut kept: Vec<DVector<T>> = Vec::new();
         for column in raw.column_iter() {
             let length = column.norm();
@@ -61,13 +103,14 @@ impl<T: ComplexField<RealField = f64>> Subspace<T> {
             let mut rest = column.unscale(length);
             // The second pass removes the rounding of nearly dependent columns.
             for _ in 0..2 {
+                rest = self.complement(rest);
                 for other in &kept {
                     let share = other.dotc(&rest);
                     rest.axpy(-share, other, T::one());
                 }
             }
             let remains = rest.norm();
-            if remains > distinct && kept.len() + 1 < raw.nrows() {
+            if remains > distinct && self.rank() + kept.len() + 1 < raw.nrows() {
                 kept.push(rest.unscale(remains));
             }
         }
@@ -86,7 +129,7 @@ impl<T: ComplexField<RealField = f64>> Subspace<T> {
         DefaultAllocator: Allocator<Dyn, C>,
     {
         if self.rank() > 0 {
-            let shares = self.columns.ad_mul(&columns);
+            let shares = products(&self.columns, &columns);
             columns.gemm(-T::one(), &self.columns, &shares, T::one());
         }
         columns

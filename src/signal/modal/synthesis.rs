@@ -21,7 +21,9 @@
 //! |H measured - H|^2/sqrt(N + |H measured|^2)
 //! ```
 //!
-//! over the lines. N is the noise power of the function about each line ([`noise_of_function`]). A function may span five
+//! over the lines. A form multiplies a line's equations by s^k: its phase turns real and imaginary part into each other,
+//! which changes no sum, and its magnitude is a weight. All forms so share their columns, and H/s^k is fitted with the
+//! weight |s|^k. N is the noise power of the function about each line ([`noise_of_function`]). A function may span five
 //! decades. Without weights the errors at its highest peaks, a few percent of them, hide its low modes. Weights by
 //! relative errors let the many lines between the peaks decide, and one mode that is not listed then spoils the peaks
 //! of all others. The root lies halfway. U and L are complex: damped modes outside the lines and a delay of the sensor
@@ -112,23 +114,16 @@ impl SynthesisLines<'_> {
             Some(ref form) => std::slice::from_ref(form),
             None => &ResponseForm::ALL,
         };
-        let mut best: Option<(f64, Synthesis)> = None;
-        for &form in forms {
-            let Some(mut found) = self.of_form(form, function, &weights) else {
-                continue;
-            };
-            let (mut left, mut cost) = (0.0, 0.0);
-            for ((value, own), weight) in function.iter().zip(&found.values).zip(&weights) {
-                left += (value - own).norm_sqr();
-                cost += (value - own).norm_sqr() * weight;
-            }
-            found.left = left / all;
-            let is_better = best.as_ref().is_none_or(|(least, _)| cost < *least);
-            if found.left.is_finite() && is_better {
-                best = Some((cost, found));
-            }
-        }
-        best.map(|(_, found)| found)
+        let solutions = self.solutions(forms, function, &weights);
+        let pairs = forms.iter().zip(solutions);
+        let sound = pairs.filter_map(|(form, solution)| Some((*form, solution?)));
+        let least = sound.min_by(|(_, a), (_, b)| a.cost.total_cmp(&b.cost));
+        let (form, solution) = least?;
+        let found = self.of_solution(form, &solution.unknowns);
+        let pairs = function.iter().zip(&found.values);
+        let left: f64 = pairs.map(|(value, own)| (value - own).norm_sqr()).sum();
+        let left = left / all;
+        left.is_finite().then_some(Synthesis { left, ..found })
     }
 
     /// Number of real unknowns of one function.
@@ -141,103 +136,143 @@ impl SynthesisLines<'_> {
         TAU * self.frequencies.last().copied().unwrap_or(1.0)
     }
 
-    /// Returns the complex columns of one line: each unknown's part of the function, in units of [`Self::scale`].
-    fn columns(&self, form: ResponseForm, frequency: f64) -> Vec<Complex64> {
+    /// Puts each unknown's part of the receptance on one line into `columns`, in units of [`Self::scale`].
+    fn fill_columns(&self, frequency: f64, columns: &mut [Complex64]) {
         let scale = self.scale();
-        let s = Complex64::new(self.added_decay, TAU * frequency) / scale;
-        let order = form.derivatives();
-        let power = s.powi(order);
-        let mut columns = Vec::with_capacity(self.unknowns());
-        for pole in self.poles {
+        let s = self.place(frequency);
+        let of_poles = columns.chunks_exact_mut(2);
+        let poles = self.poles.iter().map(|pole| {
             let pole = pole / scale;
-            let own = power / (s - pole);
-            let image = power / (s - pole.conj());
-            columns.push(own + image);
-            columns.push(Complex64::i() * (own - image));
+            let (own, image) = ((s - pole).inv(), (s - pole.conj()).inv());
+            [own + image, Complex64::i() * (own - image)]
+        });
+        let terms = [Complex64::ONE, s.powi(-2)].map(|term| [term, Complex64::i() * term]);
+        for (columns, own) in of_poles.zip(poles.chain(terms)) {
+            columns.copy_from_slice(&own);
         }
-        for term in [power, s.powi(order - 2)] {
-            columns.push(term);
-            columns.push(Complex64::i() * term);
-        }
-        columns
     }
 
-    /// Fits a function of one form, without the share that is left; `None` without an answer.
-    fn of_form(
-        &self,
-        form: ResponseForm,
-        function: &[Complex64],
-        weights: &[f64],
-    ) -> Option<Synthesis> {
-        let solution = self.solution(form, function, weights)?;
-        let complex: Vec<Complex64> = solution
+    /// Returns s of a line, in units of [`Self::scale`].
+    fn place(&self, frequency: f64) -> Complex64 {
+        Complex64::new(self.added_decay, TAU * frequency) / self.scale()
+    }
+
+    /// Returns the curve of the unknowns of one form, without the share that is left.
+    fn of_solution(&self, form: ResponseForm, unknowns: &DVector<f64>) -> Synthesis {
+        let complex: Vec<Complex64> = unknowns
             .as_slice()
             .chunks_exact(2)
             .map(|pair| Complex64::new(pair[0], pair[1]))
             .collect();
         let (residues, terms) = complex.split_at(self.poles.len());
         let (scale, order) = (self.scale(), form.derivatives());
+        let mut columns = vec![Complex64::ZERO; self.unknowns()];
         let values = self.frequencies.iter().map(|&frequency| {
-            let columns = self.columns(form, frequency).into_iter();
-            columns
-                .zip(solution.iter())
-                .map(|(part, by)| part * by)
-                .sum()
+            self.fill_columns(frequency, &mut columns);
+            let parts = columns.iter().zip(unknowns.iter());
+            self.place(frequency).powi(order) * parts.map(|(part, by)| part * by).sum::<Complex64>()
         });
-        Some(Synthesis {
+        Synthesis {
             form,
             values: values.collect(),
             residues: residues.iter().map(|r| r * scale.powi(1 - order)).collect(),
             upper: terms[0] * scale.powi(-order),
             lower: terms[1] * scale.powi(2 - order),
             left: 0.0,
-        })
+        }
     }
 
-    /// Solves for the unknowns; `None` without an answer.
+    /// Solves for the unknowns of each form; `None` for a form without an answer.
     ///
     /// The weighted columns X = Q R are factorised piece by piece: below the R of all earlier lines stand the next ones.
-    fn solution(
+    fn solutions(
         &self,
-        form: ResponseForm,
+        forms: &[ResponseForm],
         function: &[Complex64],
         weights: &[f64],
-    ) -> Option<DVector<f64>> {
+    ) -> Vec<Option<Solution>> {
         let unknowns = self.unknowns();
-        let mut upper = DMatrix::zeros(0, unknowns);
-        let mut shares: DVector<f64> = DVector::zeros(0);
+        let mut equations = vec![Equations::none(unknowns); forms.len()];
+        let mut columns = DMatrix::zeros(unknowns, MOST_LINES.min(function.len()));
         for first in (0..function.len()).step_by(MOST_LINES) {
             let lines = first..function.len().min(first + MOST_LINES);
-            let known = upper.nrows();
-            let rows = known + 2 * lines.len();
-            let mut model = upper.resize(rows, unknowns, 0.0);
-            let mut data = shares.resize_vertically(rows, 0.0);
-            for (index, line) in lines.enumerate() {
-                let row = known + 2 * index;
-                let root = weights[line].sqrt();
-                let columns = self.columns(form, self.frequencies[line]);
-                for (place, value) in columns.into_iter().enumerate() {
-                    model[(row, place)] = value.re * root;
-                    model[(row + 1, place)] = value.im * root;
-                }
-                data[row] = function[line].re * root;
-                data[row + 1] = function[line].im * root;
+            for (mut column, line) in columns.column_iter_mut().zip(lines.clone()) {
+                self.fill_columns(self.frequencies[line], column.as_mut_slice());
             }
-            let factors = model.qr();
-            factors.q_tr_mul(&mut data);
-            upper = factors.r();
-            shares = data.resize_vertically(upper.nrows(), 0.0);
+            for (equations, form) in equations.iter_mut().zip(forms) {
+                let known = equations.upper.nrows();
+                let rows = known + 2 * lines.len();
+                let mut model = equations.upper.clone().resize(rows, unknowns, 0.0);
+                let mut data = equations.shares.clone().resize_vertically(rows, 0.0);
+                for (line, columns) in lines.clone().zip(columns.column_iter()) {
+                    let row = known + 2 * (line - first);
+                    let s = self.place(self.frequencies[line]).powi(form.derivatives());
+                    let root = weights[line].sqrt() * s.norm();
+                    let value = function[line] / s * root;
+                    data[row] = value.re;
+                    data[row + 1] = value.im;
+                    for (place, value) in columns.iter().enumerate() {
+                        model[(row, place)] = value.re * root;
+                        model[(row + 1, place)] = value.im * root;
+                    }
+                }
+                equations.take(model, data);
+            }
         }
-        let lengths: Vec<f64> = upper.column_iter().map(|column| column.norm()).collect();
-        for (mut column, length) in upper.column_iter_mut().zip(&lengths) {
+        equations.into_iter().map(Equations::solved).collect()
+    }
+}
+
+/// Unknowns of a form, and the weighted sum of the squares that they leave.
+struct Solution {
+    unknowns: DVector<f64>,
+    cost: f64,
+}
+
+/// Equations of one form: R and Q'Y of all lines so far, and the sum of the squares that no unknowns explain.
+#[derive(Clone)]
+struct Equations {
+    upper: DMatrix<f64>,
+    shares: DVector<f64>,
+    left: f64,
+}
+
+impl Equations {
+    fn none(unknowns: usize) -> Self {
+        Equations {
+            upper: DMatrix::zeros(0, unknowns),
+            shares: DVector::zeros(0),
+            left: 0.0,
+        }
+    }
+
+    /// Takes the rows of more lines, which stand below its own.
+    fn take(&mut self, model: DMatrix<f64>, mut data: DVector<f64>) {
+        let factors = model.qr();
+        factors.q_tr_mul(&mut data);
+        self.upper = factors.r();
+        let known = self.upper.nrows();
+        self.left += data.rows(known, data.nrows() - known).norm_squared();
+        self.shares = data.resize_vertically(known, 0.0);
+    }
+
+    fn solved(mut self) -> Option<Solution> {
+        let lengths: Vec<f64> = (self.upper.column_iter())
+            .map(|column| column.norm())
+            .collect();
+        for (mut column, length) in self.upper.column_iter_mut().zip(&lengths) {
             column.unscale_mut(length.max(f64::MIN_POSITIVE));
         }
-        let parts = upper.try_svd(true, true, f64::EPSILON, MOST_STEPS)?;
+        let parts = self
+            .upper
+            .clone()
+            .try_svd(true, true, f64::EPSILON, MOST_STEPS)?;
         let least = DISTINCT * parts.singular_values.max();
-        let mut solution = parts.solve(&shares, least).ok()?;
-        for (value, length) in solution.iter_mut().zip(&lengths) {
+        let mut unknowns = parts.solve(&self.shares, least).ok()?;
+        let cost = self.left + (self.shares - self.upper * &unknowns).norm_squared();
+        for (value, length) in unknowns.iter_mut().zip(&lengths) {
             *value /= length.max(f64::MIN_POSITIVE);
         }
-        Some(solution)
+        cost.is_finite().then_some(Solution { unknowns, cost })
     }
 }

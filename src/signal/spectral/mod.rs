@@ -19,7 +19,7 @@ pub use transform::{BandLimiter, Transformer, Workspace, transform_block};
 pub(crate) use window::line_amplitudes;
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,
-    line_amplitude, measure_decay, noise_beside, noise_power,
+    line_and_noise, measure_decay, noise_power,
 };
 
 /// Reason why a spectrum is impossible.

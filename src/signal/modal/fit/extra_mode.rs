@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use tapjoint_numerics::stats::root_mean_square;
 
-use super::group::{Accepted, BandData, Group, GroupFit};
+use super::group::{Accepted, BandData, Group};
 use super::mode_fit::ModeFit;
 use super::{PoleStart, Unfit};
 
@@ -22,7 +22,7 @@ pub struct ExtraMode {
     /// the second pole may only correct a decay that is not straight: one mode whose frequency changes while
     /// it rings. The two poles' shares of a tap then depend on the tap's strength, which is no other shape.
     pub likeness: Option<f64>,
-    /// Fit of the mode together with the others.
+    /// Fit of the mode together with the others, where noise alone does not explain it.
     pub fit: Result<ModeFit, Unfit>,
     /// Fit of the nearest other mode of its group beside it.
     pub neighbour: Option<ModeFit>,
@@ -36,6 +36,8 @@ const LEVEL: f64 = 1e-4;
 const HOPELESS: f64 = 0.01;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
+/// Terms of a polynomial that stand for a broad pole. 4: such a pole has one maximum in the band, at any place.
+const BROAD_TERMS: usize = 4;
 /// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
 /// thousand of them, too many to fit for every chance proposal. On one line in s an amplitude has sqrt(s)
 /// times its standard deviation, so that a mode that only all lines together show is not found.
@@ -51,7 +53,12 @@ impl Accepted<'_> {
     pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
         let (test, mut together, stride) = self.test_on(extra, SCREENED);
         if test.needed && stride > 1 {
-            let (test, together, _) = self.test_on(extra, usize::MAX);
+            // From the pole of the thinned lines it is not far.
+            let start = test.fit.as_ref().map_or(*extra, |fit| PoleStart {
+                frequency: fit.frequency.value,
+                damping_ratio: Some(fit.damping_ratio.value),
+            });
+            let (test, together, _) = self.test_on(&start, usize::MAX);
             return (test, together);
         }
         together.most_lines = usize::MAX;
@@ -62,35 +69,34 @@ impl Accepted<'_> {
     fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
         let mut beside = self.clone();
         beside.most_lines = most_lines;
-        let group = beside.add(extra);
-        let mut fits = group
-            .as_ref()
-            .map(|group| beside.read(std::slice::from_ref(group)));
         let last = self.modes.len();
         let mut test = ExtraMode {
             needed: false,
             probability: 1.0,
             likeness: None,
-            fit: match &mut fits {
-                Some(fits) => fits.swap_remove(last),
-                None => Err(beside.modes[last].reason()),
-            },
+            fit: Err(Unfit::Unneeded),
             neighbour: None,
         };
-        let stride = group
-            .as_ref()
-            .map_or(1, |group| group.fit.problem.lines.stride);
-        if let (Some(group), Ok(mode)) = (&group, &test.fit)
-            && let Some(place) = group.members.iter().position(|&index| index == last)
-            && let Some((probability, information_gain)) = beside.gain_of(group, place)
-        {
+        let Some(group) = beside.add(extra) else {
+            test.fit = Err(beside.modes[last].reason());
+            return (test, beside, 1);
+        };
+        let stride = group.fit.problem.lines.stride;
+        let place = group.members.iter().position(|&index| index == last);
+        let gain = place.and_then(|place| Some((place, beside.gain_of(&group, place)?)));
+        if let Some((place, (probability, information_gain))) = gain {
             test.probability = probability;
-            if let Some(nearest) = group.fit.nearest(place) {
-                test.likeness = group.fit.likeness(self.data, place, nearest);
-                let index = group.members[nearest];
-                test.neighbour = fits.and_then(|mut fits| fits.swap_remove(index).ok());
+            let nearest = group.fit.nearest(place);
+            test.likeness =
+                nearest.and_then(|nearest| group.fit.likeness(self.data, place, nearest));
+            // Reading the modes takes long: only those that may be needed are read.
+            if probability < LEVEL && information_gain > 0.0 {
+                let mut fits = beside.read(std::slice::from_ref(&group));
+                test.fit = fits.swap_remove(last);
+                let neighbour = nearest.map(|nearest| fits.swap_remove(group.members[nearest]));
+                test.neighbour = neighbour.and_then(Result::ok);
+                test.needed = (test.fit.as_ref()).is_ok_and(is_clear);
             }
-            test.needed = is_needed(mode, probability, information_gain);
         }
         (test, beside, stride)
     }
@@ -104,10 +110,40 @@ impl Accepted<'_> {
         // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
         let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
         let without = match fewer.is_empty() {
-            true => band.square_sum_without(fit.terms, &fit.noise),
+            true => with.problem.columns.norm_squared(),
             false => band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum,
         };
-        gain(&band, &with, without)
+        gain(&band, with.at.square_sum, with.freedom, without)
+    }
+
+    /// Returns false where the data would not ask for a second pole beside the fitted mode of start `index`, wherever it is:
+    /// [`test`](Self::test) would be in vain.
+    ///
+    /// A second pole nearby adds about the derivatives of the function of the first, and a broad one a polynomial. All
+    /// these with free amplitudes leave no more residual for each degree of freedom than that pole does.
+    pub fn has_room_beside(&self, index: usize, mode: &ModeFit) -> bool {
+        let thinned = Accepted {
+            most_lines: SCREENED,
+            ..self.clone()
+        };
+        let band = BandData::new(&thinned, &mode.joint_with).ok();
+        let found = band.and_then(|band| {
+            let noise = self.noise(&mode.joint_with, &band.used)?;
+            let poles = self.poles(&mode.joint_with);
+            let problem = band.problem(mode.background_terms, &noise);
+            let without = problem.amplitudes_at(&poles)?.square_sum;
+            let freedom = band.freedom(&problem.fixed, poles.len() + 1).ok()?;
+            let terms = mode.background_terms..mode.background_terms + BROAD_TERMS;
+            let mut wider = problem.beside(&band.lines.polynomial(terms));
+            for columns in band.lines.derivatives(self.poles(&[index])[0]) {
+                wider = wider.beside(&columns);
+            }
+            // Noise that so many columns explain would be left beside a pole.
+            let left = band.freedom(&wider.fixed, poles.len() + 1).ok()?;
+            let with = wider.amplitudes_at(&poles)?.square_sum * freedom / left;
+            gain(&band, with, freedom, without)
+        });
+        found.is_none_or(|(probability, gain)| probability < LEVEL && gain > 0.0)
     }
 
     /// Returns true where the data ask for the fitted mode of start `index`, all other poles being as they are.
@@ -122,7 +158,7 @@ impl Accepted<'_> {
             let noise = self.noise(members, &band.used)?;
             self.gain_at(&band, members, place, mode.background_terms, &noise)
         });
-        gain.is_some_and(|(probability, gain)| is_needed(mode, probability, gain))
+        gain.is_some_and(|(probability, gain)| probability < LEVEL && gain > 0.0 && is_clear(mode))
     }
 
     /// Compares the fits with and without the pole at `place` of a group, all poles being as they are, as [`gain`].
@@ -137,12 +173,14 @@ impl Accepted<'_> {
         let poles = self.poles(members);
         let mut fewer = poles.clone();
         fewer.remove(place);
-        let with = band.search(&poles, terms, noise, 0).ok()?;
+        let problem = band.problem(terms, noise);
+        let freedom = band.freedom(&problem.fixed, poles.len()).ok()?;
+        let with = problem.amplitudes_at(&poles)?.square_sum;
         let without = match fewer.is_empty() {
-            true => band.square_sum_without(terms, noise),
-            false => band.search(&fewer, terms, noise, 0).ok()?.at.square_sum,
+            true => problem.columns.norm_squared(),
+            false => problem.amplitudes_at(&fewer)?.square_sum,
         };
-        gain(band, &with, without)
+        gain(band, with, freedom, without)
     }
 
     /// Returns false where a mode that has just been added will not be needed, so that more sweeps are vain.
@@ -159,30 +197,28 @@ impl Accepted<'_> {
     }
 }
 
-/// Compares two fits of a group's band, one `with` a pole and one without it, which leaves the sum of squares `without`.
-/// Returns the probability of a larger fall of the residual by noise alone at one given place, and the fall of Schwarz's
-/// criterion.
+/// Compares two fits of a group's band: one `with` a pole, of so much freedom, and one `without` it. Both are given by the
+/// sums of squares that they leave. Returns the probability of a larger fall of the residual by noise alone at one given
+/// place, and the fall of Schwarz's criterion.
 ///
 /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
 /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
 /// n ln S + k ln n.
-fn gain(band: &BandData, with: &GroupFit, without: f64) -> Option<(f64, f64)> {
+fn gain(band: &BandData, with: f64, freedom: f64, without: f64) -> Option<(f64, f64)> {
     let columns = band.used.len() as f64;
     let unknowns = 2.0 + 2.0 * columns;
     let values = 2.0 * band.lines.count() as f64 * columns;
-    let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
-    let fall = (without - with.at.square_sum) / unknowns / with.variance;
+    let chance = FisherSnedecor::new(unknowns, freedom).ok()?;
+    let fall = (without - with) / unknowns / (with / freedom);
     let probability = if fall > 0.0 { chance.sf(fall) } else { 1.0 };
-    let criterion = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
+    let criterion = values * (without / with).ln() - unknowns * values.ln();
     Some((probability, criterion))
 }
 
-/// Returns true where noise alone does not explain the fall of the residual, and the mode is certain to decay.
-fn is_needed(mode: &ModeFit, probability: f64, information_gain: f64) -> bool {
+/// Returns true where the amplitudes of a mode stand out of the noise, and it is certain to decay.
+fn is_clear(mode: &ModeFit) -> bool {
     let amplitudes = mode.amplitudes.iter();
     let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
-    probability < LEVEL
-        && information_gain > 0.0
-        && root_mean_square(&ratios) > LEAST_AMPLITUDE
+    root_mean_square(&ratios) > LEAST_AMPLITUDE
         && mode.damping_ratio.value > 2.0 * mode.damping_ratio.std
 }

@@ -5,16 +5,17 @@
 //! Distant modes are subtracted, near ones keep free amplitudes, and a polynomial of the frequency stands for
 //! everything else that the data show in the band.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-use tapjoint_numerics::stats::chi_square_tail;
 
-use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, Slopes, half_width};
-use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
+use super::group_fit::GroupFit;
+use super::variable_projection::{Lines, PoleProblem, half_width};
+use super::{Basis, FitSettings, ModalData, PoleStart, Unfit};
 use crate::modal::Subspace;
 
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
@@ -28,18 +29,11 @@ const LEAST_HALF: f64 = 12.0;
 const JOINT: f64 = 3.0;
 /// Most terms of the background: constant, slope, curvature.
 const MOST_TERMS: usize = 3;
-/// Significance level at which the residual or the poles ask for one more term of background. 5 %: a term
-/// too many makes a standard deviation some percent larger, one too few makes a bias.
-const TERM_LEVEL: f64 = 0.05;
+/// Most steps of a search. 30: one that has not ended by then has no minimum near its start.
+const MOST_STEPS: usize = 30;
 /// Largest error of a sensor's noise power before the weights are set anew. 20 %: that costs less than a
 /// percent of the precision, and a short band does not know its noise better.
 const NOISE_CHANGE: f64 = 0.2;
-
-/// Least common share of the powers of two modes over the taps. It is 1 where every tap excites them in the same
-/// proportion, and 0 where one mode rings at either frequency after a tap of its own: half way between.
-const SAME_TAPS: f64 = 0.5;
-/// Likeness from which two shapes count as one, the usual limit of the modal assurance criterion.
-const SAME_SHAPE: f64 = 0.9;
 
 /// Half of the band of a pole (lines).
 pub(super) fn half_band(pole: Complex64) -> f64 {
@@ -67,7 +61,7 @@ pub(super) fn lines_between(data: &ModalData, low: f64, high: f64) -> Range<usiz
 /// Lines of a group's band without distant modes, and the functions of the near ones.
 pub(super) struct BandData<'a> {
     pub data: &'a ModalData,
-    pub lines: Lines,
+    pub lines: Arc<Lines>,
     /// Indices of the columns that are not zero throughout.
     pub used: Vec<usize>,
     /// Real over imaginary parts of these columns.
@@ -97,7 +91,7 @@ impl<'a> BandData<'a> {
                 least,
             });
         }
-        let lines = Lines::new(data, range, accepted.most_lines.max(least));
+        let lines = Arc::new(Lines::new(data, range, accepted.most_lines.max(least)));
         let (first, stride, count) = (lines.first, lines.stride, lines.count());
         let mut used: Vec<usize> = (0..data.columns().len()).collect();
         used.retain(|&index| {
@@ -108,13 +102,18 @@ impl<'a> BandData<'a> {
         if used.is_empty() {
             return Err(Unfit::NoSignal);
         }
-        let mut values = DMatrix::from_fn(2 * count, used.len(), |row, place| {
-            let value = data.columns()[used[place]].values[first + stride * (row % count)];
-            if row < count { value.re } else { value.im }
-        });
+        let mut values = DMatrix::zeros(2 * count, used.len());
+        for (mut column, &index) in values.column_iter_mut().zip(&used) {
+            let taken = data.columns()[index].values[first..].iter().step_by(stride);
+            for (line, value) in taken.take(count).enumerate() {
+                column[line] = value.re;
+                column[line + count] = value.im;
+            }
+        }
         let margin = 0.25 * (high - low);
         let reach = low - margin..=high + margin;
-        let mut near = Vec::new();
+        let (mut near, mut distant) = (Vec::new(), Vec::new());
+        let mut amplitudes = Vec::new();
         for (index, pole) in accepted.alive() {
             if members.contains(&index) {
                 continue;
@@ -122,12 +121,16 @@ impl<'a> BandData<'a> {
             if reach.contains(&pole.im) {
                 near.push(pole);
             } else if let Some(all) = &accepted.modes[index].amplitudes {
-                let amplitudes = DMatrix::from_fn(2, used.len(), |row, place| {
-                    let value = all[used[place]];
-                    if row == 0 { value.re } else { value.im }
-                });
-                values -= lines.model(&[pole]) * amplitudes;
+                distant.push(pole);
+                amplitudes.push(all);
             }
+        }
+        if !distant.is_empty() {
+            let amplitudes = DMatrix::from_fn(2 * distant.len(), used.len(), |row, place| {
+                let value = amplitudes[row / 2][used[place]];
+                if row % 2 == 0 { value.re } else { value.im }
+            });
+            values.gemm(-1.0, &lines.model(&distant), &amplitudes, 1.0);
         }
         let steady = accepted.settings.steady_lines.iter();
         let hum = steady.filter(|line| reach.contains(&(line.frequency / data.spacing())));
@@ -143,44 +146,49 @@ impl<'a> BandData<'a> {
 
     /// Root mean square of each sensor's columns: a first scale of the noise, for every column.
     pub fn scale(&self) -> Vec<f64> {
-        self.by_sensor(&self.values, self.values.nrows() as f64)
+        let squares = self
+            .values
+            .column_iter()
+            .map(|column| column.norm_squared());
+        self.by_sensor(&Vec::from_iter(squares), self.values.nrows() as f64)
     }
 
-    /// Root of the mean square over all columns of a column's sensor, for every column.
+    /// Root of the mean square over all columns of a column's sensor, for every column, from the sum of the `squares` of each.
     ///
     /// `freedom` are the degrees of freedom of one column.
-    fn by_sensor(&self, columns: &DMatrix<f64>, freedom: f64) -> Vec<f64> {
-        let mut scales = Vec::with_capacity(self.used.len());
-        for &own in &self.used {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for (place, &other) in self.used.iter().enumerate() {
-                if self.data.columns()[other].sensor == self.data.columns()[own].sensor {
-                    sum += columns.column(place).norm_squared();
-                    count += 1.0;
-                }
-            }
-            scales.push((sum / (count * freedom)).sqrt());
+    fn by_sensor(&self, squares: &[f64], freedom: f64) -> Vec<f64> {
+        let sensor = |&column: &usize| self.data.columns()[column].sensor;
+        let mut sums: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for (column, square) in self.used.iter().zip(squares) {
+            let (sum, count) = sums.entry(sensor(column)).or_default();
+            *sum += square;
+            *count += 1.0;
         }
-        scales
+        let scales = self.used.iter().map(|column| {
+            let (sum, count) = sums[&sensor(column)];
+            (sum / (count * freedom)).sqrt()
+        });
+        scales.collect()
     }
 
     /// Returns the problem with `terms` terms of background, its columns in units of `noise`.
     pub fn problem(&self, terms: usize, noise: &[f64]) -> PoleProblem {
-        let near = self.lines.model(&self.near);
-        let split = near.ncols();
-        let mut raw = near.resize_horizontally(split + 2 * terms, 0.0);
-        raw.columns_mut(split, 2 * terms)
-            .copy_from(&self.lines.polynomial(terms));
-        let fixed = Subspace::new(&raw, DISTINCT);
         let mut columns = self.values.clone();
         for (mut column, noise) in columns.column_iter_mut().zip(noise) {
             column /= *noise;
         }
-        PoleProblem {
-            lines: self.lines.clone(),
-            columns: fixed.complement(columns),
-            fixed,
-        }
+        let alone = PoleProblem {
+            lines: Arc::clone(&self.lines),
+            fixed: Subspace::none(columns.nrows()),
+            columns,
+        };
+        let near = self.lines.model(&self.near);
+        let split = near.ncols();
+        let mut fixed = near.resize_horizontally(split + 2 * terms, 0.0);
+        fixed
+            .columns_mut(split, 2 * terms)
+            .copy_from(&self.lines.polynomial(0..terms));
+        alone.beside(&fixed)
     }
 
     /// Looks for a better start of the pole at `place`: other dampings, other places, other dampings again.
@@ -224,14 +232,8 @@ impl<'a> BandData<'a> {
         }
     }
 
-    /// Sum of the squares without any pole.
-    pub fn square_sum_without(&self, terms: usize, noise: &[f64]) -> f64 {
-        self.problem(terms, noise).columns.norm_squared()
-    }
-
     /// Fits from `start` with `terms` terms of background and given noise of the columns (any scale).
     pub fn fit(&self, start: &[Complex64], terms: usize, noise: &[f64]) -> Result<GroupFit, Unfit> {
-        const MOST_STEPS: usize = 30;
         self.search(start, terms, noise, MOST_STEPS)
     }
 
@@ -243,7 +245,18 @@ impl<'a> BandData<'a> {
         noise: &[f64],
         steps: usize,
     ) -> Result<GroupFit, Unfit> {
-        let problem = self.problem(terms, noise);
+        self.search_in(self.problem(terms, noise), start, terms, noise, steps)
+    }
+
+    /// Fits as [`search`](Self::search) does, where the problem with these terms and this noise is known.
+    fn search_in(
+        &self,
+        problem: PoleProblem,
+        start: &[Complex64],
+        terms: usize,
+        noise: &[f64],
+        steps: usize,
+    ) -> Result<GroupFit, Unfit> {
         let freedom = self.freedom(&problem.fixed, start.len())?;
         let best = problem
             .search(start, freedom, steps)
@@ -262,7 +275,7 @@ impl<'a> BandData<'a> {
     }
 
     /// Degrees of freedom of the residual: real values less amplitudes, fixed part and poles.
-    fn freedom(&self, fixed: &Subspace<f64>, poles: usize) -> Result<f64, Unfit> {
+    pub fn freedom(&self, fixed: &Subspace<f64>, poles: usize) -> Result<f64, Unfit> {
         let linear = fixed.rank() + 2 * poles;
         let rows = self.values.nrows();
         let lines = self.lines.count();
@@ -289,7 +302,7 @@ impl<'a> BandData<'a> {
     pub fn noise_of(&self, fit: &GroupFit) -> Vec<f64> {
         let linear = fit.problem.fixed.rank() + fit.at.amplitudes.nrows();
         let freedom = (self.values.nrows() - linear) as f64;
-        let mut noise = self.by_sensor(&fit.at.residual, freedom);
+        let mut noise = self.by_sensor(&fit.at.column_squares, freedom);
         for (place, (noise, scale)) in noise.iter_mut().zip(&fit.noise).enumerate() {
             // Rounding leaves 10^-13 of the values: a smaller residual tells nothing of the sensor.
             let floor = 1e-13 * self.values.column(place).amax();
@@ -307,7 +320,8 @@ impl<'a> BandData<'a> {
             if !self.has_room(poles, terms) {
                 break;
             }
-            match self.fit(&fit.at.poles, terms, noise) {
+            let problem = fit.problem.beside(&self.lines.polynomial(terms - 1..terms));
+            match self.search_in(problem, &fit.at.poles, terms, noise, MOST_STEPS) {
                 Ok(more) if fit.needs(&more) => fit = more,
                 Ok(_) | Err(_) => break,
             }
@@ -321,166 +335,6 @@ impl<'a> BandData<'a> {
         }
         Ok(fit)
     }
-}
-
-/// A group of poles fitted over its band.
-#[derive(Debug, Clone)]
-pub(super) struct GroupFit {
-    /// Poles (lines), amplitudes and residual in units of each sensor's noise.
-    pub at: Evaluation,
-    pub slopes: Slopes,
-    pub stop: StopReason,
-    /// Noise of each column that was used (unit of the data, each real component).
-    pub noise: Vec<f64>,
-    /// Residual variance in units of `noise` squared.
-    pub variance: f64,
-    /// Degrees of freedom of the residual.
-    pub freedom: f64,
-    /// Complex terms of the background polynomial.
-    pub terms: usize,
-    /// Indices of the columns that were used.
-    pub used: Vec<usize>,
-    /// Problem that the poles solve.
-    pub problem: PoleProblem,
-}
-
-impl GroupFit {
-    /// Noise of every column of the data; zero where a column was not used.
-    pub fn noise_by_column(&self, columns: usize) -> Vec<f64> {
-        let mut all = vec![0.0; columns];
-        for (&column, noise) in self.used.iter().zip(&self.noise) {
-            all[column] = noise * self.variance.sqrt();
-        }
-        all
-    }
-
-    /// Amplitude b of the pole at `place` in the used column `index`, in units of noise.
-    pub fn amplitude(&self, place: usize, index: usize) -> Complex64 {
-        complex_row(&self.at.amplitudes, place, index)
-    }
-
-    /// Amplitude of the pole at `place` in every column of the data (its unit); zero in unused columns.
-    pub fn amplitudes(&self, place: usize, columns: usize) -> Vec<Complex64> {
-        let mut all = vec![Complex64::ZERO; columns];
-        for (index, (&column, noise)) in self.used.iter().zip(&self.noise).enumerate() {
-            all[column] = self.amplitude(place, index) * *noise;
-        }
-        all
-    }
-
-    /// Returns the place of the pole nearest to that at `place`; `None` without another.
-    pub fn nearest(&self, place: usize) -> Option<usize> {
-        let poles = &self.at.poles;
-        let distance = |other: &usize| (poles[*other] - poles[place]).norm();
-        let others = (0..poles.len()).filter(|other| *other != place);
-        others.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-    }
-
-    /// Returns the likeness of the shapes of two poles, in units of noise; `None` with one sensor.
-    ///
-    /// It is sum_tu |sum_s conj(b_ts) c_us|^2/(sum_t sum_s |b_ts|^2 sum_u sum_s |c_us|^2) over all pairs of taps t, u and
-    /// sensors s. Each tap excites the two in a proportion of its own where one mode moves from tap to tap. Frequency
-    /// response functions count as one tap: the places of their taps are part of a shape.
-    pub fn likeness(&self, data: &ModalData, one: usize, other: usize) -> Option<f64> {
-        let as_one = matches!(data.basis(), Basis::FrequencyResponse { .. });
-        let taps: Vec<usize> = (self.used.iter())
-            .map(|&column| data.columns()[column].tap)
-            .collect();
-        let columns: Vec<usize> = (0..taps.len()).collect();
-        let shapes = columns.chunk_by(|&a, &b| as_one || taps[a] == taps[b]);
-        let shapes: Vec<&[usize]> = shapes.filter(|shape| shape.len() > 1).collect();
-        let sensors = |shape: &[usize]| -> Vec<usize> {
-            let shape = shape.iter();
-            shape
-                .map(|&index| data.columns()[self.used[index]].sensor)
-                .collect()
-        };
-        let (mut alike, mut whole) = (0.0, 0.0);
-        for mine in &shapes {
-            for theirs in shapes
-                .iter()
-                .filter(|theirs| sensors(theirs) == sensors(mine))
-            {
-                let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
-                for (&a, &b) in mine.iter().zip(*theirs) {
-                    let (own, other) = (self.amplitude(one, a), self.amplitude(other, b));
-                    product += own.conj() * other;
-                    own_power += own.norm_sqr();
-                    other_power += other.norm_sqr();
-                }
-                alike += product.norm_sqr();
-                whole += own_power * other_power;
-            }
-        }
-        (whole > 0.0).then(|| alike / whole)
-    }
-
-    /// Returns true where two poles are one mode whose frequency changed between the taps. They have one shape, but
-    /// different taps excite them. Every tap excites two neighbouring modes in the same proportion.
-    fn is_one_mode(&self, data: &ModalData, one: usize, other: usize) -> bool {
-        let taps = data.columns().iter().map(|column| column.tap + 1).max();
-        let taps = taps.unwrap_or(0);
-        if matches!(data.basis(), Basis::FrequencyResponse { .. }) || taps < 2 {
-            return false;
-        }
-        let mut powers = vec![[0.0; 2]; taps];
-        for (index, &column) in self.used.iter().enumerate() {
-            let power = &mut powers[data.columns()[column].tap];
-            power[0] += self.amplitude(one, index).norm_sqr();
-            power[1] += self.amplitude(other, index).norm_sqr();
-        }
-        let whole = powers.iter().fold([0.0, 0.0], |sum, power| {
-            [sum[0] + power[0], sum[1] + power[1]]
-        });
-        let shares = powers
-            .iter()
-            .map(|power| (power[0] / whole[0]).min(power[1] / whole[1]));
-        let alike = || self.likeness(data, one, other);
-        shares.sum::<f64>() < SAME_TAPS && alike().is_none_or(|alike| alike > SAME_SHAPE)
-    }
-
-    /// Standard deviations of position and decay of each pole (lines), from the residual.
-    ///
-    /// NaN where two poles cannot be separated.
-    pub fn deviations(&self) -> Vec<[f64; 2]> {
-        let covariance = self.slopes.covariance(self.variance);
-        (0..self.at.poles.len())
-            .map(|place| {
-                [2 * place, 2 * place + 1]
-                    .map(|i| covariance.as_ref().map_or(f64::NAN, |c| c[(i, i)].sqrt()))
-            })
-            .collect()
-    }
-
-    /// Returns true where the data ask for the background of `more`.
-    ///
-    /// They do where the residual falls (F test), or where a pole moves by more than the precision that
-    /// the term costs explains (Hausman 1978).
-    fn needs(&self, more: &GroupFit) -> bool {
-        let terms = self.freedom - more.freedom;
-        let gain = (self.at.square_sum - more.at.square_sum) / terms / more.variance;
-        let chance = FisherSnedecor::new(terms, more.freedom);
-        if chance.is_ok_and(|chance| gain > 0.0 && chance.sf(gain) < TERM_LEVEL) {
-            return true;
-        }
-        let [efficient, robust] =
-            [self, more].map(|fit| fit.slopes.information.clone().try_inverse());
-        let (Some(efficient), Some(robust)) = (efficient, robust) else {
-            return false;
-        };
-        let level = TERM_LEVEL / efficient.nrows() as f64;
-        (0..efficient.nrows()).any(|i| {
-            let change = more.at.poles[i / 2] - self.at.poles[i / 2];
-            let change = if i % 2 == 0 { change.im } else { change.re };
-            let explained = (robust[(i, i)] - efficient[(i, i)]) * more.variance;
-            explained > 0.0 && chi_square_tail(change * change / explained, 1.0) < level
-        })
-    }
-}
-
-/// Complex value in the rows (real, imaginary) of the pole at `place`.
-pub(super) fn complex_row(matrix: &DMatrix<f64>, place: usize, column: usize) -> Complex64 {
-    Complex64::new(matrix[(2 * place, column)], matrix[(2 * place + 1, column)])
 }
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.

@@ -12,6 +12,7 @@
 
 mod extra_mode;
 mod group;
+mod group_fit;
 mod modal_constant;
 mod mode_fit;
 mod steady;
@@ -29,6 +30,7 @@ pub use tapjoint_numerics::least_squares::StopReason;
 
 use num_complex::Complex64;
 use realfft::{RealFftPlanner, RealToComplex};
+use std::f64::consts::PI;
 use std::sync::Arc;
 use variable_projection::STEADY;
 
@@ -225,6 +227,8 @@ pub struct ModalData {
     frequencies: Vec<f64>,
     columns: Vec<Column>,
     spacing: f64,
+    /// Sine and cosine of half the turn from one sample to the next, pi f/rate, on every line of decays.
+    half_turns: Vec<(f64, f64)>,
 }
 
 impl ModalData {
@@ -264,11 +268,21 @@ impl ModalData {
             return Err(FitError::Axis);
         }
         let spacing = line_spacing(basis, &frequencies)?;
+        let half_turns = match basis {
+            Basis::FreeDecay { samples, .. } => {
+                let lines = frequencies.iter().map(|frequency| frequency / spacing);
+                lines
+                    .map(|line| (PI / samples as f64 * line).sin_cos())
+                    .collect()
+            }
+            Basis::FrequencyResponse { .. } => Vec::new(),
+        };
         Ok(ModalData {
             basis,
             frequencies,
             columns,
             spacing,
+            half_turns,
         })
     }
 

@@ -8,12 +8,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix2};
 use num_complex::Complex64;
 use tapjoint_numerics::stats::{NORMAL_95, chi_square_tail, student};
 
-use super::group::{Accepted, Group, GroupFit, ModeState, complex_row};
+use super::group::{Accepted, Group, ModeState};
+use super::group_fit::{GroupFit, complex_row};
 use super::variable_projection::{PoleProblem, half_width};
 use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
@@ -334,27 +336,50 @@ struct TapPoles {
     moved: f64,
 }
 
-/// Returns where the fit of one tap begins, and the relative change of all frequencies up to there: none, or a change
-/// by some half widths where that leaves clearly less residual. From half widths away no search finds the pole.
-fn moved_start(problem: &PoleProblem, joint: &[Complex64]) -> (Vec<Complex64>, f64) {
+/// A place where the fit of a tap may begin.
+struct TapStart {
+    poles: Vec<Complex64>,
+    /// Relative change of all frequencies from the joint fit to here.
+    moved: f64,
+    /// Sum of the squares that these poles leave of each column.
+    squares: Vec<f64>,
+}
+
+/// Returns the places where the fit of a tap may begin: the joint poles first, then those half widths away. From half
+/// widths away no search finds the pole.
+fn tap_starts(problem: &PoleProblem, joint: &[Complex64]) -> Vec<TapStart> {
     let narrowest = joint.iter().map(|pole| half_width(*pole) / pole.im);
     let step = narrowest.fold(f64::INFINITY, f64::min);
-    let square_sum = |moved: f64| {
+    let half_widths = (1..=MOST_MOVED).flat_map(|count| [-f64::from(count), f64::from(count)]);
+    let mut starts = Vec::new();
+    for half_widths in std::iter::once(0.0).chain(half_widths) {
+        let moved = half_widths * step;
         let poles = joint
             .iter()
             .map(|pole| pole + Complex64::new(0.0, moved * pole.im));
         let poles: Vec<Complex64> = poles.collect();
-        let at = problem.amplitudes_at(&poles);
-        (at.map_or(f64::INFINITY, |at| at.square_sum), poles)
-    };
-    let (here, poles) = square_sum(0.0);
-    let (mut best, mut least) = ((poles, 0.0), here);
-    for half_widths in (1..=MOST_MOVED).flat_map(|count| [-f64::from(count), f64::from(count)]) {
-        let moved = half_widths * step;
-        let (sum, poles) = square_sum(moved);
-        let variance = sum / problem.columns.len() as f64;
+        let squares = problem.squares_at(&poles);
+        starts.push(TapStart {
+            squares: squares.unwrap_or_else(|| vec![f64::INFINITY; problem.columns.ncols()]),
+            poles,
+            moved,
+        });
+    }
+    starts
+}
+
+/// Chooses where the fit of the tap with these columns begins: at the joint poles, or elsewhere where that leaves clearly
+/// less residual.
+fn chosen<'s>(starts: &'s [TapStart], columns: &[usize], lines: usize) -> &'s TapStart {
+    let square_sum =
+        |start: &TapStart| -> f64 { columns.iter().map(|&column| start.squares[column]).sum() };
+    let here = square_sum(&starts[0]);
+    let (mut best, mut least) = (&starts[0], here);
+    for start in &starts[1..] {
+        let sum = square_sum(start);
+        let variance = sum / (2 * lines * columns.len()) as f64;
         if sum < least && here - sum > CLEARLY_LESS * variance {
-            (best, least) = ((poles, moved), sum);
+            (best, least) = (start, sum);
         }
     }
     best
@@ -385,18 +410,28 @@ impl<'a> GroupReader<'a> {
             let tap = data.columns()[column].tap;
             places.entry(tap).or_default().push(place);
         }
+        // A single tap has the joint fit; the places of functions are no repeats.
         let is_decay = matches!(data.basis(), Basis::FreeDecay { .. });
-        let several = places.len() > 1;
-        let mut problem = fit.problem.clone();
+        let starts = match is_decay && places.len() > 1 {
+            true => tap_starts(&fit.problem, &fit.at.poles),
+            false => Vec::new(),
+        };
+        let mut problem = PoleProblem {
+            columns: DMatrix::zeros(0, 0),
+            lines: Arc::clone(&fit.problem.lines),
+            fixed: fit.problem.fixed.clone(),
+        };
         let mut taps = Vec::new();
         for (tap, places) in places {
             problem.columns = fit.problem.columns.select_columns(&places);
-            // A single tap has the joint fit; the places of functions are no repeats.
-            let (start, moved) = match (is_decay && several, &fit.at.poles) {
-                (true, joint) => moved_start(&problem, joint),
-                (false, joint) => (joint.clone(), 0.0),
+            let (start, moved) = match starts.is_empty() {
+                true => (&fit.at.poles, 0.0),
+                false => {
+                    let start = chosen(&starts, &places, fit.problem.lines.count());
+                    (&start.poles, start.moved)
+                }
             };
-            if let Some(best) = problem.search(&start, fit.freedom, TAP_STEPS)
+            if let Some(best) = problem.search(start, fit.freedom, TAP_STEPS)
                 && let Some(covariance) = best.slopes.covariance(match moved {
                     0.0 => fit.variance,
                     // The joint fit does not describe this tap, and its residual is no noise.
@@ -588,7 +623,7 @@ fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
         .filter(|&line| positions[line + 1] - positions[line] < 1.5)
         .collect();
     let mut product = 0.0;
-    for e in fit.at.residual.column_iter() {
+    for e in fit.problem.residual(&fit.at).column_iter() {
         for &m in &neighbours {
             product += e[m] * e[m + 1] + e[m + count] * e[m + 1 + count];
         }

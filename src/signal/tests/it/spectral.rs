@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_signal::spectral::{
     BandLimiter, DecayCheck, Lines, SpectralAverager, SpectralError, Window, apply_force_window,
-    choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_beside, noise_power,
+    choose_window, largest_smooth_block, line_and_noise, measure_decay, noise_power,
     smallest_smooth_block, transform_block,
 };
 
@@ -229,11 +229,11 @@ fn recover_amplitude_of_a_steady_line() {
     let hum: Vec<f64> = (0..3000)
         .map(|n| 0.02 * (TAU * 50.0 * n as f64 / rate + 0.4).sin())
         .collect();
-    let found = line_amplitude(&hum, rate, 50.0).unwrap();
+    let (found, _) = line_and_noise(&hum, rate, 50.0).unwrap();
     // Thirty whole periods: the image at -50 Hz cancels to rounding.
     assert!((found - 0.02).abs() < 1e-6, "{found}");
     assert!(
-        line_amplitude(&hum[..200], rate, 50.0).is_none(),
+        line_and_noise(&hum[..200], rate, 50.0).is_none(),
         "two periods are too few"
     );
 }
@@ -246,8 +246,8 @@ fn recover_noise_beside_a_line() {
         for (n, x) in samples.iter_mut().enumerate() {
             *x += hum * (TAU * 1800.0 * n as f64 / rate).sin();
         }
-        let line = line_amplitude(&samples, rate, 1800.0).unwrap();
-        line / noise_beside(&samples, rate, 1800.0).unwrap()
+        let (line, noise) = line_and_noise(&samples, rate, 1800.0).unwrap();
+        line / noise
     };
     // White noise of unit variance leaves amplitudes of 2/sqrt(n) = 0.03 root mean square: a line of 0.5 is
     // 16 times as high, give or take the scatter of a median of twelve (a third).

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Measures `tapjoint batch` on many short recordings.
 
-usage: scripts/batch_speed.py PROGRAM [--tests N] [--jobs N] [--folder DIR]
+usage: scripts/batch_speed.py PROGRAM [--tests N] [--jobs N] [--folder DIR] [--parquet] [--short]
 
 Writes N recordings of 1 s with one tap each (3 channels, 25.6 kHz, 16 bit) by a modal model with random frequencies. Then
 prints the processor time of a test, the peak memory at N/4, N/2 and N tests, and beside it what reading and transforming the
 same files by numpy alone takes. A run is killed in its middle and started again: its files must be those of an undisturbed
-run. Tests in parts are joined. At last the measured parts give the cost of a million tests on 1, 16 and 256 machines. Needs
-numpy and Linux.
+run. Tests in parts are joined. At last the measured parts give the cost of a million tests on 1, 16 and 256 machines.
+`--parquet` also writes and compares Parquet; the program must have been built with that feature. `--short` leaves out
+the smaller numbers of tests, the parts and the cost model. Needs numpy and Linux.
 """
 
 import argparse
@@ -28,7 +29,8 @@ CHANNELS = 3
 # The model of a million tests: processors of a machine, and what a shared disk reads in a second (bytes).
 MILLION, PROCESSORS, DISK = 1_000_000, 16, 1e9
 # Files that a batch writes; the journal is in the order of the tests at the end.
-FILES = ("tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html")
+FILES = ["tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html"]
+PARQUET = ["tests.parquet", "modes.parquet", "hypotheses.parquet"]
 
 
 def recording(random):
@@ -91,8 +93,8 @@ def measured(program, jobs, out, files, *options):
     return usage.ru_utime + usage.ru_stime, time.time() - begin, usage.ru_maxrss / 1024
 
 
-def sums(folder):
-    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
+def sums(folder, names):
+    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names}
 
 
 def print_model(own, joining, read, written):
@@ -116,8 +118,12 @@ def main():
     parser.add_argument("--tests", type=int, default=2000)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--folder", type=Path, help="keep the recordings here, and take those that are there")
+    parser.add_argument("--parquet", action="store_true", help="write and compare Parquet as well")
+    parser.add_argument("--short", action="store_true", help="leave out the shares and the parts")
     arguments = parser.parse_args()
     program = str(Path(arguments.program).resolve())
+    options = ["--parquet"] if arguments.parquet else []
+    names = FILES + (PARQUET if arguments.parquet else [])
     with tempfile.TemporaryDirectory() as temporary:
         temporary = Path(temporary)
         recordings = arguments.folder or temporary / "recordings"
@@ -128,17 +134,17 @@ def main():
             files = sorted(recordings.glob("tap-*.wav"))
         files = files[: arguments.tests]
         print(f"numpy, reading and transforming alone: {1e3 * read_and_transform(files[:200]):.2f} ms a test")
-        for share in (4, 2, 1):
+        for share in (1,) if arguments.short else (4, 2, 1):
             some = files[: len(files) // share]
-            own, wall, peak = measured(program, arguments.jobs, temporary / f"out-{share}", some)
+            own, wall, peak = measured(program, arguments.jobs, temporary / f"out-{share}", some, *options)
             print(
                 f"{len(some)} tests: {1e3 * own / len(some):.2f} ms of processor time a test, {wall:.1f} s, "
                 f"peak memory {peak:.0f} MB"
             )
-        again, _, _ = measured(program, arguments.jobs, temporary / "out-1", files)
+        again, _, _ = measured(program, arguments.jobs, temporary / "out-1", files, *options)
         print(f"again, nothing to do: {1e3 * again / len(files):.3f} ms a test")
         out = temporary / "killed"
-        process = batch(program, arguments.jobs, out, files)
+        process = batch(program, arguments.jobs, out, files, *options)
         journal = out / "batch.jsonl"
         whole = (temporary / "out-1" / "batch.jsonl").stat().st_size
         while process.poll() is None and (not journal.exists() or journal.stat().st_size < whole / 2):
@@ -146,14 +152,17 @@ def main():
         process.send_signal(signal.SIGKILL)
         process.wait()
         lines = journal.read_bytes().count(b"\n") - 1
-        measured(program, arguments.jobs, out, files)
-        is_equal = sums(out) == sums(temporary / "out-1")
+        measured(program, arguments.jobs, out, files, *options)
+        whole_sums = sums(temporary / "out-1", names)
+        is_equal = sums(out, names) == whole_sums
         print(f"killed after {lines} tests and started again: files are {'equal' if is_equal else 'DIFFERENT'}")
+        if arguments.short:
+            raise SystemExit(int(not is_equal))
         parted = temporary / "parted"
         for part in ("1/2", "2/2"):
             measured(program, arguments.jobs, parted, files, "--shard", part)
-        joining, wall, peak = measured(program, arguments.jobs, parted, files, "--merge")
-        is_joined = sums(parted) == sums(temporary / "out-1")
+        joining, wall, peak = measured(program, arguments.jobs, parted, files, "--merge", *options)
+        is_joined = sums(parted, names) == whole_sums
         words = "equal" if is_joined else "DIFFERENT"
         print(f"two parts joined: files are {words}, {1e3 * joining / len(files):.3f} ms a test, peak memory {peak:.0f} MB")
         read = sum(path.stat().st_size for path in files) / len(files)

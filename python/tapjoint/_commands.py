@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, Union
 
 from . import _native
@@ -37,13 +36,13 @@ class _Call:
         """Returns the path of a test. A description in memory gets one that no file and no other description has."""
         if not isinstance(test, Test):
             return os.fspath(test)
-        file = Path(test.file)
-        path, number = os.fspath(test.folder / file), 1
+        path, number = os.fspath(test.folder / test.file), 1
+        stem, suffix = os.path.splitext(test.file)
         while os.path.abspath(path) in self._files or any(
             path == known and text != test.text for known, text in self.descriptions
         ):
             number += 1
-            path = os.fspath(test.folder / f"{file.stem}-{number}{file.suffix}")
+            path = os.fspath(test.folder / f"{stem}-{number}{suffix}")
         self.descriptions.append((path, test.text))
         return path
 
@@ -288,6 +287,7 @@ def simulate(
     """
     # Loaded here, because few need them.
     import shutil
+    from pathlib import Path
     from tempfile import mkdtemp
 
     temporary = mkdtemp(prefix="tapjoint-") if out is None else None

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _native, _plots, _tables
 from ._arrays import whole
 from ._functions import FrequencyResponses, Spectrum, responses_of, spectrum_of
 from ._packages import package
 from .errors import InputError, TapjointError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class Section(Mapping[str, Any]):

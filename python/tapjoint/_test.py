@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _native
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class Test:
@@ -70,6 +72,9 @@ class Test:
 
     def _begin(self, text: str, folder: str | os.PathLike[str], file: str) -> None:
         self.warnings = _native.check_description(text, file)
+        # Loaded here: the import of the package would take a third longer.
+        from pathlib import Path
+
         self.text = text
         self.folder = Path(folder)
         self.file = file
@@ -80,6 +85,8 @@ class Test:
         Raises:
             FileExistsError: There is a file of this name.
         """
+        from pathlib import Path
+
         with open(path, "x", encoding="utf-8") as opened:
             opened.write(self.text)
         return Path(path)

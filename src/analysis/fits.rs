@@ -598,7 +598,7 @@ impl FreeDecays {
             fit.amplitude = Some(curve);
         }
         if let Some(rest) = followed.rest {
-            self.fit_again(readings, &rest, &followed.subtracted, &settings);
+            self.fit_again(readings, rest, &followed.subtracted, &settings);
         }
         for reading in readings {
             if let Some(fit) = reading.fit.as_deref_mut() {
@@ -614,13 +614,15 @@ impl FreeDecays {
     fn fit_again(
         &self,
         readings: &mut [ModeReading],
-        rest: &[Decay],
+        rest: Vec<Decay>,
         subtracted: &[usize],
         settings: &FitSettings,
     ) {
-        let Ok(data) = self.transforms_of(rest) else {
+        let Ok(data) = self.transforms_of(&rest) else {
             return;
         };
+        // The fits need only the transforms, and many taps take much memory.
+        drop(rest);
         let fitted = readings.iter_mut();
         let fitted = fitted.filter_map(|reading| reading.fit.as_deref_mut());
         let steady: Vec<&mut FittedReading> = (fitted.enumerate())

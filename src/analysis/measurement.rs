@@ -162,7 +162,7 @@ pub(super) fn measure_watched(
     // The band is judged before anything is read: it is the user's typing, not the data.
     let trial = lines_for(settings, recording.sample_rate(), recording.duration());
     let trial = trial.map_err(|problem| MeasureError::of(recording, problem))?;
-    let mut tap_settings = settings.taps;
+    let mut tap_settings = settings.taps.clone();
     tap_settings.wanted = settings
         .block
         .map(|_| trial.block as f64 / (DISPLAY_RATIO * (trial.high - trial.low)));

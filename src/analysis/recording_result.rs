@@ -260,6 +260,7 @@ mod tests {
             second_hit,
             overload: None,
             rejection: None,
+            overruled: None,
         };
         let far = SecondHit {
             delay: 0.035,

@@ -19,7 +19,7 @@ use tapjoint_description::{
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
+use tapjoint_signal::taps::{TapSettings, TapSource, TapsByHand, find_taps};
 
 /// Reasons for which an analysis stops.
 #[derive(Debug, thiserror::Error)]
@@ -110,6 +110,10 @@ fn measure_described(
     settings.band = description.band;
     settings.block = description.block;
     settings.taps.keep_overload = description.keep_overload;
+    settings.taps.by_hand = TapsByHand {
+        accept: description.accept_taps.clone(),
+        reject: description.reject_taps.clone(),
+    };
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
     settings.poles = poles_of(test, description);

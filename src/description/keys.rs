@@ -56,7 +56,7 @@ pub(super) const SENSOR: KnownTable = KnownTable::new(
 );
 pub(super) const RECORDING: KnownTable = KnownTable::new(
     "[[recording]]",
-    "file files length tap level band block at mass sample_rate time_unit form values variables sensor overload torque temperature date poles",
+    "file files length tap level band block at mass sample_rate time_unit form values variables sensor overload accept_taps reject_taps torque temperature date poles",
 );
 pub(super) const FASTENED: KnownTable = KnownTable::new("[[recording.mass]]", "name position mass");
 pub(super) const MEASURED: KnownTable = KnownTable::new(

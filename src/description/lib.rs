@@ -309,6 +309,10 @@ pub struct RecordingDescription {
     pub sensor: Option<String>,
     /// True if taps that drove a channel to its limit are used from where their decays are whole.
     pub keep_overload: bool,
+    /// Taps that are used whatever their faults: times of their triggers (s from the start of the recording), ascending.
+    pub accept_taps: Vec<f64>,
+    /// Taps that are left out: times as above.
+    pub reject_taps: Vec<f64>,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,
     /// Carried to the outputs: temperature (degrees Celsius).

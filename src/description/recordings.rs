@@ -328,10 +328,27 @@ pub(super) fn read_recording(
              or remove `values`",
         ));
     }
-    if let (Some(entry), Some(_)) = (table.get("overload"), form) {
-        return Err(entry.error(
-            "`overload` is about taps, and `form` says that the file holds functions; remove one of them",
-        ));
+    for key in ["overload", "accept_taps", "reject_taps"] {
+        if let (Some(entry), Some(_)) = (table.get(key), form) {
+            return Err(entry.error(format!(
+                "`{key}` is about taps, and `form` says that the file holds functions; remove one of them"
+            )));
+        }
+    }
+    let accept_taps = table
+        .optional("accept_taps", read_taps)?
+        .unwrap_or_default();
+    let reject_taps = table
+        .optional("reject_taps", read_taps)?
+        .unwrap_or_default();
+    if let (Some(entry), Some(time)) = (
+        table.get("reject_taps"),
+        reject_taps.iter().find(|time| accept_taps.contains(time)),
+    ) {
+        return Err(entry.error(format!(
+            "`accept_taps` and `reject_taps` both name the tap at {}; remove it from one of them",
+            with_unit(*time, "s")
+        )));
     }
     Ok(RecordingDescription {
         poles: table.optional("poles", read_poles)?,
@@ -358,6 +375,8 @@ pub(super) fn read_recording(
             .unwrap_or_default(),
         sensor,
         keep_overload: table.choice("overload", &OVERLOADS)?.unwrap_or(false),
+        accept_taps,
+        reject_taps,
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,
@@ -653,6 +672,25 @@ const MOST_POLES: usize = 100;
 pub(super) fn read_poles(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
     let remedy = "list the modes of interest, or leave `poles` out";
     read_ascending(entry, MOST_POLES, remedy)
+}
+
+/// Most taps that may be chosen by hand in one recording.
+const MOST_TAPS: usize = 1000;
+const TAP_TIME: Limits = Limits::between(
+    0.0,
+    1e7,
+    "write the times that the table of taps shows: `reject_taps = [4.905, 12.31]`",
+);
+
+/// Reads the times of taps (s from the start of the recording), the earliest first.
+fn read_taps(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+    let items = entry.list_up_to(MOST_TAPS, "a list of times such as [4.905, 12.31] (s)")?;
+    let times = items
+        .iter()
+        .map(|item| item.within(Dimension::Time, &TAP_TIME));
+    let times = times.collect::<Result<Vec<_>, _>>()?;
+    check_ascending(&items, &times)?;
+    Ok(times)
 }
 
 /// Reads natural frequencies (Hz), the lowest first, `most` of them. `remedy` goes with another number of them.

@@ -49,6 +49,8 @@ pub enum Dimension {
     PressureSensitivity,
     /// Sensitivity of a force sensor (V/N).
     ForceSensitivity,
+    /// Time (s).
+    Time,
 }
 
 impl Dimension {
@@ -130,6 +132,7 @@ const LENGTH: &[Unit] = &[
     unit("in", INCH),
     unit("ft", 12.0 * INCH),
 ];
+const TIME: &[Unit] = &[unit("s", 1.0), unit("ms", 1e-3), unit("min", 60.0)];
 const PRESSURE: &[Unit] = &[
     unit("Pa", 1.0),
     unit("GPa", 1e9),
@@ -279,7 +282,7 @@ const FORCE_SENSOR: &[Unit] = &[
 
 /// Every dimension with its words and units, SI unit first. They stand in the order of their declaration,
 /// in which a stray unit is looked for.
-const DIMENSIONS: [(Dimension, &str, &[Unit]); 20] = [
+const DIMENSIONS: [(Dimension, &str, &[Unit]); 21] = [
     (Dimension::Length, "a length", LENGTH),
     (Dimension::Pressure, "a pressure", PRESSURE),
     (Dimension::Density, "a density", DENSITY),
@@ -332,6 +335,7 @@ const DIMENSIONS: [(Dimension, &str, &[Unit]); 20] = [
         "the sensitivity of a force sensor",
         FORCE_SENSOR,
     ),
+    (Dimension::Time, "a time", TIME),
 ];
 
 /// Reason for which a text is not the quantity asked for.

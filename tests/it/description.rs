@@ -421,7 +421,7 @@ fn regress_template_with_measured_instead_of_recordings() {
 fn regress_templates_name_every_key() {
     let keys = "name length width thickness modulus density poisson tolerance kind model kt kr ktr \
                 beam position overlap channel scale sensitivity mass file files length tap band block at \
-                sample_rate form sensor torque temperature date frequencies modes half_line std \
+                sample_rate form sensor accept_taps reject_taps torque temperature date frequencies modes half_line std \
                 scatter window reading fit_modes weights sensor_mass fit right poles sheet instrument number \
                 operator specimen laboratory remarks";
     let all = template(Assembly::Cantilever) + &template(Assembly::Lap);

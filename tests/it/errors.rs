@@ -236,6 +236,13 @@ fn regress_recordings_and_settings_that_cannot_be() {
             ("block = 2048", "block = -2048"),
             ("block = 2048", "block = 1048577"),
             ("block = 2048", "block = 2048.5"),
+            ("block = 2048", "reject_taps = [4.9, 4.9]"),
+            ("block = 2048", "reject_taps = [-1]"),
+            ("block = 2048", "accept_taps = 4.9"),
+            (
+                "block = 2048",
+                "accept_taps = [\"4.9 s\"]\nreject_taps = [4.9]",
+            ),
             ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
             ("at = { tip = 0.20 }", "at = { tip = 2 }"),
             ("file = \"low.wav\"\n", ""),

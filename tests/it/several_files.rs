@@ -117,6 +117,26 @@ fn recover_the_same_modes_from_a_file_for_each_tap() {
 }
 
 #[test]
+fn prop_a_tap_rejected_by_hand_is_as_one_not_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut low = cut(folder.path(), "low");
+    copy_high(folder.path());
+    let text = described(&[("low", low.clone())]);
+    let whole = analyse(&text, folder.path()).unwrap();
+    let time = whole.recordings[0].measurement.taps.taps[1].time;
+    let rejected = text.replacen("files =", &format!("reject_taps = [{time}]\nfiles ="), 1);
+    let rejected = analyse(&rejected, folder.path()).unwrap();
+    low.remove(1);
+    let missing = analyse(&described(&[("low", low)]), folder.path()).unwrap();
+    for (one, other) in rejected.modes.iter().zip(&missing.modes) {
+        // The same numbers in another place of the recording.
+        assert!((one.frequency / other.frequency - 1.0).abs() < 1e-12);
+    }
+    assert_ne!(rejected.modes[0].frequency, whole.modes[0].frequency);
+    assert_eq!(rejected.modes.len(), missing.modes.len());
+}
+
+#[test]
 fn regress_a_file_without_a_tap_is_a_doubt_and_not_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let mut low = cut(folder.path(), "low");

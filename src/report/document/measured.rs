@@ -129,7 +129,7 @@ pub struct TapSection {
     pub peak_response: Option<f64>,
     /// True if it enters the averages.
     pub accepted: bool,
-    /// Why not.
+    /// Why not. Of a tap that was accepted by hand, or gives its decay alone: what speaks against it.
     pub reason: Option<String>,
     /// Its force pulse; null without a hammer.
     pub pulse: Option<Pulse>,
@@ -236,10 +236,11 @@ impl RecordingSection {
             peak_force: recording.has_hammer.then_some(tap.peak),
             peak_response: (!recording.has_hammer).then_some(tap.peak),
             accepted: tap.accepted(),
-            reason: match (&tap.rejection, &tap.overload) {
-                (Some(rejection), _) => Some(rejection.to_string()),
-                (None, Some(overload)) => Some(format!("decay only: {overload}")),
-                (None, None) => None,
+            reason: match (&tap.rejection, &tap.overruled, &tap.overload) {
+                (Some(rejection), ..) => Some(rejection.to_string()),
+                (None, Some(fault), _) => Some(format!("accepted by hand; {fault}")),
+                (None, None, Some(overload)) => Some(format!("decay only: {overload}")),
+                (None, None, None) => None,
             },
             pulse: tap.pulse,
         });

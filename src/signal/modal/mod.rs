@@ -48,8 +48,8 @@ struct Subspace<T> {
     columns: DMatrix<T>,
 }
 
-/// Rows that products of tall matrices take at once. 1024: the rows of a few columns stay in the cache nearest to a core
-/// while they meet those of many.
+/// Rows that products of tall matrices take at once. 1024: as many of four columns fill the cache nearest to a core, and a
+/// pole has two.
 const ROWS_AT_ONCE: usize = 1024;
 
 /// Returns left' right of tall matrices.
@@ -75,14 +75,14 @@ impl<T: ComplexField<RealField = f64>> Subspace<T> {
         Self::none(raw.nrows()).added(raw, distinct)
     }
 
-    /// Returns the space without a direction.
+    /// Returns an empty space of columns with so many rows.
     fn none(rows: usize) -> Self {
         Subspace {
             columns: DMatrix::zeros(rows, 0),
         }
     }
 
-    /// Returns the space that this and another span, whose columns are orthonormal to this one's.
+    /// Returns the space that this and another span, whose columns are orthogonal to this one's.
     fn with(&self, other: &Self) -> Self {
         let (own, all) = (self.rank(), self.rank() + other.rank());
         let mut columns = self.columns.clone().resize_horizontally(all, T::zero());
@@ -92,7 +92,7 @@ impl<T: ComplexField<RealField = f64>> Subspace<T> {
         Subspace { columns }
     }
 
-    /// Returns what columns add to this space, as [`new`](Self::new).
+    /// Returns the part of the span of `raw` that this space lacks; `distinct` is as in [`new`](Self::new).
     fn added(&self, raw: &DMatrix<T>, distinct: f64) -> Self {
         let mut kept: Vec<DVector<T>> = Vec::new();
         for column in raw.column_iter() {

@@ -22,7 +22,7 @@
 //! ```
 //!
 //! over the lines. A form multiplies a line's equations by s^k: its phase turns real and imaginary part into each other,
-//! which changes no sum, and its magnitude is a weight. All forms so share their columns, and H/s^k is fitted with the
+//! which changes no sum, and its magnitude is a weight. All forms therefore share their columns, and H/s^k is fitted with the
 //! weight |s|^k. N is the noise power of the function about each line ([`noise_of_function`]). A function may span five
 //! decades. Without weights the errors at its highest peaks, a few percent of them, hide its low modes. Weights by
 //! relative errors let the many lines between the peaks decide, and one mode that is not listed then spoils the peaks
@@ -140,14 +140,14 @@ impl SynthesisLines<'_> {
     fn fill_columns(&self, frequency: f64, columns: &mut [Complex64]) {
         let scale = self.scale();
         let s = self.place(frequency);
-        let of_poles = columns.chunks_exact_mut(2);
+        let pairs = columns.chunks_exact_mut(2);
         let poles = self.poles.iter().map(|pole| {
             let pole = pole / scale;
             let (own, image) = ((s - pole).inv(), (s - pole.conj()).inv());
             [own + image, Complex64::i() * (own - image)]
         });
         let terms = [Complex64::ONE, s.powi(-2)].map(|term| [term, Complex64::i() * term]);
-        for (columns, own) in of_poles.zip(poles.chain(terms)) {
+        for (columns, own) in pairs.zip(poles.chain(terms)) {
             columns.copy_from_slice(&own);
         }
     }
@@ -206,9 +206,9 @@ impl SynthesisLines<'_> {
                 let mut data = equations.shares.clone().resize_vertically(rows, 0.0);
                 for (line, columns) in lines.clone().zip(columns.column_iter()) {
                     let row = known + 2 * (line - first);
-                    let s = self.place(self.frequencies[line]).powi(form.derivatives());
-                    let root = weights[line].sqrt() * s.norm();
-                    let value = function[line] / s * root;
+                    let power = self.place(self.frequencies[line]).powi(form.derivatives());
+                    let root = weights[line].sqrt() * power.norm();
+                    let value = function[line] / power * root;
                     data[row] = value.re;
                     data[row + 1] = value.im;
                     for (place, value) in columns.iter().enumerate() {

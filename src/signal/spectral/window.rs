@@ -214,8 +214,8 @@ const LANES: usize = 4;
 /// twentieth: their sum is then short by (turn/2)^2/6 = 1e-4 of itself, which is put right.
 const BLOCK_TURN: f64 = 0.05;
 
-/// The same within the smallest block, of [`LANES`] samples: of a stretch of a thousand samples the sums are short by up to
-/// 2e-3, which is put right, and other parts of the samples by a little less or more.
+/// Largest turn (rad) of that kind within the smallest block, of [`LANES`] samples. A fifth: its sum is short by
+/// (turn/2)^2/6 = 2e-3, which is put right. Stretches of a thousand samples then need no pass for each frequency.
 const LANES_TURN: f64 = 0.2;
 
 /// Amplitudes of steady lines at several `frequencies` (Hz) near each other in `samples`, 2 |sum x e^{-j omega t}|/n;
@@ -285,8 +285,8 @@ fn sums_of_blocks(samples: &[f64], turn: f64, block: usize) -> Vec<Complex64> {
     blocks.collect()
 }
 
-/// Amplitude of a steady line at `frequency` (Hz) in `samples`, and the root mean square of those that noise has
-/// beside it; `None` when they hold fewer than three periods.
+/// Returns the amplitude of a steady line at `frequency` (Hz) and the root mean square amplitude of the noise beside it, both
+/// in the unit of the samples; `None` when they hold fewer than three periods.
 ///
 /// The noise is from the median over 3 to 8 resolutions 1/T to either side: nearer ones hold the line itself, and
 /// another line among them does not count. Powers of noise are exponentially distributed, so that their

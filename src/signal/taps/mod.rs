@@ -5,10 +5,12 @@
 //! recording block by block. A tap's record begins a little before the trigger and ends where the
 //! next tap comes.
 
+mod by_hand;
 mod double_hit;
 mod pulse;
 mod search;
 
+pub use by_hand::TapsByHand;
 pub use double_hit::SecondHit;
 pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
@@ -48,7 +50,7 @@ impl TapSource {
 }
 
 /// Limits by which taps are found and judged.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TapSettings {
     /// Signal kept before the trigger (s). 10 ms, enough for a filter's ringing ahead of the pulse;
     /// at least 16 samples.
@@ -75,6 +77,8 @@ pub struct TapSettings {
     pub wanted: Option<f64>,
     /// True to accept taps that drove a channel to its limit. Their decays are used from where they are whole.
     pub keep_overload: bool,
+    /// Taps that are accepted or rejected by hand.
+    pub by_hand: TapsByHand,
 }
 
 impl Default for TapSettings {
@@ -90,6 +94,7 @@ impl Default for TapSettings {
             rearm: 0.05,
             wanted: None,
             keep_overload: false,
+            by_hand: TapsByHand::default(),
         }
     }
 }
@@ -117,6 +122,8 @@ pub struct Tap {
     pub overload: Option<Overload>,
     /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
+    /// Reason for which it would have been rejected, had it not been accepted by hand.
+    pub overruled: Option<Rejection>,
 }
 
 /// Samples of a tap's record at the limit of a channel.
@@ -211,6 +218,8 @@ pub enum Rejection {
         /// Length of the others (s).
         needed: f64,
     },
+    /// It was rejected by hand.
+    ByHand,
 }
 
 impl fmt::Display for Rejection {
@@ -247,6 +256,7 @@ impl fmt::Display for Rejection {
                     "the next tap comes after {available:.2} s, {needed:.2} s are needed"
                 )
             }
+            Rejection::ByHand => f.write_str("by hand"),
         }
     }
 }
@@ -277,6 +287,20 @@ pub enum TapRemark {
     AllOverloaded {
         /// Number of taps.
         count: usize,
+    },
+    /// No tap is where one was to be accepted or rejected by hand.
+    NoTapThere {
+        /// Where (s from the start of the recording).
+        time: f64,
+        /// The nearest tap (s); `None` without any.
+        nearest: Option<f64>,
+    },
+    /// A tap that was to be accepted by hand has no record that could be used.
+    StillRejected {
+        /// Time of its trigger (s from the start of the recording).
+        time: f64,
+        /// Reason why.
+        rejection: Rejection,
     },
 }
 
@@ -312,6 +336,24 @@ impl fmt::Display for TapRemark {
                  overload = \"keep\" in [[recording]], or --overload keep, uses their decays after the last sample \
                  that was cut off"
             ),
+            TapRemark::NoTapThere { time, nearest } => {
+                let reach = 1e3 * by_hand::REACH;
+                write!(
+                    f,
+                    "no tap lies within {reach:.0} ms of {time:.3} s, where one was to be accepted or rejected by hand; \
+                     correct the time"
+                )?;
+                match nearest {
+                    Some(nearest) => write!(f, ": the nearest tap is at {nearest:.3} s"),
+                    None => Ok(()),
+                }
+            }
+            TapRemark::StillRejected { time, rejection } => {
+                write!(
+                    f,
+                    "the tap at {time:.3} s cannot be accepted by hand: {rejection}"
+                )
+            }
         }
     }
 }
@@ -421,9 +463,10 @@ pub fn find_taps(
             }
         }
     }
+    let mut remarks = settings.by_hand.judge(&mut taps);
     reject_short(&mut taps, &lasts, rate, settings.wanted);
+    remarks.extend(settings.by_hand.still_rejected(&taps));
     let mut noise = 0.0_f64;
-    let mut remarks: Vec<TapRemark> = Vec::new();
     for (_, file, found) in searched {
         noise = noise.max(found.noise);
         for remark in found.remarks {
@@ -544,6 +587,7 @@ fn tap(
         second_hit: second,
         overload: overloaded,
         rejection,
+        overruled: None,
     })
 }
 

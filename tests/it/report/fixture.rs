@@ -486,6 +486,7 @@ fn measured_taps() -> Vec<Tap> {
             second_hit: None,
             overload: None,
             rejection: None,
+            overruled: None,
         })
         .collect();
     taps[1].rejection = Some(Rejection::DoubleHit {

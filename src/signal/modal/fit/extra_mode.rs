@@ -6,6 +6,7 @@ use tapjoint_numerics::stats::root_mean_square;
 
 use super::group::{Accepted, BandData, Group};
 use super::mode_fit::ModeFit;
+use super::variable_projection::half_width;
 use super::{PoleStart, Unfit};
 
 /// Test result for one more mode.
@@ -18,7 +19,8 @@ pub struct ExtraMode {
     /// Modal assurance criterion between its shape and that of the nearest other mode of its group.
     ///
     /// For free decays it is taken over the sensors, as the mean of all taps weighted by their power; for
-    /// frequency response functions over all columns. `None` without such a mode, or with one sensor. Near 1
+    /// frequency response functions over all columns. `None` without such a mode, with one sensor, and where noise alone
+    /// explains the mode. Near 1
     /// the second pole may only correct a decay that is not straight: one mode whose frequency changes while
     /// it rings. The two poles' shares of a tap then depend on the tap's strength, which is no other shape.
     pub likeness: Option<f64>,
@@ -36,8 +38,14 @@ const LEVEL: f64 = 1e-4;
 const HOPELESS: f64 = 0.01;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
-/// Terms of a polynomial that stand for a broad pole. 4: such a pole has one maximum in the band, at any place.
+/// Terms beyond the background that stand for a broad pole. 4: with the background's own they follow a maximum at any
+/// place of the band, and two turning points.
 const BROAD_TERMS: usize = 4;
+/// Half widths to either side within which a second pole is looked for. 4: a pair is one where it lies within three half
+/// widths of both poles.
+const SCANNED: i32 = 4;
+/// Dampings of such a pole, as shares of the mode's own. A narrower one makes a dent that no derivative follows.
+const NARROWER: [f64; 2] = [0.3, 1.0];
 /// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
 /// thousand of them, too many to fit for every chance proposal. On one line in s an amplitude has sqrt(s)
 /// times its standard deviation, so that a mode that only all lines together show is not found.
@@ -53,7 +61,7 @@ impl Accepted<'_> {
     pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
         let (test, mut together, stride) = self.test_on(extra, SCREENED);
         if test.needed && stride > 1 {
-            // From the pole of the thinned lines it is not far.
+            // From the pole of the thinned lines it is not far; it may move as far again as from a proposal.
             let start = test.fit.as_ref().map_or(*extra, |fit| PoleStart {
                 frequency: fit.frequency.value,
                 damping_ratio: Some(fit.damping_ratio.value),
@@ -74,7 +82,7 @@ impl Accepted<'_> {
             needed: false,
             probability: 1.0,
             likeness: None,
-            fit: Err(Unfit::Unneeded),
+            fit: Err(Unfit::NotIndependent),
             neighbour: None,
         };
         let Some(group) = beside.add(extra) else {
@@ -86,11 +94,12 @@ impl Accepted<'_> {
         let gain = place.and_then(|place| Some((place, beside.gain_of(&group, place)?)));
         if let Some((place, (probability, information_gain))) = gain {
             test.probability = probability;
-            let nearest = group.fit.nearest(place);
-            test.likeness =
-                nearest.and_then(|nearest| group.fit.likeness(self.data, place, nearest));
+            test.fit = Err(Unfit::Unneeded);
             // Reading the modes takes long: only those that may be needed are read.
             if probability < LEVEL && information_gain > 0.0 {
+                let nearest = group.fit.nearest(place);
+                test.likeness =
+                    nearest.and_then(|nearest| group.fit.likeness(self.data, place, nearest));
                 let mut fits = beside.read(std::slice::from_ref(&group));
                 test.fit = fits.swap_remove(last);
                 let neighbour = nearest.map(|nearest| fits.swap_remove(group.members[nearest]));
@@ -116,34 +125,55 @@ impl Accepted<'_> {
         gain(&band, with.at.square_sum, with.freedom, without)
     }
 
-    /// Returns false where the data would not ask for a second pole beside the fitted mode of start `index`, wherever it is:
-    /// [`test`](Self::test) would be in vain.
+    /// Returns false where the data would hardly ask for a second pole beside the fitted mode of start `index`:
+    /// [`test`](Self::test) takes some fifty times as long.
     ///
-    /// A second pole nearby adds about the derivatives of the function of the first, and a broad one a polynomial. All
-    /// these with free amplitudes leave no more residual for each degree of freedom than that pole does.
+    /// A second pole within about two half widths adds the derivatives of the first one's function, and a broad pole is a
+    /// polynomial over the band. There is room where these with free amplitudes are needed, or a pole at one of some places
+    /// up to [`SCANNED`] half widths away. Second poles at the limit of what the data show may be missed.
     pub fn has_room_beside(&self, index: usize, mode: &ModeFit) -> bool {
         let thinned = Accepted {
             most_lines: SCREENED,
             ..self.clone()
         };
-        let band = BandData::new(&thinned, &mode.joint_with).ok();
-        let found = band.and_then(|band| {
-            let noise = self.noise(&mode.joint_with, &band.used)?;
-            let poles = self.poles(&mode.joint_with);
-            let problem = band.problem(mode.background_terms, &noise);
-            let without = problem.amplitudes_at(&poles)?.square_sum;
-            let freedom = band.freedom(&problem.fixed, poles.len() + 1).ok()?;
-            let terms = mode.background_terms..mode.background_terms + BROAD_TERMS;
-            let mut wider = problem.beside(&band.lines.polynomial(terms));
-            for columns in band.lines.derivatives(self.poles(&[index])[0]) {
-                wider = wider.beside(&columns);
-            }
-            // Noise that so many columns explain would be left beside a pole.
-            let left = band.freedom(&wider.fixed, poles.len() + 1).ok()?;
-            let with = wider.amplitudes_at(&poles)?.square_sum * freedom / left;
-            gain(&band, with, freedom, without)
-        });
-        found.is_none_or(|(probability, gain)| probability < LEVEL && gain > 0.0)
+        // Where the data cannot tell, the test decides.
+        let Ok(band) = BandData::new(&thinned, &mode.joint_with) else {
+            return true;
+        };
+        let Some(noise) = self.noise(&mode.joint_with, &band.used) else {
+            return true;
+        };
+        let poles = self.poles(&mode.joint_with);
+        let own = self.poles(&[index])[0];
+        let terms = mode.background_terms..mode.background_terms + BROAD_TERMS;
+        let problem = band.problem(mode.background_terms, &noise);
+        let beside = problem.beside(&band.lines.model(&poles));
+        let mut wide = beside.beside(&band.lines.polynomial(terms));
+        for columns in band.lines.derivatives(own) {
+            wide = wide.beside(&columns);
+        }
+        let freedom = band.freedom(&problem.fixed, poles.len() + 1);
+        let (Ok(freedom), Ok(left)) = (freedom, band.freedom(&wide.fixed, 0)) else {
+            return true;
+        };
+        let without = beside.columns.norm_squared();
+        let asks = |with: f64| {
+            let gain = gain(&band, with, freedom, without);
+            gain.is_none_or(|(probability, gain)| probability < LEVEL && gain > 0.0)
+        };
+        // The wide fit explains noise as well, which a pole would leave: what it leaves is scaled by the freedom.
+        if asks(wide.columns.norm_squared() * freedom / left) {
+            return true;
+        }
+        let steps = -2 * SCANNED..=2 * SCANNED;
+        let mut places =
+            steps.flat_map(|step| NARROWER.map(|share| (0.5 * f64::from(step), share)));
+        places.any(|(half_widths, share)| {
+            let place = own.im + half_widths * half_width(own);
+            let pole = Complex64::new(own.re * share, place);
+            let squares = beside.squares_at(&[pole]);
+            squares.is_some_and(|squares| asks(squares.iter().sum()))
+        })
     }
 
     /// Returns true where the data ask for the fitted mode of start `index`, all other poles being as they are.
@@ -197,13 +227,12 @@ impl Accepted<'_> {
     }
 }
 
-/// Compares two fits of a group's band: one `with` a pole, of so much freedom, and one `without` it. Both are given by the
-/// sums of squares that they leave. Returns the probability of a larger fall of the residual by noise alone at one given
-/// place, and the fall of Schwarz's criterion.
+/// Compares two fits of a group's band. They leave the sums of squares S0, `without` a pole, and S1, `with` it. `freedom`
+/// are the degrees of freedom of the fit with the pole. Returns the probability of a larger fall by noise alone at one
+/// given place, and the fall of Schwarz's criterion.
 ///
-/// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
-/// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
-/// n ln S + k ln n.
+/// The pole has k unknowns (two of its own, two amplitudes a column), and there are n real values. Then
+/// F = (S0 - S1)/k/(S1/freedom), and the criterion is n ln S + k ln n.
 fn gain(band: &BandData, with: f64, freedom: f64, without: f64) -> Option<(f64, f64)> {
     let columns = band.used.len() as f64;
     let unknowns = 2.0 + 2.0 * columns;

@@ -182,13 +182,8 @@ impl<'a> BandData<'a> {
             fixed: Subspace::none(columns.nrows()),
             columns,
         };
-        let near = self.lines.model(&self.near);
-        let split = near.ncols();
-        let mut fixed = near.resize_horizontally(split + 2 * terms, 0.0);
-        fixed
-            .columns_mut(split, 2 * terms)
-            .copy_from(&self.lines.polynomial(0..terms));
-        alone.beside(&fixed)
+        let near = alone.beside(&self.lines.model(&self.near));
+        near.beside(&self.lines.polynomial(0..terms))
     }
 
     /// Looks for a better start of the pole at `place`: other dampings, other places, other dampings again.

@@ -20,7 +20,7 @@ const SAME_SHAPE: f64 = 0.9;
 /// A group of poles fitted over its band.
 #[derive(Debug, Clone)]
 pub(super) struct GroupFit {
-    /// Poles (lines), amplitudes and residual in units of each sensor's noise.
+    /// Poles (lines), amplitudes and sums of squares in units of each sensor's noise.
     pub at: Evaluation,
     pub slopes: Slopes,
     pub stop: StopReason,

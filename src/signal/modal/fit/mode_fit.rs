@@ -416,14 +416,13 @@ impl<'a> GroupReader<'a> {
             true => tap_starts(&fit.problem, &fit.at.poles),
             false => Vec::new(),
         };
-        let mut problem = PoleProblem {
-            columns: DMatrix::zeros(0, 0),
-            lines: Arc::clone(&fit.problem.lines),
-            fixed: fit.problem.fixed.clone(),
-        };
         let mut taps = Vec::new();
         for (tap, places) in places {
-            problem.columns = fit.problem.columns.select_columns(&places);
+            let problem = PoleProblem {
+                columns: fit.problem.columns.select_columns(&places),
+                lines: Arc::clone(&fit.problem.lines),
+                fixed: fit.problem.fixed.clone(),
+            };
             let (start, moved) = match starts.is_empty() {
                 true => (&fit.at.poles, 0.0),
                 false => {

@@ -64,7 +64,7 @@ impl Lines {
             Basis::FreeDecay { samples, .. } => Some(TAU / samples as f64),
             Basis::FrequencyResponse { .. } => None,
         };
-        // None are known for functions.
+        // Functions have no turns.
         let turns = data.half_turns.get(range.clone()).unwrap_or_default();
         Lines {
             first: range.start,
@@ -123,7 +123,8 @@ impl Lines {
     /// Fills the two columns of a pole of decays.
     ///
     /// With u = kappa (q - j m) = x + j y and phi = kappa/(1 - e^u), coth(u/2) = (sinh x - j sin y)/(cosh x - cos y) gives
-    /// phi = (kappa/2) (1 - coth(u/2)). Near the pole cosh x - cos y = 2 sinh^2(x/2) + 2 sin^2(y/2) keeps its digits.
+    /// phi = (kappa/2) (1 - coth(u/2)). The difference of cosines loses its digits near the pole, and the sum
+    /// cosh x - cos y = 2 sinh^2(x/2) + 2 sin^2(y/2) keeps them.
     fn fill_decay<const DERIVATIVE: usize>(
         &self,
         kappa: f64,
@@ -207,7 +208,7 @@ fn derivative<const ORDER: usize>(phi: Complex64, kappa: f64) -> Complex64 {
     }
 }
 
-/// Angle up to which [`small_sin_cos`] is exact.
+/// Angle (rad) up to which [`small_sin_cos`] is exact to rounding.
 const EIGHTH: f64 = 0.125;
 
 /// Returns sine and cosine of an angle up to [`EIGHTH`] by the first terms of their series, as exact as the functions. The
@@ -237,8 +238,9 @@ pub(super) struct PoleProblem {
 #[derive(Debug, Clone)]
 pub(super) struct Evaluation {
     pub poles: Vec<Complex64>,
-    /// Sum of the squares of the residual, of all columns and of each.
+    /// Sum of the squares of the residual over all columns.
     pub square_sum: f64,
+    /// Sum of the squares of the residual of each column.
     pub column_squares: Vec<f64>,
     /// Amplitudes: rows b1, b2 of each pole.
     pub amplitudes: DMatrix<f64>,
@@ -279,7 +281,9 @@ pub(super) struct BestPoles {
 impl PoleProblem {
     /// Solves for the amplitudes; `None` where the poles' columns are not independent.
     pub fn amplitudes_at(&self, poles: &[Complex64]) -> Option<Evaluation> {
-        let (orthonormal, inverse) = self.orthonormalised(poles)?;
+        let (orthonormal, upper) = self.orthonormalised(poles)?;
+        let count = upper.nrows();
+        let inverse = upper.solve_upper_triangular(&DMatrix::identity(count, count))?;
         let (shares, column_squares) = self.shares(&orthonormal);
         let square_sum: f64 = column_squares.iter().sum();
         square_sum.is_finite().then(|| Evaluation {
@@ -298,7 +302,7 @@ impl PoleProblem {
         Some(self.shares(&orthonormal).1)
     }
 
-    /// Returns Q of the poles' columns without the fixed part, and the inverse of R; `None` where they are not independent.
+    /// Returns Q and R of the poles' columns without the fixed part; `None` where they are not independent.
     fn orthonormalised(&self, poles: &[Complex64]) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let mut model = self.fixed.complement(self.lines.model(poles));
         let count = model.ncols();
@@ -324,8 +328,7 @@ impl PoleProblem {
             model.column_mut(column).scale_mut(remains.recip());
             upper[(column, column)] = remains;
         }
-        let inverse = upper.solve_upper_triangular(&DMatrix::identity(count, count))?;
-        Some((model, inverse))
+        Some((model, upper))
     }
 
     /// Returns Q'Y, and the sum of the squares of each column of Y - Q Q'Y.
@@ -370,9 +373,10 @@ impl PoleProblem {
         }
     }
 
-    /// Returns the slopes of the residual of `data` at an evaluation.
+    /// Returns the slopes at an evaluation, and their products with the residual of `data`.
     ///
-    /// They are free of Q and of the fixed part: their products with the data are those with the residual.
+    /// The slope columns are orthogonal to Q and to the fixed part. So their products with the data are those with the
+    /// residual, even where the data hold a fixed part.
     fn slopes(&self, at: &Evaluation, data: &DMatrix<f64>) -> Slopes {
         let mut raw = self.fixed.complement(self.lines.slopes(&at.poles));
         let along = at.orthonormal.tr_mul(&raw);
@@ -597,7 +601,7 @@ mod tests {
             for order in 0..3 {
                 let difference = (&above[order] - &below[order]) / (2.0 * step);
                 let error = (difference - &here[order + 1]).norm() / here[order + 1].norm();
-                // The third difference over the pole's distance of 0.4 lines squared: (step/0.4)^2 some ten times.
+                // Two orders higher over six: 20/6 of (step/distance)^2 at most, and the distance is 0.4 lines or more.
                 assert!(error < 1e-8, "{basis:?} {order}: {error:e}");
             }
         }

@@ -277,30 +277,58 @@ fn recover_a_second_mode_only_where_there_is_one() {
     assert_eq!(mistaken, 0);
 }
 
-/// The bound that spares tests in vain is below every second pole that the data ask for, and noise seldom passes it.
+/// Wherever a test finds that a second pole is needed, there is room for it; where there is one mode, seldom.
 #[test]
 fn prop_there_is_room_wherever_a_second_pole_is_needed() {
     let settings = FitSettings::default();
-    let (mut needed, mut passed) = (0, 0);
-    for seed in 0..60 {
+    let (mut needed, mut missed, mut alone, mut passed) = (0, 0, 0, 0);
+    for seed in 0..240 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let (modes, data) = close_pair(&mut random, 0.02 * f64::from(seed as u8 % 6));
-        let (accepted, fits) = Accepted::new(&data, &[start(modes[0], 0.05)], &settings);
-        let fit = fits[0].as_ref().unwrap();
+        let first: Mode = (125.1, 0.002 * 2f64.powf(random.random_range(-1.0..1.0)));
+        let half_width = first.0 * first.1;
+        let away = random.random_range(0.3..3.5) * half_width;
+        let second = (
+            first.0 + away,
+            first.1 * 3f64.powf(random.random_range(-1.0..1.0)),
+        );
+        let is_alone = seed % 4 == 0;
+        let size = match is_alone {
+            true => 0.0,
+            false => 10f64.powf(random.random_range(-2.0..-0.3)),
+        };
+        let (taps, sensors) = (random.random_range(1..5), random.random_range(1..4));
+        let shapes: Vec<f64> = (0..2 * sensors)
+            .map(|_| random.random_range(-1.0..1.0))
+            .collect();
+        let taps: Vec<Vec<Vec<f64>>> = (0..taps)
+            .map(|_| {
+                let phase = Complex64::from_polar(random.random_range(0.7..1.3), 0.4);
+                let shapes = shapes.chunks_exact(2);
+                let parts = shapes
+                    .map(|shape| [(first, phase * shape[0]), (second, phase * shape[1] * size)]);
+                let sensors = parts.map(|parts| decay(&parts, (512.0, 2048), 1e-3, &mut random));
+                sensors.collect()
+            })
+            .collect();
+        let data = collect(&taps, 512.0, &[(100.0, 150.0)]);
+        let (accepted, fits) = Accepted::new(&data, &[start(first, 0.05)], &settings);
+        let Ok(fit) = &fits[0] else { continue };
         let room = accepted.has_room_beside(0, fit);
-        let width = fit.damping_ratio.value * fit.frequency.value;
+        let (frequency, ratio) = (fit.frequency.value, fit.damping_ratio.value);
         let asks = [-0.5, 0.5].map(|side| {
-            let beside = start((fit.frequency.value, fit.damping_ratio.value), side * width);
+            let beside = start((frequency, ratio), side * frequency * ratio);
             accepted.test(&beside).0.needed
         });
-        needed += usize::from(asks.contains(&true));
-        assert!(room || !asks.contains(&true), "seed {seed}");
-        passed += usize::from(room && seed % 6 == 0);
+        let is_needed = asks.contains(&true);
+        needed += usize::from(is_needed);
+        missed += usize::from(is_needed && !room);
+        alone += usize::from(is_alone);
+        passed += usize::from(is_alone && room);
     }
-    // Five in six have a second mode, the weakest a fiftieth of the first. Ten have none: 7 terms of 4 columns lower the
-    // residual as two unknowns of a pole and its 4 amplitudes seldom would.
-    assert!(needed > 25, "{needed}");
-    assert!(passed <= 2, "{passed}");
+    assert!(needed > 100, "{needed}");
+    // Only second poles at the limit of what the data show, one in fifty.
+    assert!(50 * missed <= needed, "{missed} of {needed}");
+    assert!(10 * passed <= alone, "{passed} of {alone}");
 }
 
 /// A mode whose frequency falls by a tenth of its half-power width at the hardest of taps of very different strength,

@@ -7,7 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_signal::recording::{Channel, ReadSettings, Recording, WavFormat, write_wav};
-use tapjoint_signal::taps::{Rejection, Tap, TapRemark, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{
+    Rejection, Tap, TapRemark, TapSettings, TapSource, Taps, TapsByHand, find_taps,
+};
 
 /// Form of a hammer pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -442,6 +444,105 @@ fn recover_every_second_hit_of_twelve_percent_and_none_of_eight() {
         let (_, samples) = five_taps((rate, seed), shape, second(0.08));
         assert_all_accepted(&hammer_taps(rate, samples), 5, &format!("{case}, but 8 %"));
     }
+}
+
+#[test]
+fn prop_taps_by_hand_change_no_other_tap() {
+    let (pulses, samples) = five_taps((5120.0, 3), Shape::SineSquared, |pulses| {
+        let main = pulses[1];
+        pulses.push(pulse(main.time + 0.05, main.width, 0.3 * main.peak));
+    });
+    let recording = recording(5120.0, vec![samples]);
+    let by_hand = |accept: Vec<f64>, reject: Vec<f64>| {
+        let settings = TapSettings {
+            by_hand: TapsByHand { accept, reject },
+            ..TapSettings::default()
+        };
+        find_taps(&recording, &hammer_alone(), &settings).unwrap()
+    };
+    let rules = by_hand(vec![], vec![]);
+    assert!(!rules.taps[1].accepted());
+    // Half the reach away from the trigger.
+    let found = by_hand(vec![pulses[1].time + 0.025], vec![pulses[3].time - 0.025]);
+    assert_eq!(found.remarks, rules.remarks);
+    for (index, (tap, before)) in found.taps.iter().zip(&rules.taps).enumerate() {
+        let expected = match index {
+            1 => Tap {
+                rejection: None,
+                overruled: before.rejection.clone(),
+                ..before.clone()
+            },
+            3 => Tap {
+                rejection: Some(Rejection::ByHand),
+                ..before.clone()
+            },
+            _ => before.clone(),
+        };
+        assert_eq!(*tap, expected, "tap {index}");
+    }
+    // Who rejects and accepts one tap does not want it.
+    let both = by_hand(vec![pulses[1].time], vec![pulses[1].time]);
+    assert_eq!(both.taps[1].rejection, Some(Rejection::ByHand));
+}
+
+#[test]
+fn limit_a_time_without_a_tap_is_a_remark() {
+    let (pulses, samples) = five_taps((5120.0, 3), Shape::SineSquared, |_| {});
+    let recording = recording(5120.0, vec![samples]);
+    let remarks = |recording: &Recording, time: f64| {
+        let settings = TapSettings {
+            by_hand: TapsByHand {
+                accept: vec![],
+                reject: vec![time],
+            },
+            ..TapSettings::default()
+        };
+        let found = find_taps(recording, &hammer_alone(), &settings).unwrap();
+        assert!(found.taps.iter().all(Tap::accepted));
+        found.remarks
+    };
+    let time = pulses[2].time + 0.08;
+    match &remarks(&recording, time)[..] {
+        [
+            TapRemark::NoTapThere {
+                time: told,
+                nearest: Some(nearest),
+            },
+        ] => {
+            assert_eq!(*told, time);
+            assert!((nearest - pulses[2].time).abs() < 2e-3, "{nearest}");
+        }
+        other => panic!("{other:?}"),
+    }
+    let silent = self::recording(5120.0, vec![vec![0.0; 5120]]);
+    let expected = TapRemark::NoTapThere {
+        time,
+        nearest: None,
+    };
+    assert_eq!(remarks(&silent, time), [expected]);
+}
+
+/// Of two taps the last has a fifth of the other's record.
+#[test]
+fn limit_no_hand_makes_a_short_record_longer() {
+    let mut samples = ringing(2048.0, 6.0, &[0.5, 5.0], &[(300.3, 0.01, 1.0)]);
+    add_noise(&mut samples, 1e-4, &mut random(5));
+    let recording = recording(2048.0, vec![samples]);
+    let settings = TapSettings {
+        by_hand: TapsByHand {
+            accept: vec![5.0],
+            reject: vec![],
+        },
+        ..TapSettings::default()
+    };
+    let found = find_taps(&recording, &TapSource::Responses(vec![0]), &settings).unwrap();
+    let rejection = found.taps[1].rejection.clone().expect("rejected");
+    assert!(matches!(rejection, Rejection::CutOff { .. }), "{rejection}");
+    let time = found.taps[1].time;
+    assert_eq!(
+        found.remarks,
+        [TapRemark::StillRejected { time, rejection }]
+    );
 }
 
 #[test]

@@ -130,7 +130,7 @@ impl Accepted<'_> {
     ///
     /// A second pole within about two half widths adds the derivatives of the first one's function, and a broad pole is a
     /// polynomial over the band. There is room where these with free amplitudes are needed, or a pole at one of some places
-    /// up to [`SCANNED`] half widths away. Second poles at the limit of what the data show may be missed.
+    /// up to four half widths away. Second poles at the limit of what the data show may be missed.
     pub fn has_room_beside(&self, index: usize, mode: &ModeFit) -> bool {
         let thinned = Accepted {
             most_lines: SCREENED,

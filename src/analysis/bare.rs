@@ -64,7 +64,7 @@ impl BareSettings {
         Ok(recording.renamed(name_of(path)))
     }
 
-    fn adjust(&self, measure: &mut MeasureSettings) {
+    pub(super) fn adjust(&self, measure: &mut MeasureSettings) {
         measure.block = self.block;
         measure.band = self.band;
         measure.window = self.window;

@@ -24,6 +24,7 @@ mod function_file;
 mod function_fits;
 mod identification;
 mod lengths;
+mod live;
 mod measured_shapes;
 mod measurement;
 mod mode_file;
@@ -54,6 +55,7 @@ pub use function_file::{FunctionSettings, measure_functions_watched};
 use identification::identify_watched;
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 use lengths::measured_modes_of;
+pub use live::{RecordingPlan, TapsSoFar, taps_so_far};
 pub use measured_shapes::{
     MeasuredShape, ShapeAgreement, ShapeBy, ShapePoint, measured_shapes, shape_agreement,
 };

@@ -68,6 +68,17 @@ impl MeasureSettings {
     }
 }
 
+impl MeasureSettings {
+    /// Returns the limits for taps, with the length of the wanted block.
+    pub(super) fn tap_settings(&self, lines: &Lines) -> TapSettings {
+        let length = lines.block as f64 / (DISPLAY_RATIO * (lines.high - lines.low));
+        TapSettings {
+            wanted: self.block.map(|_| length),
+            ..self.taps.clone()
+        }
+    }
+}
+
 /// Taps and spectra of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
@@ -162,11 +173,7 @@ pub(super) fn measure_watched(
     // The band is judged before anything is read: it is the user's typing, not the data.
     let trial = lines_for(settings, recording.sample_rate(), recording.duration());
     let trial = trial.map_err(|problem| MeasureError::of(recording, problem))?;
-    let mut tap_settings = settings.taps.clone();
-    tap_settings.wanted = settings
-        .block
-        .map(|_| trial.block as f64 / (DISPLAY_RATIO * (trial.high - trial.low)));
-    let taps = find_taps(recording, &settings.source, &tap_settings)?;
+    let taps = find_taps(recording, &settings.source, &settings.tap_settings(&trial))?;
     let mut warnings = of_recording(recording, &settings.source, &taps);
     let mut spectra = None;
     if let Some(shortest) = taps.shortest() {
@@ -209,7 +216,7 @@ pub(super) fn measure_watched(
 }
 
 /// The axis: block and band as wanted, or the longest block that fits `available` seconds.
-fn lines_for(
+pub(super) fn lines_for(
     settings: &MeasureSettings,
     rate: f64,
     available: f64,

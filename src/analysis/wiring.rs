@@ -106,19 +106,7 @@ fn measure_described(
         _ => open_joined(description, folder, &read)?,
     };
     let wiring = described_wiring(test, &mut recording, test_file)?;
-    let mut settings = MeasureSettings::new(wiring.source());
-    settings.band = description.band;
-    settings.block = description.block;
-    settings.taps.keep_overload = description.keep_overload;
-    settings.taps.by_hand = TapsByHand {
-        accept: description.accept_taps.clone(),
-        reject: description.reject_taps.clone(),
-    };
-    settings.window = test.analysis.window;
-    settings.reading = test.analysis.reading;
-    settings.poles = poles_of(test, description);
-    let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
-    settings.kinds = kinds.collect();
+    let settings = described_settings(test, description, &wiring);
     let finished = finish(recording.renamed(file), settings, &wiring, work);
     let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(problem @ MeasureError::Spectral { .. }) => {
@@ -156,8 +144,30 @@ fn open_joined(
     Recording::joined(description.name(), parts)
 }
 
+/// Returns the settings of a described recording.
+pub(super) fn described_settings(
+    test: &TestDescription,
+    description: &RecordingDescription,
+    wiring: &Wiring,
+) -> MeasureSettings {
+    let mut settings = MeasureSettings::new(wiring.source());
+    settings.band = description.band;
+    settings.block = description.block;
+    settings.taps.keep_overload = description.keep_overload;
+    settings.taps.by_hand = TapsByHand {
+        accept: description.accept_taps.clone(),
+        reject: description.reject_taps.clone(),
+    };
+    settings.window = test.analysis.window;
+    settings.reading = test.analysis.reading;
+    settings.poles = poles_of(test, description);
+    let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
+    settings.kinds = kinds.collect();
+    settings
+}
+
 /// Finds and scales the described channels of a recording.
-fn described_wiring(
+pub(super) fn described_wiring(
     test: &TestDescription,
     recording: &mut Recording,
     test_file: &str,
@@ -251,7 +261,7 @@ pub fn measure_bare_watched(
 }
 
 /// The channels of a bare recording, with the names and units that the file gives.
-fn bare_wiring(
+pub(super) fn bare_wiring(
     recording: &Recording,
     hammer: Option<&ChannelRef>,
 ) -> Result<Wiring, RecordingError> {
@@ -348,11 +358,6 @@ fn result(
     let readings = spectra.map_or(0, |spectra| spectra.readings.len());
     let responses = wiring.responses.iter();
     let responses: Vec<Response> = responses.map(|(_, response)| response.clone()).collect();
-    // Without a hammer the unit that all responses have.
-    let common_unit = responses.first().and_then(|first| {
-        let same = responses.iter().all(|other| other.unit == first.unit);
-        first.unit.clone().filter(|_| same)
-    });
     if let Some(spectra) = measurement.spectra.as_mut() {
         let force_unit = wiring.hammer_unit.as_deref();
         let forms = responses.iter().map(|one| form_of(one, force_unit));
@@ -390,10 +395,7 @@ fn result(
         channels: recording.channels().to_vec(),
         has_hammer: wiring.hammer.is_some(),
         conditions: Conditions::default(),
-        tap_unit: match wiring.hammer {
-            Some(_) => wiring.hammer_unit.clone(),
-            None => common_unit,
-        },
+        tap_unit: wiring.tap_unit(),
         responses,
         band: settings.band,
         overview: Some(Overview {
@@ -434,6 +436,17 @@ impl Wiring {
             Some(channel) => TapSource::Hammer { channel, responses },
             None => TapSource::Responses(responses),
         }
+    }
+
+    /// The unit of the force, or without a hammer the one that all responses have.
+    pub(super) fn tap_unit(&self) -> Option<String> {
+        if self.hammer.is_some() {
+            return self.hammer_unit.clone();
+        }
+        let (_, first) = self.responses.first()?;
+        let mut responses = self.responses.iter();
+        let is_common = responses.all(|(_, other)| other.unit == first.unit);
+        first.unit.clone().filter(|_| is_common)
     }
 
     /// Every channel with its unit.

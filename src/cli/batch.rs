@@ -288,11 +288,11 @@ fn merged_places(
             read.fetch_add(1, Ordering::Relaxed) + 1,
             tests.len(),
         );
-        // The new record replaces an earlier one.
-        if let Some(earlier) = earlier {
+        let place = journals.place(index, key);
+        // The new record replaces an earlier one. That of an unfinished test has another key, and replaces none.
+        if let (Some(earlier), Some(_)) = (earlier, place) {
             earlier.known().replace(key);
         }
-        let place = journals.place(index, key);
         place.or_else(|| journals.place(index, tests.bare_key(index)))
     });
     let places: Vec<Option<Place>> = places.collect();

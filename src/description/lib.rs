@@ -311,7 +311,7 @@ pub struct RecordingDescription {
     pub keep_overload: bool,
     /// Taps that are used whatever their faults: times of their triggers (s from the start of the recording), ascending.
     pub accept_taps: Vec<f64>,
-    /// Taps that are left out: times as above.
+    /// Taps that are left out: times as above. None of them is within 0.1 s of one of `accept_taps`.
     pub reject_taps: Vec<f64>,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,

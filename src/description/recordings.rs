@@ -19,6 +19,7 @@ use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
 use tapjoint_signal::recording::{MOST_FILES, TIME_UNITS};
 use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
+use tapjoint_signal::taps::REACH;
 
 /// Words of `kind` in `[[sensor]]`.
 pub const SENSOR_KINDS: [(&str, SensorKind); 4] = [
@@ -341,14 +342,8 @@ pub(super) fn read_recording(
     let reject_taps = table
         .optional("reject_taps", read_taps)?
         .unwrap_or_default();
-    if let (Some(entry), Some(time)) = (
-        table.get("reject_taps"),
-        reject_taps.iter().find(|time| accept_taps.contains(time)),
-    ) {
-        return Err(entry.error(format!(
-            "`accept_taps` and `reject_taps` both name the tap at {}; remove it from one of them",
-            with_unit(*time, "s")
-        )));
+    if let Some(entry) = table.get("reject_taps") {
+        check_chosen_once(&entry, &accept_taps, &reject_taps)?;
     }
     Ok(RecordingDescription {
         poles: table.optional("poles", read_poles)?,
@@ -674,8 +669,8 @@ pub(super) fn read_poles(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError
     read_ascending(entry, MOST_POLES, remedy)
 }
 
-/// Most taps that may be chosen by hand in one recording.
-const MOST_TAPS: usize = 1000;
+/// Most taps that may be chosen by hand in one recording: an hour of taps, three a second.
+const MOST_TAPS: usize = 10_000;
 const TAP_TIME: Limits = Limits::between(
     0.0,
     1e7,
@@ -684,13 +679,40 @@ const TAP_TIME: Limits = Limits::between(
 
 /// Reads the times of taps (s from the start of the recording), the earliest first.
 fn read_taps(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
-    let items = entry.list_up_to(MOST_TAPS, "a list of times such as [4.905, 12.31] (s)")?;
+    let items = entry.list("a list of times such as [4.905, 12.31] (s)")?;
+    if items.len() > MOST_TAPS {
+        let remedy = "divide the recording, or list fewer taps";
+        return Err(entry.wrong_count(items.len(), &format!("0 to {MOST_TAPS}"), remedy));
+    }
     let times = items
         .iter()
         .map(|item| item.within(Dimension::Time, &TAP_TIME));
     let times = times.collect::<Result<Vec<_>, _>>()?;
     check_ascending(&items, &times)?;
     Ok(times)
+}
+
+/// Refuses times (s) that may name one tap in both lists. `entry` holds those of rejected taps.
+fn check_chosen_once(
+    entry: &Entry<'_>,
+    accept: &[f64],
+    reject: &[f64],
+) -> Result<(), DescriptionError> {
+    for &time in reject {
+        // The tap between two times may be within reach of both.
+        let near = accept
+            .iter()
+            .find(|other| (**other - time).abs() <= 2.0 * REACH);
+        if let Some(other) = near {
+            return Err(entry.error(format!(
+                "`reject_taps` names the tap at {} and `accept_taps` the one at {}: times this close may name the same \
+                 tap; remove one of them",
+                with_unit(time, "s"),
+                with_unit(*other, "s")
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Reads natural frequencies (Hz), the lowest first, `most` of them. `remedy` goes with another number of them.

@@ -90,7 +90,8 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 # mass = [{ position = 0.423, mass = "15 g" }]   # known masses fastened for this recording, default: none
 # sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
 # overload = "keep"            # "reject" (default) taps that drove a channel to its limit | "keep" the decay after the last clipped sample
-# reject_taps = [4.905]        # s, taps to leave out, at the times of the table of taps; accept_taps = [12.31] uses taps that were rejected
+# reject_taps = [4.905]        # s, taps to leave out, at the times of the table of taps, default: none
+# accept_taps = [12.31]        # s, rejected taps to use all the same, default: none
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none
 # date = 2024-05-17            # carried to the outputs, default: none

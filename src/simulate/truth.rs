@@ -242,8 +242,10 @@ pub fn nominal_description(
             recording.insert("band".into(), Value::Array(band.map(Value::Float).to_vec()));
         }
         recording.insert("file".into(), file.into());
-        recording.remove("sample_rate");
-        recording.remove("level");
+        // The times name taps of other recordings.
+        for key in ["sample_rate", "level", "accept_taps", "reject_taps"] {
+            recording.remove(key);
+        }
     }
     Ok(format!("{HEAD}{table}"))
 }

@@ -241,7 +241,12 @@ fn regress_recordings_and_settings_that_cannot_be() {
             ("block = 2048", "accept_taps = 4.9"),
             (
                 "block = 2048",
-                "accept_taps = [\"4.9 s\"]\nreject_taps = [4.9]",
+                "accept_taps = [\"4.9 s\"]\nreject_taps = [4.82]",
+            ),
+            ("block = 2048", "accept_taps = [\"4.9 m\"]"),
+            (
+                "block = 2048",
+                "form = \"mobility\"\nsensor = \"tip\"\naccept_taps = [4.9]",
             ),
             ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
             ("at = { tip = 0.20 }", "at = { tip = 2 }"),

@@ -17,6 +17,9 @@ position = 0.205
 [[recording]]
 file = "taps.csv"
 tap = 0.385
+level = 0.9
+accept_taps = [1.0]
+reject_taps = [3.5]
 band = [0, 1000]
 "#
 );

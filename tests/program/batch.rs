@@ -575,6 +575,24 @@ fn regress_a_report_that_takes_too_long_leaves_the_record() {
 }
 
 #[test]
+fn regress_a_merge_of_unfinished_records_keeps_finished_ones() {
+    let folder = tests();
+    let place = folder.path();
+    batch(place, &["tests/t00"]);
+    let journal = place.join("batch-report/batch.jsonl");
+    let whole = fs::read_to_string(&journal).unwrap();
+    let record = whole.lines().nth(1).unwrap();
+    // No test takes as little as a microsecond.
+    refused(
+        place,
+        &["tests/t00", "--shard", "1/1", "--limit", "1e-6"],
+        1,
+    );
+    refused(place, &["tests/t00", "--merge"], 1);
+    assert!(fs::read_to_string(&journal).unwrap().contains(record));
+}
+
+#[test]
 fn limit_a_refused_call_writes_nothing() {
     let folder = tests();
     let place = folder.path();

@@ -11,7 +11,7 @@ use tapjoint_signal::modal::{ModeReading, PeakLabel};
 use tapjoint_signal::quality::{Check, Outcome, QualityVerdict, Subject, limits};
 use tapjoint_signal::recording::{Recording, RecordingWarning};
 use tapjoint_signal::spectral::Window;
-use tapjoint_signal::taps::{TapSource, Taps};
+use tapjoint_signal::taps::{Rejection, TapSource, Taps};
 
 impl Warning {
     /// A doubt about a key or value of the description.
@@ -349,9 +349,19 @@ pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
         warnings.push(Warning::about(file, "taps", remark));
     }
     let accepted = taps.accepted().count();
-    let rejected = taps.taps.len() - accepted;
+    let total = taps.taps.len();
+    // Taps that the user left out are no news, unless none is left.
+    let by_hand = taps.taps.iter();
+    let by_hand = by_hand
+        .filter(|tap| tap.rejection == Some(Rejection::ByHand))
+        .count();
+    let rejected = total - accepted - by_hand;
     if rejected > 0 {
-        warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
+        warnings.push(Warning::rejected_taps(file, rejected, total));
+    }
+    if accepted == 0 && by_hand > 0 {
+        let text = format!("no tap is left; `reject_taps` names {by_hand} of {total}");
+        warnings.push(Warning::about(file, "taps", text));
     }
     if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
         warnings.push(Warning::single_tap(file));

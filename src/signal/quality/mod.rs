@@ -58,6 +58,8 @@ pub struct TapEvidence {
     pub overload: Option<Overload>,
     /// Why it was rejected; `None` = accepted.
     pub rejection: Option<Rejection>,
+    /// Why it would have been rejected, had it not been accepted by hand.
+    pub overruled: Option<Rejection>,
 }
 
 impl TapEvidence {
@@ -74,6 +76,7 @@ impl From<&Tap> for TapEvidence {
             second_hit: tap.second_hit,
             overload: tap.overload,
             rejection: tap.rejection.clone(),
+            overruled: tap.overruled.clone(),
         }
     }
 }

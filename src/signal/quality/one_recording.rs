@@ -129,15 +129,17 @@ pub(super) fn check_overload(recording: &RecordingEvidence) -> Vec<QualityVerdic
 /// No tap far weaker than the others; value and limit are in units of the least accepted peak.
 pub(super) fn check_weak(recording: &RecordingEvidence) -> Vec<QualityVerdict> {
     of_taps(recording, Check::WeakTap, 1.0, |tap, verdict| {
-        match &tap.rejection {
+        match tap.rejection.as_ref().or(tap.overruled.as_ref()) {
             Some(Rejection::TooWeak { peak, limit }) => {
                 let share = peak / limit;
                 let happened =
                     format!("A peak of {peak:.3}, {share:.2} of the least accepted {limit:.3}.");
                 verdict.found(share, Outcome::Doubtful, happened)
             }
-            Some(_) => verdict.missing("Not applicable: rejected for another reason."),
-            None => verdict.clear("As strong as the others.".to_owned()),
+            Some(_) if tap.rejection.is_some() => {
+                verdict.missing("Not applicable: rejected for another reason.")
+            }
+            _ => verdict.clear("As strong as the others.".to_owned()),
         }
     })
 }

@@ -25,12 +25,14 @@ mod csv;
 mod error;
 mod flac;
 mod function_text;
+mod growing;
 mod health;
 mod joined;
 mod kept;
 mod lvm;
 mod mat;
 mod outline;
+mod pcm;
 mod resample;
 mod response_files;
 mod responses;
@@ -43,10 +45,12 @@ mod wav;
 mod write;
 
 pub use error::{RecordingError, RecordingWarning};
+pub use growing::GrowingRecording;
 pub use health::{ChannelHealth, EqualRun};
 pub use joined::MOST_FILES;
 pub use mat::{VariableRole, Variables};
 pub use outline::{Extremes, Outline};
+pub use pcm::{PcmHead, PcmLayout, SampleForm};
 pub use response_files::open_frequency_responses;
 pub use responses::{FrequencyResponse, FrequencyResponses, ValueColumns};
 pub use text::Separator;
@@ -364,6 +368,19 @@ impl Recording {
     /// The file as the caller named it, or the name of a recording in memory.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Returns the recording with names, units and scales of the channels of another one with as many channels: its samples
+    /// are the same in file units.
+    pub fn with_headers_of(mut self, other: &Recording) -> Self {
+        for (own, other) in self.channels.iter_mut().zip(&other.channels) {
+            own.name.clone_from(&other.name);
+            own.unit.clone_from(&other.unit);
+            own.header_unit.clone_from(&other.header_unit);
+            own.health = own.health.scaled(other.scale / own.scale);
+            own.scale = other.scale;
+        }
+        self
     }
 
     /// Format of the file.

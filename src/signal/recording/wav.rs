@@ -5,7 +5,7 @@
 //! integers that do not fill their containers. No size is believed without comparing it with the file.
 
 use std::fs::File;
-use std::io::{Seek, SeekFrom};
+use std::io::{Cursor as BytesCursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
@@ -40,13 +40,10 @@ pub(super) fn open_wav(
     let source = WavSource::open(path, &file, &mut warnings)?;
     let (sample_rate, frames) = (f64::from(source.sample_rate), source.frames);
     warnings.extend(settings.ignored_rate(sample_rate));
-    let format = match source.coding {
-        Coding::Integer { valid, .. } => Format::WavInteger { bits: valid },
-        Coding::Float { bits } => Format::WavFloat { bits },
-    };
+    let format = source.format();
     let all: Vec<usize> = (0..source.channels).collect();
-    let mut meters = vec![HealthMeter::new(source.coding.full_scale()); source.channels];
-    let per_block = (PASS_SAMPLES / source.channels).max(1) as u64;
+    let mut meters = source.meters();
+    let per_block = source.frames_of_a_pass();
     let mut kept = KeptSamples::new(source.channels);
     let mut cursor = source.reader(0)?;
     let mut block = vec![Vec::new(); all.len()];
@@ -94,19 +91,19 @@ pub(super) fn open_wav(
 }
 
 /// A WAV file whose header has been understood and checked against the file.
-#[derive(Debug)]
-struct WavSource {
+#[derive(Debug, Clone)]
+pub(super) struct WavSource {
     path: PathBuf,
     file: String,
-    sample_rate: u32,
-    channels: usize,
+    pub(super) sample_rate: u32,
+    pub(super) channels: usize,
     coding: Coding,
     /// Bytes of one sample of all channels.
     frame_bytes: u64,
     /// First byte of the samples in the file.
     data_start: u64,
     /// Complete samples per channel that are in the file.
-    frames: u64,
+    pub(super) frames: u64,
 }
 
 impl Source for WavSource {
@@ -116,8 +113,34 @@ impl Source for WavSource {
 }
 
 impl WavSource {
+    pub(super) fn format(&self) -> Format {
+        match self.coding {
+            Coding::Integer { valid, .. } => Format::WavInteger { bits: valid },
+            Coding::Float { bits } => Format::WavFloat { bits },
+        }
+    }
+
+    /// Returns a meter for each channel.
+    pub(super) fn meters(&self) -> Vec<HealthMeter> {
+        vec![HealthMeter::new(self.coding.full_scale()); self.channels]
+    }
+
+    /// Returns the frames that are handled at a time when the samples are checked.
+    pub(super) fn frames_of_a_pass(&self) -> u64 {
+        (PASS_SAMPLES / self.channels).max(1) as u64
+    }
+
+    /// Takes all complete frames that the file holds by now, whatever its header says.
+    pub(super) fn take_all(&mut self) -> Result<(), RecordingError> {
+        let found =
+            std::fs::metadata(&self.path).map_err(|source| unreadable(&self.file, source))?;
+        let bytes = found.len().saturating_sub(self.data_start);
+        self.frames = bytes / self.frame_bytes;
+        Ok(())
+    }
+
     /// Walks the chunks up to the samples, from the first one behind "RIFF", a size and "WAVE".
-    fn open(
+    pub(super) fn open(
         path: &Path,
         file: &str,
         warnings: &mut Vec<RecordingWarning>,
@@ -173,7 +196,7 @@ impl WavSource {
     }
 
     /// Positions a reader at `frame`.
-    fn reader(&self, frame: u64) -> Result<WavCursor<'_>, RecordingError> {
+    pub(super) fn reader(&self, frame: u64) -> Result<WavCursor<'_>, RecordingError> {
         let at = frame.min(self.frames);
         let start = SeekFrom::Start(self.data_start + at * self.frame_bytes);
         let opened = File::open(&self.path).and_then(|mut reader| {
@@ -228,7 +251,7 @@ impl WavSource {
 
 /// A reader somewhere in the samples.
 #[derive(Debug)]
-struct WavCursor<'a> {
+pub(super) struct WavCursor<'a> {
     source: &'a WavSource,
     reader: File,
     /// The next frame.
@@ -311,8 +334,8 @@ fn from_high_end<const BYTES: usize>(bytes: &[u8]) -> f64 {
 }
 
 /// A file whose chunks are read.
-struct ChunkWalker<'a> {
-    reader: File,
+struct ChunkWalker<'a, R> {
+    reader: R,
     /// The file's name in errors.
     file: &'a str,
     length: u64,
@@ -326,7 +349,7 @@ struct WaveFormat {
     coding: Coding,
 }
 
-impl ChunkWalker<'_> {
+impl<R: Read + Seek> ChunkWalker<'_, R> {
     /// Name and size of the chunk at `at`; `None` at the end of the file.
     fn chunk_header(&mut self, at: u64) -> Result<Option<([u8; 4], u32)>, RecordingError> {
         let mut header = [0_u8; 8];
@@ -473,6 +496,68 @@ impl ChunkWalker<'_> {
             format!("the WAV header says {field} {value}; allowed: {allowed}; export it again");
         RecordingError::new(self.file, problem)
     }
+}
+
+/// What the head of a WAV stream says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct WavHead {
+    pub(super) sample_rate: u32,
+    pub(super) channels: u16,
+    /// Bytes of one sample of all channels.
+    pub(super) frame_bytes: u64,
+    /// Content of its "fmt " chunk.
+    pub(super) format_chunk: Vec<u8>,
+    /// Bytes before the samples.
+    pub(super) length: usize,
+    /// Bytes of samples that it promises.
+    pub(super) promised: u32,
+}
+
+/// Reads the head of a WAV file that comes as a stream; `None` while bytes are missing. `name` stands for it in errors.
+pub(super) fn read_head(name: &str, bytes: &[u8]) -> Result<Option<WavHead>, RecordingError> {
+    let mut walker = ChunkWalker {
+        reader: BytesCursor::new(bytes),
+        file: name,
+        length: bytes.len() as u64,
+    };
+    let (mut at, mut format) = (12, None);
+    while let Some((chunk, size)) = walker.chunk_header(at)? {
+        let content = at + 8;
+        let end = content.saturating_add(u64::from(size));
+        match (&chunk, format) {
+            (b"data", None) => return Err(walker.missing("fmt ", " before the samples")),
+            (
+                b"data",
+                Some((
+                    WaveFormat {
+                        channels,
+                        sample_rate,
+                        coding,
+                    },
+                    format_chunk,
+                )),
+            ) => {
+                check_channel_count(name, usize::from(channels))?;
+                return Ok(Some(WavHead {
+                    sample_rate,
+                    channels,
+                    frame_bytes: u64::from(channels) * coding.bytes(),
+                    format_chunk,
+                    length: content as usize,
+                    promised: size,
+                }));
+            }
+            // A chunk is judged once all of it is there.
+            _ if end > bytes.len() as u64 => return Ok(None),
+            (b"fmt ", _) => {
+                let own = bytes[content as usize..end as usize].to_vec();
+                format = Some((walker.read_format(content, size)?, own));
+            }
+            (_, known) => format = known,
+        }
+        at = walker.after_chunk(content, u64::from(size))?;
+    }
+    Ok(None)
 }
 
 /// Coding of the samples.

@@ -1,39 +1,78 @@
 //! Taps that a person accepts or rejects, whatever the rules say of them.
 
-use super::{Rejection, Tap, TapRemark};
+use super::{Event, Rejection, Tap, TapRemark};
 
 /// Distance within which a time names a tap (s). 50 ms: far less than between two taps, and more than the digits of a table
 /// leave open.
-pub(super) const REACH: f64 = 0.05;
+pub const REACH: f64 = 0.05;
 
 /// Taps that are accepted or rejected by hand, named by the times of their triggers.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TapsByHand {
     /// Accepted whatever their faults (s from the start of the recording).
     pub accept: Vec<f64>,
-    /// Rejected (s from the start of the recording).
+    /// Rejected (s from the start of the recording). A tap that is named twice is rejected.
     pub reject: Vec<f64>,
 }
 
 impl TapsByHand {
-    /// Judges the taps that are named. Returns a remark for each time without a tap.
-    ///
-    /// A tap that drove a channel to its limit gives its decay, as [`TapSettings::keep_overload`](super::TapSettings) has
-    /// it. A tap that is named twice is rejected.
-    pub(super) fn judge(&self, taps: &mut [Tap]) -> Vec<TapRemark> {
+    /// Marks the events that are accepted, before their records are cut: an accepted tap ends the record before it.
+    /// Returns a remark for each time without an event. `starts` are the times at which the files of the events begin (s).
+    pub(super) fn mark(
+        &self,
+        files: &mut [&mut [Event]],
+        starts: &[f64],
+        rate: f64,
+    ) -> Vec<TapRemark> {
         let mut remarks = Vec::new();
-        for (place, &time) in self.accept.iter().chain(&self.reject).enumerate() {
-            let nearest = nearest(taps, time);
-            let Some(tap) = nearest.filter(|&tap| is_at(&taps[tap], time)) else {
-                let nearest = nearest.map(|tap| taps[tap].time);
-                remarks.push(TapRemark::NoTapThere { time, nearest });
-                continue;
-            };
-            let tap = &mut taps[tap];
-            if place < self.accept.len() {
-                tap.overruled = tap.rejection.take();
-            } else if tap.accepted() {
-                tap.rejection = Some(Rejection::ByHand);
+        for &time in &self.accept {
+            let mut best: Option<(f64, &mut Event)> = None;
+            for (events, start) in files.iter_mut().zip(starts) {
+                for event in events.iter_mut() {
+                    let own = start + event.trigger as f64 / rate;
+                    if best
+                        .as_ref()
+                        .is_none_or(|(other, _)| is_nearer(own, *other, time))
+                    {
+                        best = Some((own, event));
+                    }
+                }
+            }
+            match best {
+                Some((own, event)) if is_at(own, time) => event.by_hand = true,
+                other => remarks.push(TapRemark::NoTapThere {
+                    time,
+                    accept: true,
+                    nearest: other.map(|(own, _)| own),
+                }),
+            }
+        }
+        remarks
+    }
+
+    /// Rejects the taps that are named. Returns a remark for each time without a tap. A tap that is rejected for another
+    /// reason keeps that reason.
+    pub(super) fn reject(&self, taps: &mut [Tap]) -> Vec<TapRemark> {
+        let mut remarks = Vec::new();
+        for &time in &self.reject {
+            let mut best: Option<&mut Tap> = None;
+            for tap in taps.iter_mut() {
+                if best
+                    .as_ref()
+                    .is_none_or(|other| is_nearer(tap.time, other.time, time))
+                {
+                    best = Some(tap);
+                }
+            }
+            match best {
+                Some(tap) if is_at(tap.time, time) => {
+                    tap.rejection.get_or_insert(Rejection::ByHand);
+                }
+                other => remarks.push(TapRemark::NoTapThere {
+                    time,
+                    accept: false,
+                    nearest: other.map(|tap| tap.time),
+                }),
             }
         }
         remarks
@@ -41,11 +80,10 @@ impl TapsByHand {
 
     /// Returns a remark for each tap that was accepted by hand, and is rejected all the same: its record is too short.
     pub(super) fn still_rejected(&self, taps: &[Tap]) -> Vec<TapRemark> {
+        let is_named = |tap: &&Tap| self.accept.iter().any(|time| is_at(tap.time, *time));
         let mut remarks = Vec::new();
-        for &time in &self.accept {
-            let named = nearest(taps, time).map(|tap| &taps[tap]);
-            if let Some(tap) = named.filter(|tap| is_at(tap, time))
-                && let Some(rejection) = tap.rejection.clone()
+        for tap in taps.iter().filter(is_named) {
+            if let Some(rejection) = tap.rejection.clone()
                 && rejection != Rejection::ByHand
             {
                 let time = tap.time;
@@ -56,12 +94,11 @@ impl TapsByHand {
     }
 }
 
-/// Returns the index of the tap nearest to a time (s).
-fn nearest(taps: &[Tap], time: f64) -> Option<usize> {
-    let distance = |tap: &usize| (taps[*tap].time - time).abs();
-    (0..taps.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+/// Returns `true` where `own` is nearer to a time than the `other` one (s).
+fn is_nearer(own: f64, other: f64, time: f64) -> bool {
+    (own - time).abs() < (other - time).abs()
 }
 
-fn is_at(tap: &Tap, time: f64) -> bool {
-    (tap.time - time).abs() <= REACH
+fn is_at(own: f64, time: f64) -> bool {
+    (own - time).abs() <= REACH
 }

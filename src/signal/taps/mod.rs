@@ -10,7 +10,7 @@ mod double_hit;
 mod pulse;
 mod search;
 
-pub use by_hand::TapsByHand;
+pub use by_hand::{REACH, TapsByHand};
 pub use double_hit::SecondHit;
 pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
@@ -79,6 +79,8 @@ pub struct TapSettings {
     pub keep_overload: bool,
     /// Taps that are accepted or rejected by hand.
     pub by_hand: TapsByHand,
+    /// True while the recording goes on: its end then cuts off no record.
+    pub is_growing: bool,
 }
 
 impl Default for TapSettings {
@@ -95,6 +97,7 @@ impl Default for TapSettings {
             wanted: None,
             keep_overload: false,
             by_hand: TapsByHand::default(),
+            is_growing: false,
         }
     }
 }
@@ -122,7 +125,8 @@ pub struct Tap {
     pub overload: Option<Overload>,
     /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
-    /// Reason for which it would have been rejected, had it not been accepted by hand.
+    /// Reason for which it would have been rejected, had it not been accepted by hand; never an overload, of which only the
+    /// decay is used.
     pub overruled: Option<Rejection>,
 }
 
@@ -256,7 +260,7 @@ impl fmt::Display for Rejection {
                     "the next tap comes after {available:.2} s, {needed:.2} s are needed"
                 )
             }
-            Rejection::ByHand => f.write_str("by hand"),
+            Rejection::ByHand => f.write_str("rejected by hand"),
         }
     }
 }
@@ -292,6 +296,8 @@ pub enum TapRemark {
     NoTapThere {
         /// Where (s from the start of the recording).
         time: f64,
+        /// True where it was to be accepted.
+        accept: bool,
         /// The nearest tap (s); `None` without any.
         nearest: Option<f64>,
     },
@@ -336,12 +342,16 @@ impl fmt::Display for TapRemark {
                  overload = \"keep\" in [[recording]], or --overload keep, uses their decays after the last sample \
                  that was cut off"
             ),
-            TapRemark::NoTapThere { time, nearest } => {
-                let reach = 1e3 * by_hand::REACH;
+            TapRemark::NoTapThere {
+                time,
+                accept,
+                nearest,
+            } => {
+                let key = if *accept { "accept_taps" } else { "reject_taps" };
+                let reach = 1e3 * REACH;
                 write!(
                     f,
-                    "no tap lies within {reach:.0} ms of {time:.3} s, where one was to be accepted or rejected by hand; \
-                     correct the time"
+                    "{key} names {time:.3} s, and no tap lies within {reach:.0} ms of it; correct the time"
                 )?;
                 match nearest {
                     Some(nearest) => write!(f, ": the nearest tap is at {nearest:.3} s"),
@@ -399,6 +409,18 @@ struct Event {
     peak: f64,
     /// A sensor answers it; without a hammer the answer is the event.
     answered: bool,
+    /// It is accepted by hand.
+    by_hand: bool,
+}
+
+impl Event {
+    /// Returns `true` for a hit of the structure. It ends the record before it.
+    ///
+    /// What moves no sensor, or stays below the `weakest` peak, disturbs a record no more than is tolerated of a second
+    /// excursion.
+    fn is_hit(&self, weakest: f64) -> bool {
+        self.by_hand || self.answered && self.peak >= weakest
+    }
 }
 
 /// Result of a search, before it is judged.
@@ -435,6 +457,13 @@ pub fn find_taps(
         .collect();
     let weakest = settings.weak * median(&mut peaks);
     let rate = recording.sample_rate();
+    let starts: Vec<f64> = searched
+        .iter()
+        .map(|(start, ..)| *start as f64 / rate)
+        .collect();
+    let found = searched.iter_mut();
+    let mut files: Vec<&mut [Event]> = found.map(|(.., found)| &mut found.events[..]).collect();
+    let mut remarks = settings.by_hand.mark(&mut files, &starts, rate);
     let mut taps = Vec::with_capacity(peaks.len());
     // Last tap of each file.
     let mut lasts = Vec::new();
@@ -463,8 +492,9 @@ pub fn find_taps(
             }
         }
     }
-    let mut remarks = settings.by_hand.judge(&mut taps);
-    reject_short(&mut taps, &lasts, rate, settings.wanted);
+    remarks.extend(settings.by_hand.reject(&mut taps));
+    let going_on = taps.len().checked_sub(1).filter(|_| settings.is_growing);
+    reject_short(&mut taps, &lasts, going_on, rate, settings.wanted);
     remarks.extend(settings.by_hand.still_rejected(&taps));
     let mut noise = 0.0_f64;
     for (_, file, found) in searched {
@@ -539,11 +569,10 @@ fn tap(
 ) -> Result<Tap, RecordingError> {
     let rate = recording.sample_rate();
     let event = &found.events[index];
-    // The record ends with the pre-trigger of the next tap, or with the file. What moves no sensor, or stays below a
-    // tenth of the usual tap, disturbs a record no more than is tolerated of a second excursion, and does not end it.
+    // The record ends with the pre-trigger of the next tap, or with the file.
     let before = ((settings.pre_trigger * rate) as u64).max(16);
     let mut later = found.events.iter().skip(index + 1);
-    let next = later.find(|next| next.answered && next.peak >= weakest);
+    let next = later.find(|next| next.is_hit(weakest));
     let end = next.map_or(recording.frames(), |next| {
         next.trigger.saturating_sub(before)
     });
@@ -560,8 +589,8 @@ fn tap(
         pulse_end = Some(end);
         second = second_hit(&force, event, own, settings);
     }
-    let mut overloaded = None;
-    let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
+    let double = second.filter(|second| second.ratio >= settings.double_hit);
+    let fault = match double {
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
             peak: event.peak,
@@ -572,10 +601,15 @@ fn tap(
             ratio: double.ratio,
             limit: settings.double_hit,
         }),
-        None => {
-            overloaded = overload(recording, source, &record)?;
-            overloaded.map(Rejection::Overload)
-        }
+        None => None,
+    };
+    let mut overloaded = None;
+    if fault.is_none() || event.by_hand {
+        overloaded = overload(recording, source, &record)?;
+    }
+    let (rejection, overruled) = match event.by_hand {
+        true => (None, fault),
+        false => (fault.or(overloaded.map(Rejection::Overload)), None),
     };
     Ok(Tap {
         file: None,
@@ -587,7 +621,7 @@ fn tap(
         second_hit: second,
         overload: overloaded,
         rejection,
-        overruled: None,
+        overruled,
     })
 }
 
@@ -634,7 +668,7 @@ fn force_of(
     let inside = events.partition_point(|event| event.trigger + least < first)
         ..events.partition_point(|event| event.trigger < end + least);
     for (event, other) in events[inside.clone()].iter().zip(inside) {
-        if other != index && !event.answered {
+        if other != index && !event.answered && !event.by_hand {
             let start = force.index(event.trigger.saturating_sub(least / 100));
             let end = force.index(event.trigger + least);
             force.samples[start..end].fill(0.0);
@@ -696,19 +730,24 @@ fn overload(
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
-/// record sets its length. `lasts` are the last taps of the files, which may be cut off.
-fn reject_short(taps: &mut [Tap], lasts: &[usize], rate: f64, wanted: Option<f64>) {
-    let mut lengths: Vec<f64> = taps
-        .iter()
-        .filter(|tap| tap.accepted())
-        .map(|tap| tap.frames() as f64 / rate)
-        .collect();
+/// record sets its length. `lasts` are the last taps of the files, which may be cut off. The record of the tap `going_on`
+/// has not ended.
+fn reject_short(
+    taps: &mut [Tap],
+    lasts: &[usize],
+    going_on: Option<usize>,
+    rate: f64,
+    wanted: Option<f64>,
+) {
+    let ended = taps.iter().enumerate();
+    let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
+    let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
     let typical = median(&mut lengths);
     let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
     for (index, tap) in taps.iter_mut().enumerate() {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if tap.accepted() && available <= SHORT_OF_MEDIAN * needed {
+        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if let Some(overload) = tap.overload {
                 Rejection::Overload(overload)
             } else if lasts.contains(&index) {
@@ -726,7 +765,7 @@ fn reject_short(taps: &mut [Tap], lasts: &[usize], rate: f64, wanted: Option<f64
         .map(|(_, tap)| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
-    for &last in lasts {
+    for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
         let tap = &mut taps[last];
         let available = tap.frames() as f64 / rate;
         if tap.accepted()

@@ -252,6 +252,7 @@ fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Event> {
             trigger: trigger.unwrap_or(first).start,
             peak,
             answered: true,
+            by_hand: false,
         });
         rest = later;
     }
@@ -422,6 +423,7 @@ impl<'a> Envelope<'a> {
             trigger,
             peak: 0.0,
             answered: true,
+            by_hand: false,
         };
         let piece = trigger / self.frames;
         let levels = self.levels(piece..piece + 4 * BUILD_UP as u64)?;

@@ -279,7 +279,7 @@ fn recover_a_second_mode_only_where_there_is_one() {
 
 /// Wherever a test finds that a second pole is needed, there is room for it; where there is one mode, seldom.
 #[test]
-fn prop_there_is_room_wherever_a_second_pole_is_needed() {
+fn recover_room_where_a_second_pole_is_needed() {
     let settings = FitSettings::default();
     let (mut needed, mut missed, mut alone, mut passed) = (0, 0, 0, 0);
     for seed in 0..240 {

@@ -40,6 +40,7 @@ fn tap(peak: f64) -> TapEvidence {
         second_hit: None,
         overload: None,
         rejection: None,
+        overruled: None,
     }
 }
 

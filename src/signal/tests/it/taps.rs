@@ -486,6 +486,87 @@ fn prop_taps_by_hand_change_no_other_tap() {
 }
 
 #[test]
+fn prop_an_accepted_tap_ends_the_record_before_it() {
+    // A hit of 6 % of the others is too weak, and its neighbour's record goes over it.
+    let (pulses, samples) = five_taps((5120.0, 3), Shape::SineSquared, |pulses| {
+        let (first, second) = (pulses[1], pulses[2]);
+        let between = 0.5 * (first.time + second.time);
+        pulses.push(pulse(between, first.width, 0.06 * first.peak));
+    });
+    let weak = pulses[pulses.len() - 1].time;
+    let recording = recording(5120.0, vec![samples]);
+    let found = |accept: Vec<f64>| {
+        let by_hand = TapsByHand {
+            accept,
+            reject: vec![],
+        };
+        let settings = TapSettings {
+            by_hand,
+            ..TapSettings::default()
+        };
+        find_taps(&recording, &hammer_alone(), &settings).unwrap()
+    };
+    let rules = found(vec![]);
+    assert!(matches!(
+        rules.taps[2].rejection,
+        Some(Rejection::TooWeak { .. })
+    ));
+    assert!(
+        rules.taps[1].record.end > rules.taps[2].record.end.min(rules.taps[3].record.start - 1)
+    );
+    let accepted = found(vec![weak]);
+    assert!(accepted.taps[2].accepted());
+    assert!(matches!(
+        accepted.taps[2].overruled,
+        Some(Rejection::TooWeak { .. })
+    ));
+    // Records meet a little before the trigger.
+    assert_eq!(accepted.taps[1].record.end, accepted.taps[2].record.start);
+    assert_eq!(accepted.taps[2].record.end, accepted.taps[3].record.start);
+}
+
+#[test]
+fn regress_an_accepted_double_hit_is_looked_at_for_overload() {
+    let rate = 5120.0;
+    let (pulses, force) = five_taps((rate, 3), Shape::SineSquared, |pulses| {
+        let main = pulses[1];
+        pulses.push(pulse(main.time + 0.05, main.width, 0.3 * main.peak));
+    });
+    let taps: Vec<f64> = pulses[..5].iter().map(|pulse| pulse.time).collect();
+    let mut response = ringing(rate, force.len() as f64 / rate, &taps, &[(60.4, 0.01, 1.0)]);
+    response.truncate(force.len());
+    // The second tap alone drives the converter to its limit.
+    let from = (taps[1] * rate) as usize;
+    for sample in &mut response[from..from + 400] {
+        *sample = (3.0 * *sample).clamp(-1.5, 1.5);
+    }
+    let recording = recording(rate, vec![force, response]);
+    let source = TapSource::Hammer {
+        channel: 0,
+        responses: vec![1],
+    };
+    let settings = TapSettings {
+        by_hand: TapsByHand {
+            accept: vec![taps[1]],
+            reject: vec![],
+        },
+        ..TapSettings::default()
+    };
+    let rules = find_taps(&recording, &source, &TapSettings::default()).unwrap();
+    assert!(matches!(
+        rules.taps[1].rejection,
+        Some(Rejection::DoubleHit { .. })
+    ));
+    let tap = &find_taps(&recording, &source, &settings).unwrap().taps[1];
+    assert!(tap.accepted());
+    assert!(matches!(tap.overruled, Some(Rejection::DoubleHit { .. })));
+    let overload = tap.overload.expect("its response is cut off");
+    assert_eq!(overload.channel, 2);
+    // Only its decay is used.
+    assert!(tap.usable_from() > tap.record.start);
+}
+
+#[test]
 fn limit_a_time_without_a_tap_is_a_remark() {
     let (pulses, samples) = five_taps((5120.0, 3), Shape::SineSquared, |_| {});
     let recording = recording(5120.0, vec![samples]);
@@ -506,6 +587,7 @@ fn limit_a_time_without_a_tap_is_a_remark() {
         [
             TapRemark::NoTapThere {
                 time: told,
+                accept: false,
                 nearest: Some(nearest),
             },
         ] => {
@@ -517,6 +599,7 @@ fn limit_a_time_without_a_tap_is_a_remark() {
     let silent = self::recording(5120.0, vec![vec![0.0; 5120]]);
     let expected = TapRemark::NoTapThere {
         time,
+        accept: false,
         nearest: None,
     };
     assert_eq!(remarks(&silent, time), [expected]);

@@ -78,6 +78,7 @@ pub use tapjoint_compare as compare;
 pub use tapjoint_description as description;
 pub use tapjoint_diagnosis as gap;
 pub use tapjoint_identify as identify;
+pub use tapjoint_listen as listen;
 pub use tapjoint_numerics::{quantity, stats};
 pub use tapjoint_report as report;
 pub use tapjoint_signal::{modal, quality, recording, spectral, taps};

@@ -2,7 +2,6 @@
 
 use super::bare::BareSettings;
 use super::measurement::{MeasureError, MeasureSettings, lines_for};
-use super::warnings::{Warning, of_recording};
 use super::wiring::{PipelineError, bare_wiring, described_settings, described_wiring};
 use tapjoint_description::{RecordingDescription, TestDescription};
 use tapjoint_signal::recording::Recording;
@@ -39,8 +38,6 @@ pub struct TapsSoFar {
     pub band_end: f64,
     /// Length of signal that the wanted block needs (s), where a block is given.
     pub wanted: Option<f64>,
-    /// Doubts about the recording and its taps.
-    pub warnings: Vec<Warning>,
 }
 
 /// Finds the taps of a recording as the whole chain does. The end of one that `is_growing` cuts off no tap.
@@ -79,14 +76,12 @@ pub fn taps_so_far(
     let mut limits = settings.tap_settings(&lines);
     limits.is_growing = is_growing;
     let taps = find_taps(&recording, &settings.source, &limits)?;
-    let warnings = of_recording(&recording, &settings.source, &taps);
     Ok(TapsSoFar {
         peak_unit: wiring.tap_unit(),
         source: settings.source,
         taps,
         band_end: lines.high,
         wanted: limits.wanted,
-        warnings,
         recording,
     })
 }

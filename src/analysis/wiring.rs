@@ -154,6 +154,7 @@ pub(super) fn described_settings(
     settings.band = description.band;
     settings.block = description.block;
     settings.taps.keep_overload = description.keep_overload;
+    settings.taps.is_growing = description.is_growing;
     settings.taps.by_hand = TapsByHand {
         accept: description.accept_taps.clone(),
         reject: description.reject_taps.clone(),

@@ -57,6 +57,16 @@ pub(super) struct CommonArguments {
 }
 
 impl CommonArguments {
+    /// Returns the same without the destination of JSON, for words before the results. They are left out where JSON goes to
+    /// standard output.
+    pub(super) fn for_words(&self) -> Self {
+        Self {
+            json: None,
+            quiet: self.quiet || self.json == Some(JsonDestination::StandardOutput),
+            ..*self
+        }
+    }
+
     /// Returns true if times are to be printed.
     pub(super) fn tells_more(&self) -> bool {
         self.verbose > 0 && !self.quiet
@@ -169,6 +179,7 @@ impl RecordingArguments {
             band: spectrum.zoom,
             window: spectrum.window,
             reading,
+            is_growing: false,
         }
     }
 

@@ -67,8 +67,16 @@ pub fn call(
     let name = OsString::from("tapjoint");
     let (line, matches) = parse([name].into_iter().chain(arguments))
         .map_err(|usage| CallError::Usage(usage_text(&usage)))?;
-    if matches!(line.command, Command::Watch(_)) {
-        let text = "`watch` ends with a signal and needs a terminal; call `run` again where a file has changed";
+    let refused = match line.command {
+        Command::Watch(_) => Some(
+            "`watch` ends with a signal and needs a terminal; call `run` again where a file has changed",
+        ),
+        Command::Listen(_) => Some(
+            "`listen` reads standard input and needs a terminal; start the program, or call `run` on the file recorded",
+        ),
+        _ => None,
+    };
+    if let Some(text) = refused {
         return Err(CallError::Usage(text.to_owned()));
     }
     staging::ledger().written.clear();

@@ -27,6 +27,7 @@ mod embedded;
 mod export;
 mod frf;
 mod identify;
+mod listen;
 mod plan;
 mod predict;
 mod recording;
@@ -76,6 +77,7 @@ struct CommandLine {
 enum Command {
     Run(run::RunArguments),
     Watch(watch::WatchArguments),
+    Listen(listen::ListenArguments),
     Init(program::InitArguments),
     Inspect(recording::InspectArguments),
     Spectrum(recording::SpectrumArguments),
@@ -132,6 +134,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = ready.and_then(|()| match &line.command {
         Command::Watch(arguments) => {
             watch::run(arguments, line.common.quiet, || timed(&line, &matches))
+        }
+        Command::Listen(arguments) => {
+            listen::run(arguments, &line.common, || timed(&line, &matches))
         }
         _ => timed(&line, &matches),
     });
@@ -198,7 +203,8 @@ fn run_command(
         let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
         let mut named: Vec<PathBuf> = test.or(file).into_iter().cloned().collect();
         if let Command::Run(arguments)
-        | Command::Watch(watch::WatchArguments { run: arguments, .. }) = &line.command
+        | Command::Watch(watch::WatchArguments { run: arguments, .. })
+        | Command::Listen(listen::ListenArguments { run: arguments, .. }) = &line.command
         {
             named = arguments.subject()?.files().to_vec();
         }
@@ -227,6 +233,7 @@ fn run_command(
     match &line.command {
         Command::Run(arguments) => run::run(arguments, false, seed, terminal),
         Command::Watch(arguments) => run::run(&arguments.run, true, seed, terminal),
+        Command::Listen(arguments) => run::run(&arguments.run, false, seed, terminal),
         Command::Init(arguments) => program::print_template(arguments, terminal),
         Command::Inspect(arguments) => recording::inspect(arguments, terminal),
         Command::Spectrum(arguments) => recording::spectrum(arguments, terminal),
@@ -259,6 +266,7 @@ impl Command {
         match self {
             Self::Run(arguments) => Some(&arguments.timings),
             Self::Watch(arguments) => Some(&arguments.run.timings),
+            Self::Listen(arguments) => Some(&arguments.run.timings),
             Self::Inspect(arguments) => Some(&arguments.timings),
             Self::Spectrum(arguments) => Some(&arguments.timings),
             Self::Frf(arguments) => Some(&arguments.timings),
@@ -285,6 +293,7 @@ impl Command {
         match self {
             Self::Run(arguments) => arguments.expanded(test, false),
             Self::Watch(arguments) => arguments.run.expanded(test, true),
+            Self::Listen(arguments) => arguments.run.expanded(test, false),
             Self::Frf(arguments) => arguments.expanded(test),
             Self::BlindCheck(arguments) => arguments.expanded(),
             Self::Compare(arguments) => arguments.expanded(),

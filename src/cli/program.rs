@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 const TASKS: &[(&str, &[&str])] = &[
     (
         "A test from recordings to report",
-        &["init", "run", "watch", "inspect"],
+        &["init", "listen", "run", "watch", "inspect"],
     ),
     ("Spectra", &["spectrum", "frf"]),
     (

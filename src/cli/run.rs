@@ -14,7 +14,7 @@ use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::{ReadBy, TestDescription};
 use crate::gap::GapSettings;
-use crate::pipeline::{EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
+use crate::pipeline::{BareSettings, EstimateMethod, IdentifySettings, Stage, Work, diagnose_test};
 use crate::recording::{MOST_FILES, ReadSettings};
 use crate::report::document::FileSection;
 use crate::report::{
@@ -59,7 +59,7 @@ pub(super) struct RunArguments {
     #[command(flatten)]
     spectrum: SpectrumSettings,
     #[command(flatten)]
-    recording: RecordingArguments,
+    pub(super) recording: RecordingArguments,
     /// Also write sheet.html, one page to sign and file, with the checksums of all files read. Texts for it stand under
     /// [sheet] of the description. Print it for a PDF
     #[arg(long)]
@@ -71,6 +71,12 @@ pub(super) struct RunArguments {
 }
 
 impl RunArguments {
+    /// Returns the settings for a file without a description.
+    pub(super) fn bare(&self) -> BareSettings {
+        self.recording
+            .bare(&self.spectrum, self.reading.unwrap_or_default())
+    }
+
     /// Returns what is to be run.
     ///
     /// # Errors

@@ -10,7 +10,8 @@ use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 use tempfile::{Builder, NamedTempFile};
@@ -37,6 +38,8 @@ pub(super) struct Ledger {
     temporary: BTreeSet<PathBuf>,
     /// Results that are in their place; of many the first.
     pub(super) written: Vec<PathBuf>,
+    /// What the first signal sets, instead of ending the process.
+    pub(super) stop: Option<Arc<AtomicBool>>,
 }
 
 impl Ledger {
@@ -51,6 +54,7 @@ impl Ledger {
 static LEDGER: Mutex<Ledger> = Mutex::new(Ledger {
     temporary: BTreeSet::new(),
     written: Vec::new(),
+    stop: None,
 });
 
 /// Returns the ledger. A signal ends the process only when nobody holds it.
@@ -76,8 +80,12 @@ pub(super) fn watch_signals() -> io::Result<()> {
     let wanted = wanted.filter(|signal| (ignored >> (signal - 1)) & 1 == 0);
     let mut signals = signal_hook::iterator::Signals::new(wanted)?;
     thread::spawn(move || {
-        if let Some(signal) = signals.forever().next() {
-            let ledger = ledger();
+        for signal in signals.forever() {
+            let mut ledger = ledger();
+            if let Some(stop) = ledger.stop.take() {
+                stop.store(true, Ordering::Relaxed);
+                continue;
+            }
             let temporary = ledger.temporary.iter();
             // A journal here is a dead process's, and still to be carried out.
             let own = temporary.filter(|path| !path.join(JOURNAL).exists());

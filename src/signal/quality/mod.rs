@@ -15,7 +15,7 @@ use crate::spectral::{DecayCheck, Lines, Window};
 use crate::taps::{Overload, Rejection, SecondHit, Tap};
 use tapjoint_numerics::stats::median;
 
-pub use verdict::{Check, Outcome, QualityVerdict, Subject};
+pub use verdict::{Check, Outcome, QualityVerdict, Subject, remedy_of};
 
 /// All checks of one recording.
 pub fn judge_recording(recording: &RecordingEvidence) -> Vec<QualityVerdict> {

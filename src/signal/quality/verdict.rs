@@ -1,6 +1,7 @@
 //! A verdict: the check, its outcome, the likely cause, the remedy, and its subject (a recording, a tap, a mode, a
 //! sensor, or the test).
 
+use crate::taps::Rejection;
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -202,6 +203,23 @@ impl Check {
                 "State the sensors' masses in the description: the model carries those that it states, and then this is no fault. Else take a lighter sensor, or place it near the joint."
             }
         }
+    }
+}
+
+/// Returns the remedy against the fault for which a tap was rejected; `None` of one that was rejected by hand.
+pub fn remedy_of(rejection: &Rejection) -> Option<&'static str> {
+    match rejection {
+        Rejection::DoubleHit { .. } => Some(Check::DoubleHit.remedy()),
+        Rejection::Overload(_) => Some(Check::Overload.remedy()),
+        Rejection::TooWeak { .. } => Some(Check::WeakTap.remedy()),
+        Rejection::NextTooSoon { .. } => Some(Check::Decay.remedy()),
+        Rejection::NoResponse => Some(
+            "Nothing needs to be done where it was no hit; else check the sensors and their cables.",
+        ),
+        Rejection::CutOff { .. } => {
+            Some("Let the recording go on until the structure has come to rest.")
+        }
+        Rejection::ByHand => None,
     }
 }
 

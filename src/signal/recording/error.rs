@@ -132,6 +132,11 @@ pub struct RecordingWarning {
 }
 
 impl RecordingWarning {
+    /// The channel concerned (1-based); `None` of a doubt about the file as a whole.
+    pub fn channel(&self) -> Option<usize> {
+        self.channel
+    }
+
     /// A doubt about a file as a whole.
     pub(super) fn new(code: &'static str, message: String) -> Self {
         Self {

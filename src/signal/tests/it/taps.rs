@@ -629,6 +629,27 @@ fn limit_no_hand_makes_a_short_record_longer() {
 }
 
 #[test]
+fn limit_the_end_of_a_growing_recording_cuts_off_no_tap() {
+    let mut samples = ringing(2048.0, 6.0, &[0.5, 5.0], &[(300.3, 0.01, 1.0)]);
+    add_noise(&mut samples, 1e-4, &mut random(5));
+    let recording = recording(2048.0, vec![samples]);
+    let found = |is_growing: bool| {
+        let settings = TapSettings {
+            is_growing,
+            ..TapSettings::default()
+        };
+        find_taps(&recording, &TapSource::Responses(vec![0]), &settings).unwrap()
+    };
+    let (ended, growing) = (found(false), found(true));
+    assert!(matches!(
+        ended.taps[1].rejection,
+        Some(Rejection::CutOff { .. })
+    ));
+    assert!(growing.taps.iter().all(Tap::accepted));
+    assert_eq!(growing.taps[0], ended.taps[0]);
+}
+
+#[test]
 fn regress_a_record_begins_with_the_first_of_two_hits() {
     let (pulses, samples) = five_taps((5120.0, 3), Shape::SineSquared, |pulses| {
         let main = pulses[1];

@@ -1,0 +1,432 @@
+//! `tapjoint listen`: a stream is recorded, and each hit is judged while it is recorded.
+
+mod recorder;
+mod state;
+mod stream;
+mod target;
+
+use super::Outcome;
+use super::arguments::CommonArguments;
+use super::input::{TestFile, file_name, read_test};
+use super::overwrite::Files;
+use super::place::is_description;
+use super::run::RunArguments;
+use super::staging::ledger;
+use super::terminal::Terminal;
+use crate::listen::{ListenSettings, Listener, News};
+use crate::pipeline::{BareSettings, RecordingPlan};
+use crate::quantity::{Dimension, parse_quantity};
+use crate::recording::{GrowingRecording, PcmLayout, ReadSettings, Recording, SampleForm};
+use anyhow::{Context, ensure};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
+use state::{States, Subject};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+use stream::{Event, Source};
+use target::{Target, bare_target, described_target};
+
+/// Record a stream of samples, and judge each hit while you tap.
+///
+/// Reads WAV from standard input, or samples without a head with --rate, --channels and --format. Writes the first
+/// [[recording]] of the description whose file is missing, or FILE itself if it is no description. Says after
+/// each hit whether it counts and why, then what all hits give so far. Ctrl-C ends the recording. Once no file is missing,
+/// the test is run as by `tapjoint run`, with the options of `run`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  arecord -f S16_LE -r 48000 -c 2 -t raw | tapjoint listen test.toml --rate 48000 --channels 2 --format s16le\n  rec -q -t wav - | tapjoint listen taps.wav --hammer 1\n  tapjoint listen test.toml --replay low.wav"
+)]
+pub(super) struct ListenArguments {
+    #[command(flatten)]
+    pub(super) run: RunArguments,
+    /// Sample rate of a stream without a head, such as 51200 or "51.2 kHz" (Hz)
+    #[arg(long, value_name = "HZ", requires_all = ["channels", "format"], value_parser = rate)]
+    rate: Option<u32>,
+    /// Channels of a stream without a head
+    #[arg(long, value_name = "N", requires_all = ["rate", "format"], value_parser = RangedU64ValueParser::<u16>::new().range(1..=MOST_CHANNELS))]
+    channels: Option<u16>,
+    /// Form of its samples, as sox and ffmpeg name it
+    #[arg(long, value_name = "F", requires_all = ["rate", "channels"], value_parser = sample_form())]
+    format: Option<SampleForm>,
+    /// Play a recording instead of a stream, or with --rate a file of samples without a head. A recording of the test is
+    /// played and not written again
+    #[arg(long, value_name = "FILE")]
+    replay: Option<PathBuf>,
+    /// Speed of --replay, 0.1 to 1000, 1 = as it was recorded; or `max`: as fast as possible, without the results between
+    /// the hits
+    #[arg(long, value_name = "X", default_value = "1", requires = "replay", value_parser = speed)]
+    speed: Speed,
+    /// Go on with the last recording, in another file beside it
+    #[arg(long, conflicts_with = "replay")]
+    resume: bool,
+    /// Hits that are wanted in each recording
+    #[arg(long, value_name = "N", default_value = "5", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
+    taps: usize,
+    /// A hit is judged so long after it, or when the next one comes; a described `block` may need longer (s)
+    #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
+    record: f64,
+}
+
+/// As many as a recording may have.
+const MOST_CHANNELS: u64 = 4096;
+
+/// Speed of a replay: seconds of the recording in a second; `None` = as fast as possible.
+type Speed = Option<f64>;
+
+fn sample_form() -> impl TypedValueParser<Value = SampleForm> {
+    PossibleValuesParser::new(SampleForm::WORDS.map(|(word, _)| word)).map(|word| {
+        let found = SampleForm::WORDS.iter().find(|(known, _)| *known == word);
+        found.map_or(SampleForm::S16, |(_, form)| *form)
+    })
+}
+
+fn rate(text: &str) -> Result<u32, String> {
+    let rate = parse_quantity(text, Dimension::Rate).map_err(|error| error.to_string())?;
+    match rate.fract() == 0.0 && (1.0..=1e8).contains(&rate) {
+        true => Ok(rate as u32),
+        false => Err(format!("{rate} Hz; give a whole number from 1 to 1e8 Hz")),
+    }
+}
+
+fn speed(text: &str) -> Result<Speed, String> {
+    let number: Option<f64> = text.trim().parse().ok();
+    match number.filter(|speed| (0.1..=1000.0).contains(speed)) {
+        Some(speed) => Ok(Some(speed)),
+        None if text.trim() == "max" => Ok(None),
+        None => Err(format!(
+            "\"{}\" is no speed; give 0.1 to 1000, or max",
+            text.trim()
+        )),
+    }
+}
+
+fn record(text: &str) -> Result<f64, String> {
+    let seconds = parse_quantity(text, Dimension::Time).map_err(|error| error.to_string())?;
+    match (0.05..=600.0).contains(&seconds) {
+        true => Ok(seconds),
+        false => Err(format!("{seconds} s; give 0.05 to 600 s")),
+    }
+}
+
+impl ListenArguments {
+    /// Returns where the samples come from.
+    fn source(&self) -> anyhow::Result<Source> {
+        let layout = match (self.rate, self.channels, self.format) {
+            (Some(rate), Some(channels), Some(form)) => Some(PcmLayout::new(rate, channels, form)?),
+            _ => None,
+        };
+        let Some(path) = &self.replay else {
+            return Ok(Source::Standard(layout));
+        };
+        let recording = match &layout {
+            Some(_) => None,
+            None => Some(Recording::open(path, &self.run.recording.settings())?),
+        };
+        Ok(Source::Replay {
+            path: path.clone(),
+            recording,
+            layout,
+            speed: self.speed,
+        })
+    }
+}
+
+/// Records a stream, and then runs the test `once`, unless other recordings are missing.
+///
+/// # Errors
+/// A stream or a file that cannot be used; the errors of the run.
+pub(super) fn run(
+    arguments: &ListenArguments,
+    common: &CommonArguments,
+    once: impl Fn() -> anyhow::Result<Outcome>,
+) -> anyhow::Result<Outcome> {
+    let terminal = Terminal::new(&common.for_words(), Files::default(), None, None)?;
+    let path = &arguments.run.file;
+    ensure!(
+        !path.is_dir(),
+        "{}: is a folder; name a description, or the WAV file to be written",
+        path.display()
+    );
+    let described = match is_description(path) {
+        true => Some(read_test(path, &terminal)?),
+        false => None,
+    };
+    let replayed = arguments.replay.as_deref();
+    let target = match &described {
+        Some(file) => described_target(file, replayed, arguments.resume)?,
+        None => bare_target(path, replayed, arguments.resume)?,
+    };
+    let heard = listen(arguments, described.as_ref(), &target, &terminal)?;
+    let ended = heard.ended.map(|rest| {
+        if rest > 0 {
+            terminal.warn(&format!(
+                "the stream ended within a sample; its last {rest} bytes are left out"
+            ));
+        }
+    });
+    if let Err(cause) = ended {
+        // What was recorded stays, and the fault decides.
+        return Err(cause);
+    }
+    if heard.files.len() > 1 {
+        let names = heard
+            .files
+            .iter()
+            .map(|file| format!("\"{}\"", file_name(file)));
+        let names = names.collect::<Vec<_>>().join(", ");
+        terminal.say(&format!(
+            "one recording in {} files: write files = [{names}] in the description, then run the test\n",
+            heard.files.len()
+        ))?;
+        return Ok(Outcome::of(heard.accepted > 0));
+    }
+    if let Some(file) = &described
+        && let Ok(next) = described_target(file, None, false)
+    {
+        terminal.say(&format!(
+            "next: {}; start `listen` again\n",
+            asked_for(file, &next)
+        ))?;
+        return Ok(Outcome::of(heard.accepted > 0));
+    }
+    terminal.say("")?;
+    once()
+}
+
+/// What was heard.
+struct Heard {
+    /// Files of the recording.
+    files: Vec<PathBuf>,
+    /// Hits that count.
+    accepted: usize,
+    /// How the stream ended: with so many bytes left over.
+    ended: anyhow::Result<usize>,
+}
+
+/// Records the stream and tells of each hit.
+fn listen(
+    arguments: &ListenArguments,
+    described: Option<&TestFile>,
+    target: &Target,
+    terminal: &Terminal,
+) -> anyhow::Result<Heard> {
+    let source = arguments.source()?;
+    let bare = arguments.run.bare();
+    let plan = plan_of(described, target, &bare);
+    let headers = match &source {
+        Source::Replay { recording, .. } => recording.clone(),
+        Source::Standard(_) => None,
+    };
+    // A recording that is there already is played into a folder that is removed.
+    let aside = tempfile::Builder::new().prefix("tapjoint-").tempdir();
+    let aside = aside.context("no temporary folder can be made")?;
+    let first = match target.is_played {
+        true => aside.path().join("played.wav"),
+        false => target.file.clone(),
+    };
+    terminal.say(&introduction(arguments, described, target))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    ledger().stop = Some(stop.clone());
+    let events = stream::record(source, first, stop.clone());
+    let settings = ListenSettings {
+        name: file_name(&target.file),
+        record: arguments.record,
+        headers,
+        earlier: opened(&target.earlier)?,
+    };
+    let is_live = arguments.speed.is_some();
+    let mut states = is_live.then(|| States::begin(Subject::of(described, target, &bare)));
+    let mut heard = Heard {
+        files: target.earlier.clone(),
+        accepted: 0,
+        ended: Ok(0),
+    };
+    let mut listener: Option<Listener> = None;
+    let mut has_ended = false;
+    loop {
+        match events.recv_timeout(PAUSE) {
+            Ok(Event::File(path)) => {
+                let growing = GrowingRecording::open(&path)?;
+                match &mut listener {
+                    None => listener = Some(Listener::new(growing, plan, settings.clone())),
+                    Some(listener) => {
+                        tell(
+                            &listener.go_on_in(growing)?,
+                            listener.accepted(),
+                            arguments,
+                            terminal,
+                        )?;
+                    }
+                }
+                heard.files.push(path);
+            }
+            Ok(Event::Ended(ended)) => {
+                heard.ended = ended;
+                has_ended = true;
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => has_ended = true,
+        }
+        let Some(listener) = &mut listener else {
+            if has_ended || stop.load(Ordering::Relaxed) {
+                break;
+            }
+            continue;
+        };
+        while let Some(news) = listener.step()? {
+            tell(&news, listener.accepted(), arguments, terminal)?;
+            if let Some(states) = &mut states {
+                if !news.is_empty() {
+                    states.ask(heard.files.clone());
+                }
+                states.tell(terminal)?;
+            }
+        }
+        if let Some(states) = &mut states {
+            states.tell(terminal)?;
+        }
+        if has_ended || stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    ledger().stop = None;
+    let Some(mut listener) = listener else {
+        return Ok(heard);
+    };
+    tell(
+        &listener.finish()?,
+        listener.accepted(),
+        arguments,
+        terminal,
+    )?;
+    heard.accepted = listener.accepted();
+    terminal.say(&format!(
+        "{}: {:.1} s, {} of {} hits count\n",
+        file_name(&target.file),
+        listener.seconds(),
+        listener.accepted(),
+        listener.hits(),
+    ))?;
+    Ok(heard)
+}
+
+/// Time between two looks at a file that does not grow: short beside the least time to a verdict.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Prints what is new, and how many hits count.
+fn tell(
+    news: &[News],
+    accepted: usize,
+    arguments: &ListenArguments,
+    terminal: &Terminal,
+) -> anyhow::Result<()> {
+    for one in news {
+        terminal.say(&terminal.screen().wrapped(&one.to_string(), 2))?;
+    }
+    if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
+        let wanted = arguments.taps;
+        let what = match wanted.saturating_sub(accepted) {
+            0 => "enough: Ctrl-C ends the recording".to_owned(),
+            1 => "1 more is wanted".to_owned(),
+            missing => format!("{missing} more are wanted"),
+        };
+        terminal.say(&format!("  {accepted} of {wanted} hits; {what}\n"))?;
+    }
+    Ok(())
+}
+
+/// What is known of the recording before it begins.
+fn plan_of<'a>(
+    described: Option<&'a TestFile>,
+    target: &Target,
+    bare: &'a BareSettings,
+) -> RecordingPlan<'a> {
+    match described.zip(target.table) {
+        Some((file, table)) => RecordingPlan::Described {
+            test: &file.test,
+            recording: &file.test.recordings[table],
+            test_file: &file.name,
+        },
+        None => RecordingPlan::Bare(bare),
+    }
+}
+
+/// Opens the files of the recording that are there already.
+fn opened(earlier: &[PathBuf]) -> anyhow::Result<Vec<Recording>> {
+    let mut recordings = Vec::new();
+    for path in earlier {
+        let opened = Recording::open(path, &ReadSettings::default())?;
+        recordings.push(opened.renamed(file_name(path)));
+    }
+    Ok(recordings)
+}
+
+/// "low.wav, tap at 0.04 m".
+fn asked_for(file: &TestFile, target: &Target) -> String {
+    let name = file_name(&target.file);
+    let recording = target.table.map(|table| &file.test.recordings[table]);
+    let Some(recording) = recording else {
+        return name;
+    };
+    let mut words = vec![name];
+    if let Some(tap) = recording.tap {
+        words.push(format!("tap at {tap} m"));
+    }
+    if let Some(level) = recording.level.filter(|level| *level != 1.0) {
+        words.push(format!("{level} times as hard as level 1"));
+    }
+    for (sensor, place) in &recording.at {
+        words.push(format!("sensor {sensor} at {place} m"));
+    }
+    if let Some(length) = recording.length {
+        words.push(format!("free length {length} m"));
+    }
+    if !recording.masses.is_empty() {
+        words.push(format!("with {} known masses", recording.masses.len()));
+    }
+    words.join(", ")
+}
+
+/// What is recorded, and how it ends.
+fn introduction(
+    arguments: &ListenArguments,
+    described: Option<&TestFile>,
+    target: &Target,
+) -> String {
+    let what = match described {
+        Some(file) => asked_for(file, target),
+        None => file_name(&target.file),
+    };
+    let verb = match (target.is_played, &target.earlier[..]) {
+        (true, _) => "playing",
+        (false, []) => "recording",
+        (false, _) => "going on with",
+    };
+    let wanted = arguments.taps;
+    format!("{verb} {what}; {wanted} hits are wanted; Ctrl-C ends\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limit_numbers_of_a_stream_have_bounds() {
+        assert_eq!(rate("51.2 kHz"), Ok(51_200));
+        assert_eq!(
+            rate("0.5 Hz").unwrap_err(),
+            "0.5 Hz; give a whole number from 1 to 1e8 Hz"
+        );
+        assert_eq!(speed("max"), Ok(None));
+        assert_eq!(speed("2"), Ok(Some(2.0)));
+        assert_eq!(
+            speed("0").unwrap_err(),
+            "\"0\" is no speed; give 0.1 to 1000, or max"
+        );
+        assert_eq!(record("400 ms"), Ok(0.4));
+        assert_eq!(record("1 h").is_err(), true);
+    }
+}

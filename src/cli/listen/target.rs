@@ -1,0 +1,142 @@
+//! The recording that is written next.
+
+use super::super::input::TestFile;
+use super::super::place::{Place, is_description};
+use super::recorder::{MOST_PARTS, part};
+use anyhow::bail;
+use std::path::{Path, PathBuf};
+
+/// The recording that is written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Target {
+    /// Place of its table among the `[[recording]]` of the description; `None` without one.
+    pub(super) table: Option<usize>,
+    /// The file to be written. Where it is full, others follow.
+    pub(super) file: PathBuf,
+    /// Files of the same recording that are there already.
+    pub(super) earlier: Vec<PathBuf>,
+    /// True where the file is there and is played: it is not written.
+    pub(super) is_played: bool,
+}
+
+/// Returns the recording that a description asks for next: the first whose file is missing, or the one that is played.
+///
+/// # Errors
+/// None is missing; its name is not that of a WAV file; the file played is none of it.
+pub(super) fn described_target(
+    file: &TestFile,
+    replayed: Option<&Path>,
+    is_resumed: bool,
+) -> anyhow::Result<Target> {
+    let played = replayed.and_then(Place::of);
+    let recordings = file.test.recordings.iter().enumerate();
+    let recordings = recordings.filter(|(_, recording)| recording.form.is_none());
+    let mut last = None;
+    for (table, recording) in recordings {
+        let mut earlier = Vec::new();
+        for name in recording.files() {
+            let path = file.path_of(name);
+            let own = Place::of(&path);
+            let is_played = own
+                .zip(played.as_ref())
+                .is_some_and(|(own, played)| own.is(played));
+            if is_played || !path.exists() && (last.is_none() || !is_resumed) {
+                if !is_played {
+                    check_ending(&path, Some(recording.line), &file.name)?;
+                }
+                return Ok(Target {
+                    table: Some(table),
+                    file: path,
+                    earlier: if is_played { Vec::new() } else { earlier },
+                    is_played,
+                });
+            }
+            if path.exists() {
+                earlier.push(path);
+            }
+        }
+        if !earlier.is_empty() {
+            last = Some((table, earlier));
+        }
+    }
+    match last {
+        Some((table, earlier)) if is_resumed => resumed(Some(table), earlier),
+        None => bail!(
+            "{}: describes no recording of taps; add a [[recording]] with the file to be written",
+            file.name
+        ),
+        Some(_) => bail!(
+            "{}: all recordings are there; add a [[recording]] with a new file, or go on with the last one by --resume",
+            file.name
+        ),
+    }
+}
+
+/// Returns the recording without a description.
+///
+/// # Errors
+/// The file is there already, or its name is not that of a WAV file.
+pub(super) fn bare_target(
+    path: &Path,
+    replayed: Option<&Path>,
+    is_resumed: bool,
+) -> anyhow::Result<Target> {
+    let shown = path.display();
+    let [own, played] = [Some(path), replayed].map(|path| path.and_then(Place::of));
+    let is_played = own.zip(played).is_some_and(|(own, played)| own.is(&played));
+    if !is_played {
+        check_ending(path, None, "")?;
+    }
+    match (path.exists(), is_resumed) {
+        (true, true) if !is_played => resumed(None, vec![path.to_owned()]),
+        (true, false) if !is_played => {
+            bail!("{shown}: is there already; give another name, or go on with it by --resume")
+        }
+        _ => Ok(Target {
+            table: None,
+            file: path.to_owned(),
+            earlier: Vec::new(),
+            is_played,
+        }),
+    }
+}
+
+/// The next file of a recording of which some are there.
+fn resumed(table: Option<usize>, mut earlier: Vec<PathBuf>) -> anyhow::Result<Target> {
+    let first = earlier[0].clone();
+    for number in 2..=MOST_PARTS {
+        let path = part(&first, number);
+        if !path.exists() {
+            return Ok(Target {
+                table,
+                file: first,
+                earlier,
+                is_played: false,
+            });
+        }
+        if !earlier.contains(&path) {
+            earlier.push(path);
+        }
+    }
+    bail!(
+        "{}: has {MOST_PARTS} files already; record into another file",
+        first.display()
+    )
+}
+
+fn check_ending(path: &Path, line: Option<usize>, test: &str) -> anyhow::Result<()> {
+    let is_wav = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("wav"));
+    if is_wav {
+        return Ok(());
+    }
+    let shown = path.display();
+    match line {
+        Some(line) => {
+            bail!("{test}:{line}: {shown}: the recording is written as WAV; end its name with .wav")
+        }
+        None if is_description(path) => Ok(()),
+        None => bail!("{shown}: the recording is written as WAV; end its name with .wav"),
+    }
+}

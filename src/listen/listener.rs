@@ -1,0 +1,493 @@
+//! The listener: reads a growing file in steps, looks when a record has ended, and tells what is new.
+
+use crate::alarm::Alarm;
+use crate::news::{Hit, News};
+use std::mem::{Discriminant, discriminant};
+use tapjoint_analysis::{PipelineError, RecordingPlan, TapsSoFar, taps_so_far};
+use tapjoint_numerics::stats::root_mean_square;
+use tapjoint_signal::quality::remedy_of;
+use tapjoint_signal::recording::{GrowingRecording, Recording, RecordingError};
+use tapjoint_signal::spectral::measure_decay;
+use tapjoint_signal::taps::{REACH, Tap, TapRemark, TapSource};
+
+/// Length of a step (s). A verdict waits for the end of its step.
+const STEP: f64 = 0.05;
+/// A record longer than this says no more of how far it rings down (s): a bound on memory.
+const LONGEST_DECAY: f64 = 10.0;
+/// Noise before the taps is read over this length (s).
+const QUIET: f64 = 1.0;
+
+/// Reasons for which listening ends.
+#[derive(Debug, thiserror::Error)]
+pub enum ListenError {
+    /// The file cannot be read, or holds a sample that is no number.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The recording does not fit its description.
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+}
+
+/// Settings of a listener.
+#[derive(Debug, Clone)]
+pub struct ListenSettings {
+    /// Name of the recording, for messages.
+    pub name: String,
+    /// A hit is judged so long after its trigger (s), or when the next one comes. A described block that needs more gets
+    /// more.
+    pub record: f64,
+    /// A recording whose channels have the names, units and scales of this one; `None` where the file itself has them.
+    pub headers: Option<Recording>,
+    /// Files of the same recording that were written before.
+    pub earlier: Vec<Recording>,
+}
+
+/// A hit that was told.
+#[derive(Debug, Clone, PartialEq)]
+struct Told {
+    time: f64,
+    /// Why it does not count.
+    reason: Option<String>,
+}
+
+/// Listens to one recording.
+pub struct Listener<'a> {
+    plan: RecordingPlan<'a>,
+    settings: ListenSettings,
+    growing: GrowingRecording,
+    /// Frames of a step.
+    step: u64,
+    /// Channels on which hits are heard (0-based); not known before the first look.
+    watched: Vec<usize>,
+    alarm: Alarm,
+    /// Frame at which the record of the last hit has ended, if no other hit comes first.
+    due: Option<u64>,
+    told: Vec<Told>,
+    /// Code and channel of the doubts that were told.
+    doubts: Vec<(&'static str, Option<usize>)>,
+    /// The remarks that were told.
+    remarks: Vec<Discriminant<TapRemark>>,
+    /// What the last look has found.
+    latest: Option<TapsSoFar>,
+}
+
+impl<'a> Listener<'a> {
+    /// Begins with a file of which the first samples are there.
+    pub fn new(
+        growing: GrowingRecording,
+        plan: RecordingPlan<'a>,
+        settings: ListenSettings,
+    ) -> Self {
+        let step = ((STEP * growing.sample_rate()) as u64).max(1);
+        Self {
+            plan,
+            settings,
+            growing,
+            step,
+            watched: Vec::new(),
+            alarm: Alarm::default(),
+            due: None,
+            told: Vec::new(),
+            doubts: Vec::new(),
+            remarks: Vec::new(),
+            latest: None,
+        }
+    }
+
+    /// Takes the next step, and looks where a record has ended. Returns what is new; `None` where the file does not hold a
+    /// whole step yet.
+    ///
+    /// # Errors
+    /// The file cannot be read, or does not fit its description.
+    pub fn step(&mut self) -> Result<Option<Vec<News>>, ListenError> {
+        let Some(swings) = self.growing.grow(self.step)? else {
+            return Ok(None);
+        };
+        if self.watched.is_empty() {
+            // A wrong channel is found before the first hit.
+            let news = self.look(true)?;
+            self.watched = match self.latest.as_ref().map(|found| &found.source) {
+                Some(TapSource::Hammer { channel, .. }) => vec![*channel],
+                Some(TapSource::Responses(channels)) => channels.clone(),
+                None => Vec::new(),
+            };
+            return Ok(Some(news));
+        }
+        let watched = self.watched.iter();
+        let swings: Vec<f64> = watched
+            .map(|channel| swings[*channel].high - swings[*channel].low)
+            .collect();
+        let now = self.growing.frames();
+        let hears = self.alarm.hears(&swings);
+        let is_over = self.due.is_some_and(|due| due <= now);
+        let mut news = Vec::new();
+        // The next hit ends the record of the one before.
+        if is_over || hears && self.due.is_some() {
+            self.due = None;
+            news = self.look(true)?;
+        }
+        if hears {
+            let wanted = self.latest.as_ref().and_then(|found| found.wanted);
+            let record = self.settings.record.max(wanted.unwrap_or(0.0));
+            self.due = Some(now + (record * self.growing.sample_rate()) as u64);
+        }
+        Ok(Some(news))
+    }
+
+    /// Takes what is left of the file, and judges all hits as `run` does. Returns what is new.
+    ///
+    /// # Errors
+    /// Those of [`step`](Self::step).
+    pub fn finish(&mut self) -> Result<Vec<News>, ListenError> {
+        self.growing.grow_to_end()?;
+        self.look(false)
+    }
+
+    /// Goes on in the next file of the recording, once the last one is full. Returns what is new of the last one.
+    ///
+    /// # Errors
+    /// Those of [`step`](Self::step).
+    pub fn go_on_in(&mut self, next: GrowingRecording) -> Result<Vec<News>, ListenError> {
+        let mut news = Vec::new();
+        while let Some(more) = self.step()? {
+            news.extend(more);
+        }
+        self.growing.grow_to_end()?;
+        let number = self.settings.earlier.len() + 1;
+        let name = format!("{} ({number})", self.settings.name);
+        self.settings
+            .earlier
+            .push(self.growing.snapshot().renamed(name));
+        self.growing = next;
+        // The record of a hit may end in the next file.
+        let waiting = self.due.is_some();
+        self.due = waiting.then(|| (self.settings.record * self.growing.sample_rate()) as u64);
+        Ok(news)
+    }
+
+    /// Number of hits that were told.
+    pub fn hits(&self) -> usize {
+        self.told.len()
+    }
+
+    /// Number of hits that count.
+    pub fn accepted(&self) -> usize {
+        self.told
+            .iter()
+            .filter(|told| told.reason.is_none())
+            .count()
+    }
+
+    /// Length of what was heard of this file (s).
+    pub fn seconds(&self) -> f64 {
+        self.growing.frames() as f64 / self.growing.sample_rate()
+    }
+
+    /// Finds the taps of the recording so far, and compares them with what was told.
+    fn look(&mut self, is_growing: bool) -> Result<Vec<News>, ListenError> {
+        let mut recording = self.growing.snapshot();
+        if let Some(headers) = &self.settings.headers {
+            recording = recording.with_headers_of(headers);
+        }
+        let name = &self.settings.name;
+        recording = match self.settings.earlier.as_slice() {
+            [] => recording.renamed(name),
+            earlier => {
+                let parts = earlier.iter().cloned().chain([recording]);
+                Recording::joined(name, parts.collect())?
+            }
+        };
+        let found = taps_so_far(recording, &self.plan, is_growing)?;
+        let mut news = Vec::new();
+        // Before the first hit a channel may rest, and nothing is strange about it.
+        if self.latest.is_some() {
+            news.extend(self.new_doubts(&found));
+        }
+        let taps = &found.taps.taps;
+        let mut told = Vec::new();
+        for (place, tap) in taps.iter().enumerate() {
+            let is_known = |told: &&Told| (told.time - tap.time).abs() <= REACH;
+            let before = self.told.iter().find(is_known);
+            let is_last = place + 1 == taps.len();
+            // The record of the last one has not ended while it is still waited for.
+            if is_growing && is_last && before.is_none() && !self.has_ended(&found, tap) {
+                continue;
+            }
+            let reason = tap.rejection.as_ref().map(ToString::to_string);
+            let is_accepted = reason.is_none();
+            match before {
+                None => news.push(News::Hit(hit_of(&found, tap)?)),
+                // Numbers in the reason move with every tap.
+                Some(before) if before.reason.is_none() != is_accepted => {
+                    news.push(News::Revised(hit_of(&found, tap)?));
+                }
+                Some(_) => {}
+            }
+            let time = tap.time;
+            told.push(Told { time, reason });
+        }
+        let is_gone = |one: &&Told| {
+            let mut others = told.iter();
+            !others.any(|other| (one.time - other.time).abs() <= REACH)
+        };
+        let gone = self.told.iter().filter(is_gone);
+        news.extend(gone.map(|one| News::Gone { time: one.time }));
+        self.told = told;
+        self.latest = Some(found);
+        Ok(news)
+    }
+
+    /// Returns the doubts about a recording and its taps of a kind that was not told yet.
+    fn new_doubts(&mut self, found: &TapsSoFar) -> Vec<News> {
+        let mut news = Vec::new();
+        let recording = &found.recording;
+        let parts = recording.parts().map(|(_, part)| part.warnings());
+        for warning in recording.warnings().into_iter().chain(parts.flatten()) {
+            // Its numbers move from look to look.
+            let kind = (warning.code(), warning.channel());
+            if !self.doubts.contains(&kind) {
+                news.push(News::Doubt(warning.to_string()));
+                self.doubts.push(kind);
+            }
+        }
+        for remark in &found.taps.remarks {
+            let kind = discriminant(remark);
+            if !self.remarks.contains(&kind) {
+                news.push(News::Doubt(remark.to_string()));
+                self.remarks.push(kind);
+            }
+        }
+        news
+    }
+
+    /// Returns true where so much of a tap's record is there as is waited for.
+    fn has_ended(&self, found: &TapsSoFar, tap: &Tap) -> bool {
+        let record = self.settings.record.max(found.wanted.unwrap_or(0.0));
+        // The alarm comes up to two steps after the trigger.
+        found.recording.duration() - tap.time >= record - 2.0 * STEP
+    }
+}
+
+/// A tap in the words of a listener.
+fn hit_of(found: &TapsSoFar, tap: &Tap) -> Result<Hit, RecordingError> {
+    let remaining = match tap.accepted() {
+        true => remaining(found, tap)?,
+        false => None,
+    };
+    Ok(Hit {
+        time: tap.time,
+        peak: tap.peak,
+        unit: found.peak_unit.clone(),
+        pulse: tap.pulse,
+        remaining,
+        rejection: tap.rejection.clone(),
+        overruled: tap.overruled.clone(),
+        remedy: tap.rejection.as_ref().and_then(remedy_of),
+    })
+}
+
+/// Amplitude at the end of a tap's record over the largest one (1), of the response that keeps most; `None` where all have
+/// sunk into their noise.
+fn remaining(found: &TapsSoFar, tap: &Tap) -> Result<Option<f64>, RecordingError> {
+    let recording = &found.recording;
+    let (TapSource::Hammer {
+        responses: channels,
+        ..
+    }
+    | TapSource::Responses(channels)) = &found.source;
+    let frames = |seconds: f64| (seconds * recording.sample_rate()) as u64;
+    let record = tap.usable_from()
+        ..tap
+            .record
+            .end
+            .min(tap.usable_from() + frames(LONGEST_DECAY));
+    let quiet = &found.taps.quiet;
+    let quiet = quiet.start.max(quiet.end.saturating_sub(frames(QUIET)))..quiet.end;
+    let mut most = None;
+    for &channel in channels {
+        let about_mean = |frames: &std::ops::Range<u64>| -> Result<Vec<f64>, RecordingError> {
+            let mean = recording.mean_at(channel, frames.start);
+            let mut samples = recording.read(channel, frames.clone())?;
+            samples.iter_mut().for_each(|sample| *sample -= mean);
+            Ok(samples)
+        };
+        let noise = root_mean_square(&about_mean(&quiet)?);
+        let decay = measure_decay(&about_mean(&record)?, noise);
+        if decay.remaining > decay.noise {
+            most = Some(decay.remaining.max(most.unwrap_or(0.0)));
+        }
+    }
+    Ok(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+    use std::path::Path;
+    use tapjoint_analysis::BareSettings;
+    use tapjoint_description::ChannelRef;
+    use tapjoint_signal::recording::{PcmLayout, ReadSettings, SampleForm};
+    use tapjoint_signal::taps::Rejection;
+
+    const RATE: f64 = 5120.0;
+
+    /// A hammer pulse at each time (s) with its peak, and the decay of 118 Hz that it wakes.
+    fn samples(seconds: f64, hits: &[(f64, f64)]) -> Vec<[f64; 2]> {
+        let mut state = 7_u32;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            1e-4 * (f64::from(state) / f64::from(u32::MAX) - 0.5)
+        };
+        let mut samples = Vec::new();
+        for n in 0..(seconds * RATE) as usize {
+            let mut frame = [noise(), noise()];
+            for &(time, peak) in hits {
+                let since = n as f64 / RATE - time;
+                if (0.0..2e-3).contains(&since) {
+                    frame[0] += peak * (PI * since / 2e-3).sin().powi(2);
+                }
+                if since > 0.0 {
+                    frame[1] += peak * (-4.0 * since).exp() * (TAU * 118.0 * since).sin();
+                }
+            }
+            samples.push(frame);
+        }
+        samples
+    }
+
+    /// Writes a file in pieces of so many frames, and listens after each. Returns the news with the seconds at which they
+    /// came; those of the end come last.
+    fn heard(samples: &[[f64; 2]], path: &Path, piece: usize) -> Vec<(f64, News)> {
+        let layout = PcmLayout::new(RATE as u32, 2, SampleForm::F64).unwrap();
+        let bare = BareSettings {
+            hammer: Some(ChannelRef::Number(1)),
+            ..BareSettings::default()
+        };
+        let settings = ListenSettings {
+            name: "taps.wav".to_owned(),
+            record: 1.0,
+            headers: None,
+            earlier: Vec::new(),
+        };
+        let mut bytes = layout.wav_head(0);
+        let mut listener = None;
+        let mut all = Vec::new();
+        for some in samples.chunks(piece) {
+            for value in some.iter().flatten() {
+                SampleForm::F64.write(*value, &mut bytes);
+            }
+            std::fs::write(path, &bytes).unwrap();
+            let listener = listener.get_or_insert_with(|| {
+                let growing = GrowingRecording::open(path).unwrap();
+                Listener::new(growing, RecordingPlan::Bare(&bare), settings.clone())
+            });
+            while let Some(news) = listener.step().unwrap() {
+                let now = listener.seconds();
+                all.extend(news.into_iter().map(|one| (now, one)));
+            }
+        }
+        let news = listener.as_mut().unwrap().finish().unwrap();
+        all.extend(news.into_iter().map(|one| (f64::INFINITY, one)));
+        let listener = listener.unwrap();
+        // The decisions after the last sample are those of the whole chain on the file.
+        let opened = Recording::open(path, &ReadSettings::default()).unwrap();
+        let whole = taps_so_far(opened, &RecordingPlan::Bare(&bare), false).unwrap();
+        let whole = whole.taps.taps.iter();
+        let whole: Vec<Told> = whole
+            .map(|tap| Told {
+                time: tap.time,
+                reason: tap.rejection.as_ref().map(ToString::to_string),
+            })
+            .collect();
+        assert_eq!(listener.told, whole);
+        all
+    }
+
+    fn rejection(news: &News) -> Option<&Rejection> {
+        match news {
+            News::Hit(hit) | News::Revised(hit) => hit.rejection.as_ref(),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn prop_a_verdict_comes_when_the_record_has_ended_whatever_the_pieces() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("taps.wav");
+        // The third comes before the record of the second has ended. The fourth is a double hit.
+        let hits = [(0.8, 1.0), (3.0, 1.1), (3.7, 0.9), (6.0, 1.0), (6.05, 0.4)];
+        let samples = samples(8.0, &hits);
+        let all = heard(&samples, &path, 137);
+        let told: Vec<(f64, f64)> = all
+            .iter()
+            .map(|(now, news)| match news {
+                News::Hit(hit) => (*now, hit.time),
+                other => panic!("{other}"),
+            })
+            .collect();
+        for ((now, time), (hit, ended)) in
+            told.iter()
+                .zip([(0.8, 1.8), (3.0, 3.7), (3.7, 4.7), (6.0, 7.0)])
+        {
+            assert!((time - hit).abs() < 2e-3, "{time} for {hit}");
+            // A step for the alarm, and one for the look.
+            assert!(
+                (ended..ended + 2.0 * STEP + 1e-9).contains(now),
+                "{now} for {ended}"
+            );
+        }
+        assert_eq!(told.len(), 4);
+        assert!(matches!(
+            rejection(&all[3].1),
+            Some(Rejection::DoubleHit { .. })
+        ));
+        // The same news, whatever came at once.
+        for piece in [1000, 41_000] {
+            assert_eq!(heard(&samples, &path, piece), all, "pieces of {piece}");
+        }
+    }
+
+    #[test]
+    fn prop_a_decision_that_later_hits_change_is_told_again() {
+        let folder = tempfile::tempdir().unwrap();
+        // Two soft hits, and then the real ones.
+        let hits = [(0.8, 0.05), (3.0, 1.0), (5.0, 1.1), (7.0, 0.9)];
+        let all = heard(&samples(9.0, &hits), &folder.path().join("taps.wav"), 500);
+        let words: Vec<String> = all.iter().map(|(_, news)| news.to_string()).collect();
+        let revised = all
+            .iter()
+            .find(|(_, news)| matches!(news, News::Revised(_)));
+        let (now, news) = revised.unwrap_or_else(|| panic!("{words:?}"));
+        assert!(
+            matches!(rejection(news), Some(Rejection::TooWeak { .. })),
+            "{news}"
+        );
+        assert!(*now < 9.0, "{words:?}");
+        assert!(words[0].starts_with("hit at 0.80 s accepted"), "{words:?}");
+    }
+
+    #[test]
+    fn limit_silence_tells_nothing_and_a_wrong_channel_is_named_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("taps.wav");
+        assert_eq!(heard(&samples(3.0, &[]), &path, 400), []);
+        let bare = BareSettings {
+            hammer: Some(ChannelRef::Number(3)),
+            ..BareSettings::default()
+        };
+        let settings = ListenSettings {
+            name: "taps.wav".to_owned(),
+            record: 1.0,
+            headers: None,
+            earlier: Vec::new(),
+        };
+        let growing = GrowingRecording::open(&path).unwrap();
+        let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings);
+        let problem = listener.step().unwrap_err().to_string();
+        assert_eq!(
+            problem,
+            "taps.wav: no channel 3; there are: 1, 2; name one of these"
+        );
+    }
+}

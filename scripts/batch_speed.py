@@ -4,8 +4,8 @@
 usage: scripts/batch_speed.py PROGRAM [--tests N] [--jobs N] [--folder DIR] [--parquet] [--short]
 
 Writes N recordings of 1 s with one tap each (3 channels, 25.6 kHz, 16 bit) by a modal model with random frequencies. Then
-prints the processor time of a test, the peak memory at N/4, N/2 and N tests, and beside it what reading and transforming the
-same files by numpy alone takes. A run is killed in its middle and started again: its files must be those of an undisturbed
+prints the processor time of a test, the program's own peak memory at N/4, N/2 and N tests, and beside it what reading and
+transforming the same files by numpy alone takes. A run is killed in its middle and started again: its files must be those of an undisturbed
 run. Tests in parts are joined. At last the measured parts give the cost of a million tests on 1, 16 and 256 machines.
 `--parquet` also writes and compares Parquet; the program must have been built with that feature. `--short` leaves out
 the smaller numbers of tests, the parts and the cost model. Needs numpy and Linux.
@@ -14,6 +14,7 @@ the smaller numbers of tests, the parts and the cost model. Needs numpy and Linu
 import argparse
 import hashlib
 import os
+import re
 import signal
 import subprocess
 import tempfile
@@ -82,15 +83,29 @@ def batch(program, jobs, out, files, *options):
     return process
 
 
+def peak_memory(process):
+    """Peak memory of a program so far (MB); 0 once it has ended."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    found = re.search(r"^VmHWM:\s+(\d+) kB", status, re.MULTILINE)
+    return int(found[1]) / 1024 if found else 0.0
+
+
 def measured(program, jobs, out, files, *options):
-    """Processor time (s), wall time (s) and peak memory (MB) of a run."""
+    """Processor time (s), wall time (s) and peak memory (MB) of a run.
+
+    The peak is asked for while the program runs. That of wait4 would count this script as well, from which it was forked.
+    """
     begin = time.time()
     process = batch(program, jobs, out, files, *options)
-    _, status, usage = os.wait4(process.pid, 0)
+    peak, ended = 0.0, 0
+    while not ended:
+        peak = max(peak, peak_memory(process))
+        time.sleep(0.02)
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in (0, 1):
-        raise SystemExit(f"the batch ended with {process.returncode}")
-    return usage.ru_utime + usage.ru_stime, time.time() - begin, usage.ru_maxrss / 1024
+        raise SystemExit(f"the batch ended with the exit code {process.returncode}; its message is above")
+    return usage.ru_utime + usage.ru_stime, time.time() - begin, peak
 
 
 def sums(folder, names):
@@ -149,6 +164,8 @@ def main():
         whole = (temporary / "out-1" / "batch.jsonl").stat().st_size
         while process.poll() is None and (not journal.exists() or journal.stat().st_size < whole / 2):
             time.sleep(0.02)
+        if process.returncode is not None:
+            raise SystemExit("the batch ended before it could be killed; give more --tests")
         process.send_signal(signal.SIGKILL)
         process.wait()
         lines = journal.read_bytes().count(b"\n") - 1

@@ -41,6 +41,7 @@ class Batch:
 
         Raises:
             InputError: There is no such table.
+            OSError: Its file cannot be read any more.
         """
         with open(self._file(table), newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
@@ -51,6 +52,7 @@ class Batch:
         Raises:
             InputError: There is no such table.
             MissingPackageError: pandas is not installed.
+            OSError: Its file cannot be read any more.
         """
         return package("pandas").read_csv(self._file(table))
 
@@ -108,14 +110,17 @@ def batch(
         seed: Seed of the random numbers.
         jobs: Number of tests at the same time on this machine; default: one for each processor.
         client: Client of a Dask cluster, whose workers analyse the tests. They must see the same files under the same
-            names, and have the same version of tapjoint.
-        tests_per_task: Number of tests of one task of the cluster.
-        attempts: Number of times that a task is tried, each time on another worker if there is one.
+            names, and have the same version of tapjoint. The file of each test is looked for before it is analysed; a worker
+            that does not see it leaves the task to another one.
+        tests_per_task: Number of tests of one task of the cluster, at least 1.
+        attempts: Number of times that a task is tried, at least 1, each time on another worker if there is one.
 
     Raises:
-        InputError: Bad arguments, with the message of the program.
-        BatchError: Tasks failed on every worker. What was finished stays in ``out``.
+        InputError: Bad arguments, or tables that cannot be written, with the message of the program. With a client also a
+            folder ``out`` that holds another number of parts.
+        BatchError: Tasks of a cluster failed in all their attempts. What was finished stays in ``out``.
         MissingPackageError: A client is given, and dask.distributed is not installed.
+        OSError: A client is given, and ``out`` cannot be written.
     """
     listed = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     tests = [os.fspath(path) for path in listed]

@@ -10,12 +10,14 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import _native
+from ._arrays import whole
 from ._packages import package
 from ._program import program
 from .errors import BatchError, InputError
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 MOST_PARTS = 10_000
 #: Tasks that wait at the cluster, for each thread of it. More would only fill the memory of the scheduler.
 WAITING = 4
+#: Time (s) after which a worker gives back a part that has failed there before. It bounds how often the part can come back.
+PAUSE = 1.0
 
 
 @dataclass
@@ -35,16 +39,26 @@ class Part:
 
     number: int
     parts: int
+    #: Names of the tests for the program; empty where the tests are rows of a table, which the program reads itself.
     names: list[str]
-    #: True for each name that is a file on the client.
-    are_there: list[bool] = field(default_factory=list)
+    #: Files of these tests that the client can read. A worker must see them too.
+    files: list[str]
+    #: Number of tasks for this part that have failed.
     attempts: int = 0
+    #: Workers on which a task for this part has failed.
     bad_workers: list[str] = field(default_factory=list)
+    #: Workers that were asked for; empty where every worker may take the part.
+    wanted_workers: list[str] = field(default_factory=list)
+    #: The last problem.
     problem: str = ""
 
     @property
     def journal(self) -> str:
         return f"batch-{self.number}-of-{self.parts}.jsonl"
+
+    def keeps_off(self, worker: str) -> bool:
+        """Returns true for a worker on which this part has failed, while others were asked for."""
+        return worker in self.bad_workers and bool(self.wanted_workers)
 
 
 @dataclass(frozen=True)
@@ -59,33 +73,31 @@ class Done:
 def analyse(
     client: Client, shared: Sequence[str], tests: Sequence[str], out: Path, size: int, attempts: int
 ) -> None:
-    """Writes the journals of all parts into the folder ``out``.
+    """Writes the journals of all parts into the folder ``out``. Waits for a worker where the cluster has none.
 
     Raises:
-        InputError: Bad arguments, or a folder with another number of parts.
+        MissingPackageError: dask.distributed is not installed.
+        InputError: ``size`` or ``attempts`` is no whole number of at least 1, the program refuses the arguments, or the
+            folder holds journals of another number of parts.
         BatchError: Parts failed in all their attempts. All others are kept.
+        OSError: The folder cannot be written.
     """
     distributed = package("distributed")
-    if size < 1 or attempts < 1:
-        raise InputError("tests_per_task and attempts: give whole numbers of 1 or more")
+    size, attempts = whole("tests_per_task", size), whole("attempts", attempts)
     if not client.nthreads():
         client.wait_for_workers(1)
-    has_table = any(argument.startswith("--table=") for argument in shared)
-    listing = [] if has_table else ["--from=-"]
-    given = "" if has_table else "".join(f"{test}\n" for test in tests)
+    table = next((one.removeprefix("--table=") for one in shared if one.startswith("--table=")), None)
+    listing = ["--from=-"] if table is None else []
+    given = "".join(f"{test}\n" for test in tests) if table is None else ""
     printed = program([*shared, *listing, "--list", "--json=-", f"--out={out}"], given)
-    parts = parts_of(json.loads(printed)["tests"], size)
-    if has_table:
-        # Each task reads the table, and takes its rows.
-        for part in parts:
-            part.names = []
+    parts = parts_of(json.loads(printed)["tests"], size, table)
     out.mkdir(parents=True, exist_ok=True)
     end = f"-of-{len(parts)}.jsonl"
     others = [file.name for file in out.glob("batch-*-of-*.jsonl") if not file.name.endswith(end)]
     if others:
         raise InputError(
-            f"{out}: holds {min(others)}, and these tests have {len(parts)} parts; give the tests_per_task of the earlier "
-            "call, or another folder"
+            f"{out}: holds {min(others)} of an earlier call, and this call has {len(parts)} parts; give the tests and the "
+            "tests_per_task of the earlier call, or another folder"
         )
     waiting = iter(parts)
     running: dict[Future, Part] = {}
@@ -110,7 +122,6 @@ def analyse(
         for future in finished:
             part = running.pop(future)
             if not take(future, part, out):
-                part.attempts += 1
                 if part.attempts < attempts:
                     begin(part)
                 else:
@@ -120,23 +131,35 @@ def analyse(
         client.cancel(list(running))
     if failed:
         raise BatchError(
-            f"{len(failed)} of {len(parts)} tasks failed {attempts} times, on {', '.join(failed[0].bad_workers)}: "
-            f"{failed[0].problem}; the others are finished: mend the workers, and call again, it goes on from there"
+            f"{len(failed)} of {len(parts)} tasks failed in each of {attempts} attempts; the results of the others are kept. "
+            f"The last problem of part {failed[0].number}: {failed[0].problem}; when this is corrected, call again with the "
+            "same arguments"
         )
 
 
-def parts_of(names: Sequence[str], size: int) -> list[Part]:
-    """Cuts the tests into parts of nearly the same size: the program takes every n-th test of a table."""
-    parts = min(-(-len(names) // size), MOST_PARTS)
-    own = [list(names[number::parts]) for number in range(parts)]
-    return [Part(number, parts, some, [os.path.isfile(name) for name in some]) for number, some in enumerate(own, 1)]
+def parts_of(names: Sequence[str], size: int, table: str | None) -> list[Part]:
+    """Cuts the tests into parts of nearly the same size. As ``--shard`` does, part i of n takes every n-th test."""
+    count = min(-(-len(names) // size), MOST_PARTS)
+    # Names in a table are seen from its folder.
+    folder = os.path.dirname(table or "")
+    parts = []
+    for number in range(count):
+        own = list(names[number::count])
+        files = [file for file in (os.path.join(folder, name) for name in own) if is_readable(file)]
+        parts.append(Part(number + 1, count, own if table is None else [], files))
+    return parts
+
+
+def is_readable(file: str) -> bool:
+    return os.path.isfile(file) and os.access(file, os.R_OK)
 
 
 def submit(client: Client, shared: Sequence[str], part: Part, out: Path) -> Future:
     """Begins a task, on a worker on which it has not failed if there is one."""
     others = [worker for worker in client.nthreads() if worker not in part.bad_workers]
+    part.wanted_workers = others if part.bad_workers else []
     # Only a wish: a worker that is named here may be gone before the task begins.
-    wish = {"workers": others, "allow_other_workers": True} if part.bad_workers and others else {}
+    wish = {"workers": others, "allow_other_workers": True} if part.wanted_workers else {}
     journal = out / part.journal
     known = journal.read_bytes() if journal.exists() else b""
     future: Future = client.submit(
@@ -146,18 +169,19 @@ def submit(client: Client, shared: Sequence[str], part: Part, out: Path) -> Futu
 
 
 def take(future: Future, part: Part, out: Path) -> bool:
-    """Keeps the journal of a task that has ended. Returns False where it has none."""
+    """Keeps the journal of a task that has ended. Returns False where the part is not finished."""
     try:
         done: Done = future.result()
     except Exception as cause:  # The cluster's own reasons, as a worker that was killed several times.
-        part.problem = f"{type(cause).__name__}: {cause}"
-        part.bad_workers.append("the cluster")
+        part.attempts += 1
+        part.problem = f"the cluster gave it up ({type(cause).__name__}: {cause}); look at the logs of the workers"
         return False
     if done.journal is not None:
         aside = out / f".{part.journal}.tmp"
         aside.write_bytes(done.journal)
         os.replace(aside, out / part.journal)
-    if done.problem:
+    if done.problem and not part.keeps_off(done.worker):
+        part.attempts += 1
         part.problem = done.problem
         part.bad_workers.append(done.worker)
     return not done.problem
@@ -166,16 +190,25 @@ def take(future: Future, part: Part, out: Path) -> bool:
 def journal_of(shared: list[str], part: Part, known: bytes, folder: str, version: str) -> Done:
     """Analyses a part in a process of its own, on a worker. ``known`` is what an earlier call has found of it."""
     worker = package("distributed").get_worker().address
+    if part.keeps_off(worker):
+        # An idle worker takes tasks of busy ones, whatever is wished. The pause keeps it from taking this one all the time.
+        time.sleep(PAUSE)
+        return Done(worker, None, part.problem)
     if version != _native.__version__:
-        problem = f"has tapjoint {_native.__version__}, and the client {version}; install the same version"
+        problem = (
+            f"the worker {worker} has tapjoint {_native.__version__}, and the client has {version}; install the same version"
+        )
         return Done(worker, None, problem)
-    for name, is_there in zip(part.names, part.are_there):
-        if is_there and not Path(folder, name).is_file():
-            return Done(worker, None, f"{name}: this worker does not see it")
+    for file in part.files:
+        if not is_readable(os.path.join(folder, file)):
+            problem = (
+                f"the worker {worker} cannot read {file}, and the client can; give the worker the same disk and the same rights"
+            )
+            return Done(worker, None, problem)
     try:
         with tempfile.TemporaryDirectory(prefix="tapjoint-") as place:
             # A list of names is cut already, and a table is cut by the program.
-            one = Part(1, 1, []) if part.names else part
+            one = Part(1, 1, [], []) if part.names else part
             journal = Path(place, one.journal)
             if known:
                 journal.write_bytes(known)
@@ -187,7 +220,8 @@ def journal_of(shared: list[str], part: Part, known: bytes, folder: str, version
                 program([*shared, *listing, *shard, "--json=-"], names, folder)
             except InputError as cause:
                 # The arguments are known to be good: the fault is this worker's. What is finished counts.
-                problem = str(cause)
+                problem = f"tapjoint ended early on the worker {worker}: {cause}"
             return Done(worker, journal.read_bytes() if journal.exists() else None, problem)
     except OSError as cause:
-        return Done(worker, None, str(cause))
+        problem = f"the worker {worker} cannot use a file or folder of the task ({cause}); give it room and rights for it"
+        return Done(worker, None, problem)

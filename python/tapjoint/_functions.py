@@ -45,7 +45,11 @@ class Spectrum:
     window_decay: float
 
     def to_pandas(self) -> Any:
-        """Returns a DataFrame: a row for each line, a column for each response, and ``force``."""
+        """Returns a DataFrame: a row for each line, a column for each response, and ``force``.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
         own = [] if self.force is None else ["force"]
         columns: dict[str, Real] = dict(zip(_tables.distinct(self.names, *own), self.response))
         if self.force is not None:
@@ -53,7 +57,11 @@ class Spectrum:
         return package("pandas").DataFrame(columns, index=_index(self.frequency))
 
     def to_xarray(self) -> Any:
-        """Returns a Dataset over ``response`` and ``frequency``, with units as attributes."""
+        """Returns a Dataset over ``response`` and ``frequency``, with units as attributes.
+
+        Raises:
+            MissingPackageError: xarray is not installed.
+        """
         xarray = package("xarray")
         variables: dict[str, Any] = {"response_spectrum": (("response", "frequency"), self.response)}
         if self.force is not None:
@@ -62,7 +70,11 @@ class Spectrum:
         return xarray.Dataset(variables, _coordinates(self), _attributes(self))
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the spectra, and returns the matplotlib axes."""
+        """Draws the spectra, and returns the matplotlib axes.
+
+        Raises:
+            MissingPackageError: matplotlib is not installed.
+        """
         unit = _shared(self.units) or "unit of the response"
         label = f"Root mean square of the transforms ({unit} s)"
         return _plots.lines(axes, label, self.frequency, self.names, self.response)
@@ -125,7 +137,11 @@ class FrequencyResponses:
         )
 
     def to_pandas(self) -> Any:
-        """Returns a DataFrame: a row for each line, and the columns (name, quantity)."""
+        """Returns a DataFrame: a row for each line, and the columns (name, quantity).
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
         columns: dict[tuple[str, str], Any] = {}
         for number, name in enumerate(_tables.distinct(self.names)):
             for key in ("h1", "h2", "hv", "coherence", "random_error"):
@@ -135,7 +151,11 @@ class FrequencyResponses:
         return package("pandas").DataFrame(columns, index=_index(self.frequency))
 
     def to_xarray(self) -> Any:
-        """Returns a Dataset over ``response`` and ``frequency``, with units as attributes."""
+        """Returns a Dataset over ``response`` and ``frequency``, with units as attributes.
+
+        Raises:
+            MissingPackageError: xarray is not installed.
+        """
         of_functions = _shared(self.units)
         units = {"h1": of_functions, "h2": of_functions, "hv": of_functions, "coherence": "1", "random_error": "1"}
         variables: dict[str, Any] = {}
@@ -148,7 +168,11 @@ class FrequencyResponses:
         return package("xarray").Dataset(variables, _coordinates(self), attributes)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the magnitudes, and returns the matplotlib axes."""
+        """Draws the magnitudes, and returns the matplotlib axes.
+
+        Raises:
+            MissingPackageError: matplotlib is not installed.
+        """
         unit = _shared(self.units)
         label = self.form.capitalize() + (f" ({unit})" if unit else "")
         return _plots.lines(axes, label, self.frequency, self.names, np.abs(np.atleast_2d(self.h1)))
@@ -181,12 +205,20 @@ class Modes:
         return len(self.frequency)
 
     def to_pandas(self) -> Any:
-        """Returns a DataFrame: a row for each mode."""
+        """Returns a DataFrame: a row for each mode.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
         columns = {key: getattr(self, key) for key in ("frequency", "damping", "above_noise")}
         return package("pandas").DataFrame(columns)
 
     def to_xarray(self) -> Any:
-        """Returns a Dataset over ``mode``, ``output`` and ``input``, with units as attributes."""
+        """Returns a Dataset over ``mode``, ``output`` and ``input``, with units as attributes.
+
+        Raises:
+            MissingPackageError: xarray is not installed.
+        """
         return package("xarray").Dataset(
             {
                 "frequency": ("mode", self.frequency, {"units": "Hz"}),
@@ -200,7 +232,11 @@ class Modes:
         )
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the stabilisation diagram, and returns the matplotlib axes."""
+        """Draws the stabilisation diagram, and returns the matplotlib axes.
+
+        Raises:
+            MissingPackageError: matplotlib is not installed.
+        """
         axes = _plots.axes_of(axes, "Frequency (Hz)", "Order")
         poles, stable = self.poles, self.poles["stable"]
         for mask, mark, label in ((~stable, "x", "new"), (stable, "o", "stable")):

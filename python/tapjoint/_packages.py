@@ -8,6 +8,10 @@ from typing import Any
 from .errors import MissingPackageError
 
 
+#: Packages whose extra of tapjoint has another name.
+EXTRAS = {"distributed": "dask"}
+
+
 def package(name: str, module: str | None = None) -> Any:
     """Returns a package, or one of its modules.
 
@@ -19,6 +23,6 @@ def package(name: str, module: str | None = None) -> Any:
     except ModuleNotFoundError as cause:
         if cause.name is not None and cause.name.split(".")[0] != name:
             raise
-        remedy = f'pip install "tapjoint[{name}]"'
+        remedy = f'pip install "tapjoint[{EXTRAS.get(name, name)}]"'
         message = f"{name} is not installed and is needed for this call; install it: {remedy}"
         raise MissingPackageError(message, remedy=remedy) from None

@@ -124,7 +124,8 @@ class Recording:
             overload: "reject" taps that drove a channel to its limit, or "keep" their decay.
 
         Raises:
-            RecordingError: There is no such channel.
+            RecordingError: There is no such channel, or the file cannot be read any more.
+            InputError: ``overload`` is another word.
         """
         answer = self._native.inspect(self._hammer(hammer), overload)
         [recording] = Result(answer).recordings
@@ -213,7 +214,11 @@ class Recording:
         ]
 
     def to_pandas(self) -> Any:
-        """Returns a DataFrame: a row for each sample, a column for each channel."""
+        """Returns a DataFrame: a row for each sample, a column for each channel.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
         pandas = package("pandas")
         channels = self.to_sep005()
         names = _tables.distinct((channel["name"] for channel in channels), "time")
@@ -221,7 +226,11 @@ class Recording:
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
     def to_xarray(self) -> Any:
-        """Returns a Dataset: a variable over ``time`` for each channel, with its unit as attribute."""
+        """Returns a Dataset: a variable over ``time`` for each channel, with its unit as attribute.
+
+        Raises:
+            MissingPackageError: xarray is not installed.
+        """
         channels = self.to_sep005()
         names = _tables.distinct((channel["name"] for channel in channels), "time")
         variables = {
@@ -233,7 +242,11 @@ class Recording:
         return package("xarray").Dataset(variables, {"time": time}, attributes)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the channels over time, and returns the matplotlib axes."""
+        """Draws the channels over time, and returns the matplotlib axes.
+
+        Raises:
+            MissingPackageError: matplotlib is not installed.
+        """
         axes = _plots.axes_of(axes, "Time (s)", "")
         # Lowest and highest values of pieces.
         piece = max(1, -(-self.frames // (_MOST_POINTS // 2)))
@@ -309,6 +322,7 @@ def from_arrays(
 
     Raises:
         RecordingError: Unequal lengths, samples that are not finite, a rate outside 0.001 to 1e9 Hz.
+        InputError: Values that are no real numbers, a channel of several dimensions, or units that do not fit the channels.
     """
     if isinstance(arrays, Mapping):
         names: list[str | None] = [str(key) for key in arrays]
@@ -335,7 +349,8 @@ def from_sep005(channels: Sequence[Mapping[str, Any]], *, name: str = "SEP005") 
     """Makes a recording of SEP005 dictionaries: ``name``, ``data``, ``unit_str``, and ``fs`` or ``time``.
 
     Raises:
-        InputError: A key is missing, or the channels have different rates.
+        InputError: A key is missing, ``data`` is no list of real numbers, ``time`` is not uniform, or the channels have
+            different rates.
         RecordingError: Unequal lengths, or samples that are not finite.
     """
     if not channels:
@@ -347,6 +362,8 @@ def from_sep005(channels: Sequence[Mapping[str, Any]], *, name: str = "SEP005") 
         (str(one["name"]), str(one.get("unit_str") or "") or None, real("data", one["data"]))
         for one in channels
     ]
+    if any(data.ndim != 1 for _, _, data in native):
+        raise InputError("data: a channel has one dimension; give the shape (frames,) for each")
     return Recording(_native.Recording.from_arrays(name, rates[0], native))
 
 

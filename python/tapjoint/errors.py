@@ -48,7 +48,7 @@ class DescriptionError(InputError):
 
 
 class BatchError(TapjointError):
-    """Tasks of a batch failed on every worker that tried them. What was finished is kept."""
+    """Tasks of a batch on a cluster failed in all their attempts. What was finished is kept."""
 
 
 class MissingPackageError(TapjointError, ImportError):

@@ -6,9 +6,11 @@ import hashlib
 import json
 import os
 import resource
+import shutil
 import signal
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ import pytest
 
 import tapjoint
 from conftest import ROOT
+from tapjoint import _cluster
 
 TABLES = ("tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html")
 
@@ -24,13 +27,18 @@ TABLES = ("tests.csv", "modes.csv", "hypotheses.csv", "batch.jsonl", "batch.html
 def recordings(tmp_path_factory):
     """Twelve taps: eleven that can be read, and one that is cut."""
     folder = tmp_path_factory.mktemp("taps")
+    _write_taps(folder, range(11))
+    (folder / "tap-11.wav").write_bytes((folder / "tap-00.wav").read_bytes()[:100])
+    return folder
+
+
+def _write_taps(folder: Path, numbers: range) -> None:
+    """Writes taps that differ in one bit."""
     whole = (ROOT / "recordings" / "cantilever" / "high.wav").read_bytes()
-    for number in range(11):
+    for number in numbers:
         samples = bytearray(whole)
         samples[5000 + number] ^= 1
         (folder / f"tap-{number:02}.wav").write_bytes(samples)
-    (folder / "tap-11.wav").write_bytes(whole[:100])
-    return folder
 
 
 def _sums(folder: Path) -> dict[str, str]:
@@ -75,13 +83,55 @@ def limit_bad_arguments_have_the_message_of_the_program(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.fixture(scope="module")
-def cluster():
+@contextmanager
+def _client_of(workers: int):
+    """Client of a new cluster of local workers."""
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster, distributed.Client(cluster) as client:
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0"
+    ) as local, distributed.Client(local, set_as_default=False) as client:
+        client.wait_for_workers(workers)
         yield client
+
+
+def limit_bad_arguments_of_a_cluster_are_named_with_their_value(tmp_path):
+    pytest.importorskip("distributed")
+    for name, value in (("tests_per_task", 0), ("tests_per_task", 2.5), ("attempts", -3), ("attempts", "2")):
+        with pytest.raises(tapjoint.InputError, match=f"{name}: {value!r} ") as found:
+            tapjoint.batch("a.wav", out=tmp_path / "out", client=object(), **{name: value})
+        assert found.value.remedy.startswith("give")
+
+
+def limit_a_missing_dask_is_named_with_its_extra(tmp_path, monkeypatch):
+    def without(name):
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr("tapjoint._packages.import_module", without)
+    with pytest.raises(tapjoint.MissingPackageError, match="distributed is not installed") as found:
+        tapjoint.batch("a.wav", out=tmp_path / "out", client=object())
+    assert found.value.remedy == 'pip install "tapjoint[dask]"'
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with _client_of(2) as client:
+        yield client
+
+
+@pytest.fixture
+def problems(monkeypatch):
+    """The problems of all tasks, as far as they have come."""
+    found = []
+
+    def taken(future, part, out):
+        is_taken = take(future, part, out)
+        if not is_taken:
+            found.append(part.problem)
+        return is_taken
+
+    take = _cluster.take
+    monkeypatch.setattr(_cluster, "take", taken)
+    return found
 
 
 def prop_a_cluster_gives_the_tables_of_one_machine(alone, cluster, recordings, tmp_path):
@@ -95,7 +145,7 @@ def prop_a_cluster_gives_the_tables_of_one_machine(alone, cluster, recordings, t
         _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=5, limit=1e-6
     )
     assert _sums(again.folder) == _sums(alone.folder)
-    with pytest.raises(tapjoint.InputError, match="give the tests_per_task of the earlier"):
+    with pytest.raises(tapjoint.InputError, match="batch-1-of-3.jsonl .* has 4 parts; give .* tests_per_task of the earlier"):
         tapjoint.batch(_taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=3)
 
 
@@ -130,26 +180,90 @@ def _full_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
-def recover_a_batch_from_a_worker_whose_disk_is_full(alone, cluster, recordings, tmp_path, monkeypatch):
-    from tapjoint import _cluster
-
-    problems = []
-
-    def taken(future, part, out):
-        is_taken = take(future, part, out)
-        problems.append(part.problem)
-        return is_taken
-
-    take = _cluster.take
-    monkeypatch.setattr(_cluster, "take", taken)
-    cluster.wait_for_workers(2)
-    first = next(iter(cluster.nthreads()))
-    cluster.run(_full_disk, workers=[first])
-    found = tapjoint.batch(
-        _taps(recordings), hammer=1, out=tmp_path / "out", client=cluster, tests_per_task=2
-    )
-    assert any(problems)
+def recover_a_batch_from_a_worker_whose_disk_is_full(alone, recordings, tmp_path, problems):
+    with _client_of(2) as client:
+        full = next(iter(client.nthreads()))
+        client.run(_full_disk, workers=[full])
+        found = tapjoint.batch(
+            _taps(recordings), hammer=1, out=tmp_path / "out", client=client, tests_per_task=2
+        )
+    assert problems and all(full in problem for problem in problems)
     assert _sums(found.folder) == _sums(alone.folder)
+
+
+@pytest.fixture
+def own_folders(recordings, tmp_path, monkeypatch):
+    """A folder with all taps, and one that a worker sees in its place. Both have a table of the taps.
+
+    The client calls from the first. Its folder has a name that leads each process to its own folder.
+    """
+    table = "file,bar\n" + "".join(f"../{Path(tap).name},{number}\n" for number, tap in enumerate(_taps(recordings)))
+    whole, other = tmp_path / "whole", tmp_path / "other"
+    shutil.copytree(recordings, whole)
+    for folder in (whole, other):
+        (folder / "lists").mkdir(parents=True)
+        (folder / "lists" / "taps.csv").write_text(table)
+    monkeypatch.chdir(whole)
+    monkeypatch.setattr(os, "getcwd", lambda: "/proc/self/cwd")
+    return whole, other
+
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="folders of processes as Linux has them")
+#: The same tests by a table and by their names.
+BY_TABLE = {"table": "lists/taps.csv", "hammer": 1}
+BY_NAMES = {"paths": [f"tap-{number:02}.wav" for number in range(12)], "hammer": 1}
+
+
+@needs_proc
+@pytest.mark.parametrize("given", [BY_TABLE, BY_NAMES], ids=["table", "names"])
+def recover_a_batch_from_a_worker_that_lacks_the_files(own_folders, tmp_path, problems, given):
+    """The worker without files fails at once, and is idle while the other one works."""
+    expected = tapjoint.batch(**given, out=tmp_path / "expected")
+    with _client_of(2) as client:
+        workers = list(client.nthreads())
+        for worker, folder in zip(workers, own_folders):
+            client.run(os.chdir, str(folder), workers=[worker])
+        found = tapjoint.batch(**given, out=tmp_path / "out", client=client, tests_per_task=2)
+    assert problems
+    assert all(f"{workers[1]} cannot read " in problem and ".wav" in problem for problem in problems)
+    assert [row["outcome"] for row in found.rows()] == ["answered"] * 11 + ["failed"]
+    assert _sums(found.folder) == _sums(expected.folder)
+
+
+@needs_proc
+def regress_a_worker_that_fails_at_once_does_not_use_up_the_attempts(own_folders, tmp_path, problems):
+    """It is idle, and takes tasks again and again that were meant for the busy one."""
+    whole, _ = own_folders
+    _write_taps(whole, range(12, 72))
+    taps = [f"tap-{number:02}.wav" for number in range(12, 72)]
+    with _client_of(2) as client:
+        for worker, folder in zip(client.nthreads(), own_folders):
+            client.run(os.chdir, str(folder), workers=[worker])
+        found = tapjoint.batch(taps, hammer=1, out=tmp_path / "out", client=client, tests_per_task=6, attempts=2)
+    assert problems
+    assert found.summary["answered"] == 60
+
+
+@needs_proc
+@pytest.mark.parametrize("given", [BY_TABLE, BY_NAMES], ids=["table", "names"])
+def limit_a_file_that_no_worker_sees_is_an_error_and_the_rest_is_kept(own_folders, tmp_path, given):
+    whole, other = own_folders
+    shutil.copytree(whole, other, dirs_exist_ok=True)
+    (other / "tap-03.wav").unlink()
+    out = tmp_path / "out"
+    expected = tapjoint.batch(**given, out=tmp_path / "expected")
+    with _client_of(1) as client:
+        [worker] = client.nthreads()
+        client.run(os.chdir, str(other))
+        with pytest.raises(tapjoint.BatchError, match=f"1 of 6 tasks failed in each of 2 .*{worker} .*tap-03.wav"):
+            tapjoint.batch(**given, out=out, client=client, tests_per_task=2, attempts=2)
+        kept = {file: file.read_bytes() for file in out.iterdir()}
+        # Part 4 has the tests 4 and 10.
+        assert {file.name for file in kept} == {f"batch-{part}-of-6.jsonl" for part in (1, 2, 3, 5, 6)}
+        client.run(os.chdir, str(whole))
+        found = tapjoint.batch(**given, out=out, client=client, tests_per_task=2)
+    assert all(file.read_bytes() == journal for file, journal in kept.items())
+    assert _sums(found.folder) == _sums(expected.folder)
 
 
 def limit_a_test_that_takes_too_long_is_a_row_and_is_tried_again(alone, cluster, recordings, tmp_path):
@@ -164,10 +278,7 @@ def limit_a_test_that_takes_too_long_is_a_row_and_is_tried_again(alone, cluster,
 
 
 def recover_a_batch_from_the_only_worker_that_is_killed(alone, recordings, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as local, distributed.Client(local, set_as_default=False) as client:
+    with _client_of(1) as client:
         client.run(_kill_once, str(tmp_path / "killed"))
         found = tapjoint.batch(
             _taps(recordings), hammer=1, out=tmp_path / "out", client=client, tests_per_task=3
@@ -176,13 +287,11 @@ def recover_a_batch_from_the_only_worker_that_is_killed(alone, recordings, tmp_p
     assert _sums(found.folder) == _sums(alone.folder)
 
 
-def limit_tasks_that_fail_everywhere_are_an_error_and_the_rest_is_kept(recordings, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as local, distributed.Client(local) as client:
+def limit_tasks_that_fail_everywhere_are_an_error(recordings, tmp_path):
+    with _client_of(1) as client:
+        [worker] = client.nthreads()
         client.run(_full_disk)
-        with pytest.raises(tapjoint.BatchError, match="failed 2 times"):
+        with pytest.raises(tapjoint.BatchError, match=f"1 of 1 tasks failed in each of 2 attempts.*{worker}: .*large"):
             tapjoint.batch(
                 _taps(recordings)[:2], hammer=1, out=tmp_path / "out", client=client, attempts=2
             )

@@ -23,8 +23,8 @@ def limit_packages_are_loaded_when_they_are_used():
     code = (
         "import sys, tapjoint\n"
         "assert 'numpy' not in sys.modules\n"
-        "tapjoint.frf, tapjoint.read, tapjoint.run, tapjoint.Test\n"
-        "heavy = {'pandas', 'xarray', 'matplotlib', 'scipy', 'dask'} & set(sys.modules)\n"
+        "tapjoint.frf, tapjoint.read, tapjoint.run, tapjoint.Test, tapjoint.batch\n"
+        "heavy = {'pandas', 'xarray', 'matplotlib', 'scipy', 'dask', 'distributed'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -106,6 +106,7 @@ def recover_sep005_there_and_back(cantilever):
         ([{"name": "a", "data": [1.0, 2.0], "time": [1.0, 0.0]}], "ascend"),
         ([{"name": "a", "data": [1.0] * 3, "time": [0.0, 1.0, 3.0]}], "uniform"),
         ([{"name": n, "data": [1.0], "fs": f} for n, f in (("a", 1.0), ("b", 2.0))], "one rate"),
+        ([{"name": "a", "data": [[1.0, 2.0]], "fs": 1.0}], "one dimension"),
     ],
 )
 def limit_bad_sep005_is_refused(channels, words):

@@ -53,6 +53,39 @@ pub fn render_answer(
     }
 }
 
+/// Returns the answer so far, in a few lines: it is renewed while somebody taps.
+pub fn render_progress(document: &Document, screen: Screen) -> String {
+    let answer = Answer::of(document);
+    let mut lines = Vec::new();
+    if let Some(state) = answer.state {
+        let reason = match answer.reason.as_str() {
+            "" => String::new(),
+            reason => format!(", {reason}"),
+        };
+        lines.push(format!("so far {}{reason}", state.name()));
+    }
+    // The second column is the frequency.
+    let strong = answer.strong_rows();
+    let frequencies: Vec<&str> = strong.iter().map(|row| row[1].as_str()).collect();
+    if !frequencies.is_empty() {
+        lines.push(format!("modes {} Hz", frequencies.join("; ")));
+    }
+    let mut values = Vec::new();
+    for value in &answer.values {
+        values.push(format!("{} {} {}", value.symbol, value.first(), value.unit));
+    }
+    if !values.is_empty() {
+        let model = answer.model.as_deref();
+        let model = model.map_or(String::new(), |model| format!(", {model}"));
+        lines.push(values.join("; ") + &model);
+    }
+    let mut text = String::new();
+    for line in lines {
+        text.push_str(&screen.wrapped(&format!("  {line}"), 4));
+    }
+    text
+}
+
 /// The findings in so many lines: the first ones where there is no room for all.
 fn findings(answer: &Answer, lines: usize, screen: Screen) -> String {
     let mut text = String::new();

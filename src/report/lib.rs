@@ -41,7 +41,7 @@ pub mod words {
     pub(crate) mod sizes;
 }
 
-pub use brief::{MOST_LINES, render_answer};
+pub use brief::{MOST_LINES, render_answer, render_progress};
 pub use charts::comparison_spectra::ComparedRecordings;
 pub use data_files::{
     render_changes_csv, render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,

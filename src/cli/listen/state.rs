@@ -8,13 +8,10 @@ use crate::gap::GapSettings;
 use crate::pipeline::{
     BareSettings, IdentifySettings, analysis_of_bare, diagnose_test, measure_bare_file,
 };
-use crate::report::{Screen, document_of, gap_section, render_answer};
+use crate::report::{Screen, document_of, gap_section, render_progress};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
-
-/// Most lines of a state.
-const LINES: usize = 12;
 
 /// What is analysed.
 pub(super) enum Subject {
@@ -88,7 +85,7 @@ impl Subject {
                 document_of(&analysis_of_bare(measured[0].file.clone(), measured))
             }
         };
-        Ok(render_answer(&document, None, LINES, screen))
+        Ok(render_progress(&document, screen))
     }
 }
 
@@ -138,7 +135,7 @@ impl States {
         {
             self.is_busy = false;
             match answer {
-                Ok(text) => terminal.say(&format!("\n{}\n\n", text.trim_end()))?,
+                Ok(text) => terminal.say(&text)?,
                 Err(cause) => terminal.warn(&format!("no result so far: {cause:#}")),
             }
         }

@@ -20,6 +20,7 @@ use std::ops::Range;
 use crate::recording::{Recording, RecordingError};
 use double_hit::{least_candidate, second_hit};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use search::{Force, Survey, find_pulses, find_rises};
 use tapjoint_numerics::stats::{median, root_mean_square};
 
@@ -470,8 +471,12 @@ pub fn find_taps(
     let mut quiet = 0..0;
     for (start, file, found) in &searched {
         let before = taps.len();
-        for index in 0..found.events.len() {
-            let mut tap = tap(file, source, found, index, weakest, settings)?;
+        let judged = (0..found.events.len()).into_par_iter();
+        let judged = judged.map(|index| tap(file, source, found, index, weakest, settings));
+        // Collected in order, so that of several errors the first is reported.
+        let judged: Vec<Result<Tap, RecordingError>> = judged.collect();
+        for tap in judged {
+            let mut tap = tap?;
             tap.file = joined.then(|| file.name().to_owned());
             tap.move_by(*start, rate);
             taps.push(tap);

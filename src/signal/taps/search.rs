@@ -43,9 +43,8 @@ impl Baseline {
 
     fn at(&self, frame: u64) -> f64 {
         let position = self.position(frame);
-        let index = position.floor().max(0.0);
-        let share = (position - index).clamp(0.0, 1.0);
-        let index = index as usize;
+        let index = position.max(0.0) as usize;
+        let share = (position - index as f64).clamp(0.0, 1.0);
         self.median(index) * (1.0 - share) + self.median(index + 1) * share
     }
 

@@ -5,7 +5,7 @@ use super::measurement::{MeasureError, MeasureSettings, lines_for};
 use super::wiring::{PipelineError, bare_wiring, described_settings, described_wiring};
 use tapjoint_description::{RecordingDescription, TestDescription};
 use tapjoint_signal::recording::Recording;
-use tapjoint_signal::taps::{TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{TapMemo, TapSource, Taps, find_taps_again};
 
 /// What is known of a recording before it begins.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,8 @@ pub struct TapsSoFar {
     pub wanted: Option<f64>,
 }
 
-/// Finds the taps of a recording as the whole chain does. The end of one that `is_growing` cuts off no tap.
+/// Finds the taps of a recording as the whole chain does. The end of one that `is_growing` cuts off no tap. `memo` holds
+/// what was found in it before.
 ///
 /// # Errors
 /// An unknown channel, an unreadable recording, a band or block that does not fit.
@@ -48,6 +49,7 @@ pub fn taps_so_far(
     mut recording: Recording,
     plan: &RecordingPlan<'_>,
     is_growing: bool,
+    memo: &mut TapMemo,
 ) -> Result<TapsSoFar, PipelineError> {
     /// Longer than any block (s): what the recording does not hold yet may still come.
     const ENOUGH: f64 = 1e7;
@@ -75,7 +77,7 @@ pub fn taps_so_far(
     })?;
     let mut limits = settings.tap_settings(&lines);
     limits.is_growing = is_growing;
-    let taps = find_taps(&recording, &settings.source, &limits)?;
+    let taps = find_taps_again(&recording, &settings.source, &limits, memo)?;
     Ok(TapsSoFar {
         peak_unit: wiring.tap_unit(),
         source: settings.source,

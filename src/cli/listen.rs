@@ -1,5 +1,6 @@
 //! `tapjoint listen`: a stream is recorded, and each hit is judged while it is recorded.
 
+mod log;
 mod recorder;
 mod state;
 mod stream;
@@ -13,13 +14,14 @@ use super::place::is_description;
 use super::run::RunArguments;
 use super::staging::ledger;
 use super::terminal::Terminal;
-use crate::listen::{ListenSettings, Listener, News};
+use crate::listen::{ListenError, ListenSettings, Listener, News};
 use crate::pipeline::{BareSettings, RecordingPlan};
 use crate::quantity::{Dimension, parse_quantity};
 use crate::recording::{GrowingRecording, PcmLayout, ReadSettings, Recording, SampleForm};
 use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
+use log::Log;
 use state::{States, Subject};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -215,7 +217,6 @@ fn listen(
 ) -> anyhow::Result<Heard> {
     let source = arguments.source()?;
     let bare = arguments.run.bare();
-    let plan = plan_of(described, target, &bare);
     let headers = match &source {
         Source::Replay { recording, .. } => recording.clone(),
         Source::Standard(_) => None,
@@ -227,116 +228,162 @@ fn listen(
         true => aside.path().join("played.wav"),
         false => target.file.clone(),
     };
+    let is_live = arguments.speed.is_some();
+    let mut hearing = Hearing {
+        plan: plan_of(described, target, &bare),
+        settings: ListenSettings {
+            name: file_name(&target.file),
+            record: arguments.record,
+            headers,
+            earlier: opened(&target.earlier)?,
+        },
+        listener: None,
+        log: Log::beside(&first),
+        states: is_live.then(|| States::begin(Subject::of(described, target, &bare))),
+        wanted: arguments.taps,
+        files: target.earlier.clone(),
+        fault: None,
+        terminal,
+    };
     terminal.say(&introduction(arguments, described, target))?;
     let stop = Arc::new(AtomicBool::new(false));
     ledger().stop = Some(stop.clone());
     let events = stream::record(source, first, stop.clone());
-    let settings = ListenSettings {
-        name: file_name(&target.file),
-        record: arguments.record,
-        headers,
-        earlier: opened(&target.earlier)?,
-    };
-    let is_live = arguments.speed.is_some();
-    let mut states = is_live.then(|| States::begin(Subject::of(described, target, &bare)));
-    let mut heard = Heard {
-        files: target.earlier.clone(),
-        accepted: 0,
-        ended: Ok(0),
-    };
-    let mut listener: Option<Listener> = None;
-    let mut has_ended = false;
-    loop {
+    let mut ended = None;
+    while ended.is_none() && !stop.load(Ordering::Relaxed) {
         match events.recv_timeout(PAUSE) {
-            Ok(Event::File(path)) => {
-                let growing = GrowingRecording::open(&path)?;
-                match &mut listener {
-                    None => listener = Some(Listener::new(growing, plan, settings.clone())),
-                    Some(listener) => {
-                        tell(
-                            &listener.go_on_in(growing)?,
-                            listener.accepted(),
-                            arguments,
-                            terminal,
-                        )?;
-                    }
-                }
-                heard.files.push(path);
-            }
-            Ok(Event::Ended(ended)) => {
-                heard.ended = ended;
-                has_ended = true;
-            }
+            Ok(Event::File(path)) => hearing.go_on_in(path)?,
+            Ok(Event::Ended(how)) => ended = Some(how),
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => has_ended = true,
+            Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(0)),
         }
-        let Some(listener) = &mut listener else {
-            if has_ended || stop.load(Ordering::Relaxed) {
-                break;
-            }
-            continue;
-        };
-        while let Some(news) = listener.step()? {
-            tell(&news, listener.accepted(), arguments, terminal)?;
-            if let Some(states) = &mut states {
-                if !news.is_empty() {
-                    states.ask(heard.files.clone());
-                }
-                states.tell(terminal)?;
-            }
-        }
-        if let Some(states) = &mut states {
-            states.tell(terminal)?;
-        }
-        if has_ended || stop.load(Ordering::Relaxed) {
-            break;
-        }
+        hearing.catch_up(&stop)?;
     }
     ledger().stop = None;
-    let Some(mut listener) = listener else {
-        return Ok(heard);
-    };
-    tell(
-        &listener.finish()?,
-        listener.accepted(),
-        arguments,
-        terminal,
-    )?;
-    heard.accepted = listener.accepted();
-    terminal.say(&format!(
-        "{}: {:.1} s, {} of {} hits count\n",
-        file_name(&target.file),
-        listener.seconds(),
-        listener.accepted(),
-        listener.hits(),
-    ))?;
-    Ok(heard)
+    hearing.end(ended.unwrap_or(Ok(0)))
+}
+
+/// A recording that is listened to.
+struct Hearing<'a> {
+    plan: RecordingPlan<'a>,
+    settings: ListenSettings,
+    /// `None` before the first samples.
+    listener: Option<Listener<'a>>,
+    log: Log,
+    /// `None` where no results are wanted between the hits.
+    states: Option<States>,
+    /// Hits that are wanted.
+    wanted: usize,
+    files: Vec<PathBuf>,
+    /// Why hits are no longer judged, while the recording goes on.
+    fault: Option<ListenError>,
+    terminal: &'a Terminal,
+}
+
+impl Hearing<'_> {
+    /// Listens to the next file of the recording.
+    fn go_on_in(&mut self, path: PathBuf) -> anyhow::Result<()> {
+        let growing = GrowingRecording::open(&path)?;
+        self.files.push(path);
+        match &mut self.listener {
+            None => {
+                let settings = self.settings.clone();
+                self.listener = Some(Listener::new(growing, self.plan, settings));
+                Ok(())
+            }
+            Some(listener) => {
+                let news = listener.go_on_in(growing);
+                self.take(news)
+            }
+        }
+    }
+
+    /// Judges what the file holds by now.
+    fn catch_up(&mut self, stop: &AtomicBool) -> anyhow::Result<()> {
+        while let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none())
+            && !stop.load(Ordering::Relaxed)
+        {
+            let news = listener.step().transpose();
+            let Some(news) = news else {
+                break;
+            };
+            self.take(news)?;
+        }
+        match &mut self.states {
+            Some(states) => states.tell(self.terminal),
+            None => Ok(()),
+        }
+    }
+
+    /// Prints and logs what is new. A sample that is no number ends the judging, and not the recording.
+    fn take(&mut self, news: Result<Vec<News>, ListenError>) -> anyhow::Result<()> {
+        let Some(listener) = &self.listener else {
+            return Ok(());
+        };
+        let news = match news {
+            Ok(news) => news,
+            Err(fault @ ListenError::Recording(_)) => {
+                let words =
+                    format!("{fault}; hits are not judged any more, and the recording goes on");
+                self.terminal.warn(&words);
+                self.fault = Some(fault);
+                return Ok(());
+            }
+            Err(fault) => return Err(fault.into()),
+        };
+        self.log.note(listener.seconds(), &news)?;
+        let screen = self.terminal.screen();
+        for one in &news {
+            self.terminal.say(&screen.wrapped(&one.to_string(), 2))?;
+        }
+        if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
+            let (accepted, wanted) = (listener.accepted(), self.wanted);
+            let what = match wanted.saturating_sub(accepted) {
+                0 => "enough: Ctrl-C ends the recording".to_owned(),
+                1 => "1 more is wanted".to_owned(),
+                missing => format!("{missing} more are wanted"),
+            };
+            self.terminal
+                .say(&format!("  {accepted} of {wanted} hits; {what}\n"))?;
+            if let Some(states) = &mut self.states {
+                states.ask(accepted, &self.files);
+            }
+        }
+        Ok(())
+    }
+
+    /// Judges all hits for good.
+    fn end(mut self, ended: anyhow::Result<usize>) -> anyhow::Result<Heard> {
+        if self.fault.is_none()
+            && let Some(listener) = &mut self.listener
+        {
+            let news = listener.finish();
+            self.states = None;
+            self.take(news)?;
+        }
+        let mut accepted = 0;
+        if let Some(listener) = &self.listener {
+            accepted = listener.accepted();
+            self.terminal.say(&format!(
+                "{}: {:.1} s, {accepted} of {} hits count\n",
+                self.settings.name,
+                listener.seconds(),
+                listener.hits(),
+            ))?;
+        }
+        Ok(Heard {
+            files: self.files,
+            accepted,
+            ended: match self.fault {
+                Some(fault) => Err(fault.into()),
+                None => ended,
+            },
+        })
+    }
 }
 
 /// Time between two looks at a file that does not grow: short beside the least time to a verdict.
 const PAUSE: Duration = Duration::from_millis(10);
-
-/// Prints what is new, and how many hits count.
-fn tell(
-    news: &[News],
-    accepted: usize,
-    arguments: &ListenArguments,
-    terminal: &Terminal,
-) -> anyhow::Result<()> {
-    for one in news {
-        terminal.say(&terminal.screen().wrapped(&one.to_string(), 2))?;
-    }
-    if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
-        let wanted = arguments.taps;
-        let what = match wanted.saturating_sub(accepted) {
-            0 => "enough: Ctrl-C ends the recording".to_owned(),
-            1 => "1 more is wanted".to_owned(),
-            missing => format!("{missing} more are wanted"),
-        };
-        terminal.say(&format!("  {accepted} of {wanted} hits; {what}\n"))?;
-    }
-    Ok(())
-}
 
 /// What is known of the recording before it begins.
 fn plan_of<'a>(

@@ -8,7 +8,7 @@ use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::quality::remedy_of;
 use tapjoint_signal::recording::{GrowingRecording, Recording, RecordingError};
 use tapjoint_signal::spectral::measure_decay;
-use tapjoint_signal::taps::{REACH, Tap, TapRemark, TapSource};
+use tapjoint_signal::taps::{REACH, Tap, TapMemo, TapRemark, TapSource};
 
 /// Length of a step (s). A verdict waits for the end of its step.
 const STEP: f64 = 0.05;
@@ -60,6 +60,7 @@ pub struct Listener<'a> {
     /// Channels on which hits are heard (0-based); not known before the first look.
     watched: Vec<usize>,
     alarm: Alarm,
+    memo: TapMemo,
     /// Frame at which the record of the last hit has ended, if no other hit comes first.
     due: Option<u64>,
     told: Vec<Told>,
@@ -86,6 +87,7 @@ impl<'a> Listener<'a> {
             step,
             watched: Vec::new(),
             alarm: Alarm::default(),
+            memo: TapMemo::default(),
             due: None,
             told: Vec::new(),
             doubts: Vec::new(),
@@ -178,9 +180,10 @@ impl<'a> Listener<'a> {
             .count()
     }
 
-    /// Length of what was heard of this file (s).
+    /// Length of what was heard, of all files (s).
     pub fn seconds(&self) -> f64 {
-        self.growing.frames() as f64 / self.growing.sample_rate()
+        let earlier = self.settings.earlier.iter().map(Recording::duration);
+        earlier.sum::<f64>() + self.growing.frames() as f64 / self.growing.sample_rate()
     }
 
     /// Finds the taps of the recording so far, and compares them with what was told.
@@ -197,28 +200,35 @@ impl<'a> Listener<'a> {
                 Recording::joined(name, parts.collect())?
             }
         };
-        let found = taps_so_far(recording, &self.plan, is_growing)?;
+        if !is_growing {
+            // The last decisions are those of a first look.
+            self.memo = TapMemo::default();
+        }
+        let found = taps_so_far(recording, &self.plan, is_growing, &mut self.memo)?;
         let mut news = Vec::new();
         // Before the first hit a channel may rest, and nothing is strange about it.
         if self.latest.is_some() {
             news.extend(self.new_doubts(&found));
         }
         let taps = &found.taps.taps;
-        let mut told = Vec::new();
+        let mut told = Vec::with_capacity(taps.len());
+        // Both are in order of time.
+        let mut earlier = self.told.iter().peekable();
         for (place, tap) in taps.iter().enumerate() {
-            let is_known = |told: &&Told| (told.time - tap.time).abs() <= REACH;
-            let before = self.told.iter().find(is_known);
+            while let Some(gone) = earlier.next_if(|one| one.time < tap.time - REACH) {
+                news.push(News::Gone { time: gone.time });
+            }
+            let before = earlier.next_if(|one| one.time <= tap.time + REACH);
             let is_last = place + 1 == taps.len();
             // The record of the last one has not ended while it is still waited for.
             if is_growing && is_last && before.is_none() && !self.has_ended(&found, tap) {
                 continue;
             }
             let reason = tap.rejection.as_ref().map(ToString::to_string);
-            let is_accepted = reason.is_none();
             match before {
                 None => news.push(News::Hit(hit_of(&found, tap)?)),
                 // Numbers in the reason move with every tap.
-                Some(before) if before.reason.is_none() != is_accepted => {
+                Some(before) if before.reason.is_none() != reason.is_none() => {
                     news.push(News::Revised(hit_of(&found, tap)?));
                 }
                 Some(_) => {}
@@ -226,12 +236,7 @@ impl<'a> Listener<'a> {
             let time = tap.time;
             told.push(Told { time, reason });
         }
-        let is_gone = |one: &&Told| {
-            let mut others = told.iter();
-            !others.any(|other| (one.time - other.time).abs() <= REACH)
-        };
-        let gone = self.told.iter().filter(is_gone);
-        news.extend(gone.map(|one| News::Gone { time: one.time }));
+        news.extend(earlier.map(|one| News::Gone { time: one.time }));
         self.told = told;
         self.latest = Some(found);
         Ok(news)
@@ -392,7 +397,13 @@ mod tests {
         let listener = listener.unwrap();
         // The decisions after the last sample are those of the whole chain on the file.
         let opened = Recording::open(path, &ReadSettings::default()).unwrap();
-        let whole = taps_so_far(opened, &RecordingPlan::Bare(&bare), false).unwrap();
+        let whole = taps_so_far(
+            opened,
+            &RecordingPlan::Bare(&bare),
+            false,
+            &mut TapMemo::default(),
+        )
+        .unwrap();
         let whole = whole.taps.taps.iter();
         let whole: Vec<Told> = whole
             .map(|tap| Told {

@@ -15,6 +15,7 @@ mod frozen;
 #[path = "../golden/mod.rs"]
 mod golden;
 mod leftovers;
+mod listen;
 mod outputs;
 mod schema;
 mod sheet;

@@ -13,6 +13,9 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
+/// Share of the hits by which their number has to change for a new state. A fifth: up to nine hits each gives one.
+const CHANGE: f64 = 0.2;
+
 /// What is analysed.
 pub(super) enum Subject {
     /// A described test, of which one recording goes on.
@@ -95,6 +98,8 @@ pub(super) struct States {
     answers: Receiver<anyhow::Result<String>>,
     is_busy: bool,
     waiting: Option<Vec<PathBuf>>,
+    /// Hits that counted at the last question.
+    accepted: usize,
 }
 
 impl States {
@@ -119,12 +124,18 @@ impl States {
             answers,
             is_busy: false,
             waiting: None,
+            accepted: 0,
         }
     }
 
-    /// Asks for the state of the recording in these files.
-    pub(super) fn ask(&mut self, files: Vec<PathBuf>) {
-        self.waiting = Some(files);
+    /// Asks for the state of the recording in these files, if the number of hits that count has changed enough.
+    pub(super) fn ask(&mut self, accepted: usize, files: &[PathBuf]) {
+        // The scatter of a mean falls with the square root of their number: among many one more says little.
+        let change = accepted.abs_diff(self.accepted);
+        if change > 0 && change >= (accepted as f64 * CHANGE) as usize {
+            self.accepted = accepted;
+            self.waiting = Some(files.to_vec());
+        }
     }
 
     /// Prints a state that is ready, and begins with the next. A state that cannot be worked out is said, and the recording

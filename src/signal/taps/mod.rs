@@ -5,24 +5,26 @@
 //! recording block by block. A tap's record begins a little before the trigger and ends where the
 //! next tap comes.
 
+mod answered;
 mod by_hand;
 mod double_hit;
+mod judge;
+mod memo;
 mod pulse;
 mod search;
 
 pub use by_hand::{REACH, TapsByHand};
 pub use double_hit::SecondHit;
+pub use memo::TapMemo;
 pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
 use std::fmt;
 use std::ops::Range;
 
 use crate::recording::{Recording, RecordingError};
-use double_hit::{least_candidate, second_hit};
-use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use search::{Force, Survey, find_pulses, find_rises};
-use tapjoint_numerics::stats::{median, root_mean_square};
+use judge::reject_short;
+use search::Survey;
+use tapjoint_numerics::stats::median;
 
 /// Channels on which taps are looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -100,6 +102,13 @@ impl Default for TapSettings {
             by_hand: TapsByHand::default(),
             is_growing: false,
         }
+    }
+}
+
+impl TapSettings {
+    /// Least distance of two taps (frames).
+    fn least_distance_in(&self, recording: &Recording) -> u64 {
+        (self.least_distance * recording.sample_rate()) as u64
     }
 }
 
@@ -425,6 +434,7 @@ impl Event {
 }
 
 /// Result of a search, before it is judged.
+#[derive(Debug, Clone)]
 struct Found {
     events: Vec<Event>,
     noise: f64,
@@ -443,13 +453,28 @@ pub fn find_taps(
     source: &TapSource,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
+    find_taps_again(recording, source, settings, &mut TapMemo::default())
+}
+
+/// Finds the taps of a recording that has grown since the last call, as [`find_taps`] does. `memo` holds what was
+/// found before, of the same recording by the same settings. What was measured of a tap then is not measured again, although
+/// the noise about it may have become a little other since; a call with a new memo measures all of it.
+///
+/// # Errors
+/// Those of [`find_taps`].
+pub fn find_taps_again(
+    recording: &Recording,
+    source: &TapSource,
+    settings: &TapSettings,
+    memo: &mut TapMemo,
+) -> Result<Taps, RecordingError> {
+    let parts: Vec<(u64, &Recording)> = recording.parts().collect();
+    let joined = !parts.is_empty();
+    let parts = if joined { parts } else { vec![(0, recording)] };
     let mut searched = Vec::new();
-    for (start, file) in recording.parts() {
-        searched.push((start, file, search(file, source, settings)?));
-    }
-    let joined = !searched.is_empty();
-    if !joined {
-        searched.push((0, recording, search(recording, source, settings)?));
+    for (number, (start, file)) in parts.into_iter().enumerate() {
+        let found = memo.part(number).search(file, source, settings)?;
+        searched.push((start, file, found));
     }
     let events = searched.iter().flat_map(|(.., found)| &found.events);
     let mut peaks: Vec<f64> = events
@@ -469,14 +494,12 @@ pub fn find_taps(
     // Last tap of each file.
     let mut lasts = Vec::new();
     let mut quiet = 0..0;
-    for (start, file, found) in &searched {
+    for (number, (start, file, found)) in searched.iter().enumerate() {
         let before = taps.len();
-        let judged = (0..found.events.len()).into_par_iter();
-        let judged = judged.map(|index| tap(file, source, found, index, weakest, settings));
-        // Collected in order, so that of several errors the first is reported.
-        let judged: Vec<Result<Tap, RecordingError>> = judged.collect();
-        for tap in judged {
-            let mut tap = tap?;
+        let judged = memo
+            .part(number)
+            .judge(file, source, found, weakest, settings)?;
+        for mut tap in judged {
             tap.file = joined.then(|| file.name().to_owned());
             tap.move_by(*start, rate);
             taps.push(tap);
@@ -533,358 +556,6 @@ pub fn find_taps(
         quiet,
         remarks,
     })
-}
-
-/// Finds the events of one file.
-fn search(
-    recording: &Recording,
-    source: &TapSource,
-    settings: &TapSettings,
-) -> Result<Found, RecordingError> {
-    match source {
-        TapSource::Hammer { channel, responses } => {
-            let mut found = find_pulses(recording, *channel, settings)?;
-            for event in &mut found.events {
-                event.answered = is_answered(recording, responses, event)?;
-            }
-            Ok(found)
-        }
-        TapSource::Responses(channels) => find_rises(recording, channels, settings),
-    }
-}
-
-// ---- Accepting and rejecting taps.
-
-/// A record shorter than this share of the median one is not worth shortening all others for.
-const SHORT_OF_MEDIAN: f64 = 0.5;
-/// A second hit is looked for so long after the first (s): longer than records usually last, and a bound
-/// on memory.
-const SEARCHED: f64 = 10.0;
-/// The last record may be cut to this share of the shortest other one.
-const CUT_OF_SHORTEST: f64 = 0.8;
-
-/// Judges one event. Peaks below `weakest` are too weak.
-fn tap(
-    recording: &Recording,
-    source: &TapSource,
-    found: &Found,
-    index: usize,
-    weakest: f64,
-    settings: &TapSettings,
-) -> Result<Tap, RecordingError> {
-    let rate = recording.sample_rate();
-    let event = &found.events[index];
-    // The record ends with the pre-trigger of the next tap, or with the file.
-    let before = ((settings.pre_trigger * rate) as u64).max(16);
-    let mut later = found.events.iter().skip(index + 1);
-    let next = later.find(|next| next.is_hit(weakest));
-    let end = next.map_or(recording.frames(), |next| {
-        next.trigger.saturating_sub(before)
-    });
-    let start = event.trigger.saturating_sub(before);
-    let record = start..end.max(start);
-    let least = least_distance(recording, settings);
-    let (mut pulse_end, mut pulse, mut second) = (None, None, None);
-    if let Some(force) = force_of(recording, source, found, index, &record, settings)? {
-        let own = force.index(record.end.min(event.trigger + least));
-        let end = force.pulse_end(event, own);
-        let start = force.index(record.start);
-        let about = start..force.index(end).max(start);
-        pulse = Pulse::of(&force.samples[about], force.noise, rate);
-        pulse_end = Some(end);
-        second = second_hit(&force, event, own, settings);
-    }
-    let double = second.filter(|second| second.ratio >= settings.double_hit);
-    let fault = match double {
-        _ if !event.answered => Some(Rejection::NoResponse),
-        _ if event.peak < weakest => Some(Rejection::TooWeak {
-            peak: event.peak,
-            limit: weakest,
-        }),
-        Some(double) => Some(Rejection::DoubleHit {
-            delay: double.delay,
-            ratio: double.ratio,
-            limit: settings.double_hit,
-        }),
-        None => None,
-    };
-    let mut overloaded = None;
-    if fault.is_none() || event.by_hand {
-        overloaded = overload(recording, source, &record)?;
-    }
-    let (rejection, overruled) = match event.by_hand {
-        true => (None, fault),
-        false => (fault.or(overloaded.map(Rejection::Overload)), None),
-    };
-    Ok(Tap {
-        file: None,
-        time: event.trigger as f64 / rate,
-        peak: event.peak,
-        pulse_end,
-        pulse: pulse.filter(|_| overloaded.is_none_or(|overload| !overload.is_force)),
-        record,
-        second_hit: second,
-        overload: overloaded,
-        rejection,
-        overruled,
-    })
-}
-
-/// Least distance of two taps (frames).
-fn least_distance(recording: &Recording, settings: &TapSettings) -> u64 {
-    (settings.least_distance * recording.sample_rate()) as u64
-}
-
-/// Surroundings of a tap whose disturbances are compared with a second hit (least distances of two taps).
-const SURROUNDINGS: u64 = 4;
-
-/// The force over an event's record and ahead of it, as far as that belongs to no other event; `None`
-/// without a hammer. Pulses that no sensor answers are taken out:
-/// they are no hits of the structure.
-fn force_of(
-    recording: &Recording,
-    source: &TapSource,
-    found: &Found,
-    index: usize,
-    record: &Range<u64>,
-    settings: &TapSettings,
-) -> Result<Option<Force>, RecordingError> {
-    let least = least_distance(recording, settings);
-    let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
-        return Ok(None);
-    };
-    let events = &found.events;
-    let trigger = events[index].trigger;
-    // Another hit of this event comes less than the least distance ahead, and after all of the last.
-    let before = index.checked_sub(1).and_then(|last| events.get(last));
-    let first = before.map_or(0, |last| last.trigger + least);
-    let first = trigger.saturating_sub(least).max(first).min(record.start);
-    // What comes nearer to the next tap than the least distance is the next one's.
-    let mut end = record.end;
-    if end < recording.frames() {
-        end = end.saturating_sub(least).max(end.min(trigger + least));
-    }
-    let longest = (SEARCHED * recording.sample_rate()) as u64;
-    let end = end.min(trigger + longest);
-    // Beyond the tap's surroundings only what may be a second hit is read.
-    let near = end.min(trigger + SURROUNDINGS * least);
-    let end = survey.last_reaching(least_candidate(settings) * events[index].peak, near..end);
-    let mut force = Force::read(recording, *channel, survey, first..end)?;
-    let inside = events.partition_point(|event| event.trigger + least < first)
-        ..events.partition_point(|event| event.trigger < end + least);
-    for (event, other) in events[inside.clone()].iter().zip(inside) {
-        if other != index && !event.answered && !event.by_hand {
-            let start = force.index(event.trigger.saturating_sub(least / 100));
-            let end = force.index(event.trigger + least);
-            force.samples[start..end].fill(0.0);
-        }
-    }
-    Ok(Some(force))
-}
-
-/// Samples after the last one at a limit that are left out as well. 4: the filter ahead of a converter spreads what was
-/// cut off over its neighbours.
-const RECOVERY: u64 = 4;
-
-/// Samples of a record at a channel's rails, and where the last of any response is over; `None` without any.
-fn overload(
-    recording: &Recording,
-    source: &TapSource,
-    record: &Range<u64>,
-) -> Result<Option<Overload>, RecordingError> {
-    let mut found: Option<Overload> = None;
-    for channel in source.channels() {
-        let Some(info) = recording.channels().get(channel) else {
-            continue;
-        };
-        let [low, high] = info.health.rails;
-        if low.is_none() && high.is_none() {
-            continue;
-        }
-        // A hair inside, so that rescaling by a unit cannot make a sample slip through.
-        let hair = 1e-9 * info.health.peak;
-        let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
-        let high = high.map_or(f64::INFINITY, |high| high - hair);
-        let outline = recording.outline(channel).unwrap_or_default();
-        let mut pieces = outline.pieces[outline.pieces_of(record.clone())].iter();
-        if !pieces.any(|piece| piece.high >= high || piece.low <= low) {
-            continue;
-        }
-        let samples = recording.read(channel, record.clone())?;
-        let cut_off = samples.iter().enumerate();
-        let cut_off = cut_off.filter(|(_, x)| **x >= high || **x <= low);
-        let (count, last) = cut_off.fold((0, None), |(count, _), (at, _)| (count + 1, Some(at)));
-        let Some(last) = last else {
-            continue;
-        };
-        let overload = found.get_or_insert(Overload {
-            channel: channel + 1,
-            samples: count,
-            whole_from: record.start,
-            is_force: false,
-        });
-        // The clipped pulse of a hammer spoils no decay.
-        if matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel) {
-            overload.is_force = true;
-        } else {
-            let whole_from = record.start + last as u64 + 1 + RECOVERY;
-            overload.whole_from = overload.whole_from.max(whole_from);
-        }
-    }
-    Ok(found)
-}
-
-/// Rejects records much shorter than the others: all averages share one block, and the shortest
-/// record sets its length. `lasts` are the last taps of the files, which may be cut off. The record of the tap `going_on`
-/// has not ended.
-fn reject_short(
-    taps: &mut [Tap],
-    lasts: &[usize],
-    going_on: Option<usize>,
-    rate: f64,
-    wanted: Option<f64>,
-) {
-    let ended = taps.iter().enumerate();
-    let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
-    let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
-    let typical = median(&mut lengths);
-    let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
-    for (index, tap) in taps.iter_mut().enumerate() {
-        let available = tap.frames() as f64 / rate;
-        // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
-            tap.rejection = Some(if let Some(overload) = tap.overload {
-                Rejection::Overload(overload)
-            } else if lasts.contains(&index) {
-                Rejection::CutOff { available, needed }
-            } else {
-                Rejection::NextTooSoon { available, needed }
-            });
-        }
-    }
-    let others = taps
-        .iter()
-        .enumerate()
-        .filter(|(index, tap)| tap.accepted() && !lasts.contains(index));
-    let shortest = others
-        .map(|(_, tap)| tap.frames() as f64 / rate)
-        .fold(f64::INFINITY, f64::min);
-    let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
-    for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
-        let tap = &mut taps[last];
-        let available = tap.frames() as f64 / rate;
-        if tap.accepted()
-            && tap.is_whole()
-            && needed.is_finite()
-            && available < CUT_OF_SHORTEST * needed
-        {
-            tap.rejection = Some(Rejection::CutOff { available, needed });
-        }
-    }
-}
-
-/// Stretch before and after the trigger that is compared (s): several periods of the lowest modes'
-/// higher companions, short beside the time between taps.
-const STRETCH: f64 = 0.05;
-/// A tap raises the rms of some response by this factor at least, or that of what cannot be predicted of it.
-const RISE: f64 = 1.5;
-
-/// Returns `true` where any response rises, or does not ring on as before, when the force rises. A hammer laid down, a swinging hammer and an
-/// electrical spike move no sensor. Without responses, or at the very start of the recording, the
-/// benefit of the doubt is given.
-fn is_answered(
-    recording: &Recording,
-    responses: &[usize],
-    event: &Event,
-) -> Result<bool, RecordingError> {
-    let stretch = (STRETCH * recording.sample_rate()) as u64;
-    // The filter's ringing ahead of the pulse belongs to neither side.
-    let gap = stretch / 10;
-    if responses.is_empty() || stretch < 8 || event.trigger < 2 * stretch {
-        return Ok(true);
-    }
-    let continued = (CONTINUED * recording.sample_rate()) as u64;
-    // Two taps lie no nearer, so that the stretch before the trigger is part of what is read.
-    let first = (event.trigger - gap).saturating_sub(continued.max(stretch));
-    let samples = recording.read_channels(responses, first..event.trigger + stretch)?;
-    let turn = (event.trigger - gap - first) as usize;
-    let trigger = (event.trigger - first) as usize;
-    let lag = ((LAG * recording.sample_rate()) as usize).max(1);
-    for ringing in &samples {
-        let quiet = &ringing[turn - stretch as usize..turn];
-        let loud = &ringing[trigger.min(ringing.len())..];
-        if rms_about_mean(loud) > RISE * rms_about_mean(quiet)
-            || rms_of_change(loud) > RISE * rms_of_change(quiet)
-        {
-            return Ok(true);
-        }
-        // A hit on a structure that still rings loudly may leave it no louder.
-        if let Some((quiet, loud)) = unpredicted(ringing, turn, lag)
-            && loud > RISE * quiet
-        {
-            return Ok(true);
-        }
-    }
-    Ok(false)
-}
-
-/// Stretch before the trigger from which the ringing is continued (s): two taps lie no nearer.
-const CONTINUED: f64 = 0.2;
-/// Distance of the past values from which the next one is predicted (s): a part of a period of the strong low modes,
-/// so that noise on neighbouring samples does not hide their curvature.
-const LAG: f64 = 1e-3;
-/// Number of past values: two for each of eight oscillations.
-const LAGS: usize = 16;
-
-/// Root mean squares of what a linear prediction misses before the sample `turn`, from which its weights come, and
-/// after it; `None` where there are too few samples.
-///
-/// A sum of n decaying oscillations is predicted exactly by 2 n equally spaced past values (de Prony 1795), whatever
-/// its beats. A new hit breaks the prediction.
-fn unpredicted(samples: &[f64], turn: usize, lag: usize) -> Option<(f64, f64)> {
-    let reach = LAGS * lag;
-    let rows = turn.checked_sub(reach).filter(|rows| *rows >= 4 * LAGS)?;
-    let past = |row: usize| (1..=LAGS).map(move |k| samples[row - k * lag]);
-    let mut normal = DMatrix::<f64>::zeros(LAGS, LAGS);
-    let mut right = DVector::<f64>::zeros(LAGS);
-    for (row, &value) in samples.iter().enumerate().take(turn).skip(reach) {
-        let values = DVector::from_iterator(LAGS, past(row));
-        normal.ger(1.0, &values, &values, 1.0);
-        right.axpy(value, &values, 1.0);
-    }
-    // Fewer oscillations than the weights could follow leave the equations nearly singular.
-    let trace = normal.trace();
-    for k in 0..LAGS {
-        normal[(k, k)] += 1e-12 * trace;
-    }
-    let weights = normal.cholesky()?.solve(&right);
-    let misses = |rows: Range<usize>| -> f64 {
-        let errors = rows.map(|row| {
-            let predicted: f64 = past(row).zip(&weights).map(|(x, w)| x * w).sum();
-            (samples[row] - predicted).powi(2)
-        });
-        errors.sum()
-    };
-    let before = misses(reach..turn) / (rows - LAGS) as f64;
-    let after = misses(turn..samples.len()) / samples.len().saturating_sub(turn).max(1) as f64;
-    Some((before.sqrt(), after.sqrt()))
-}
-
-/// rms of the second differences: it weighs high modes, which die first and which a new hit wakes
-/// even while the low ones still ring loudly.
-fn rms_of_change(samples: &[f64]) -> f64 {
-    let change: Vec<f64> = samples
-        .windows(3)
-        .map(|x| x[2] - 2.0 * x[1] + x[0])
-        .collect();
-    root_mean_square(&change)
-}
-
-/// Root mean square about the mean; 0 of nothing.
-fn rms_about_mean(samples: &[f64]) -> f64 {
-    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
-    let about: Vec<f64> = samples.iter().map(|x| x - mean).collect();
-    root_mean_square(&about)
 }
 
 #[cfg(test)]
@@ -947,22 +618,5 @@ mod tests {
                 "noise {noise}"
             );
         }
-    }
-
-    #[test]
-    fn limit_oscillations_are_predicted_until_something_new_comes() {
-        let rings = |n: usize| -> f64 {
-            let waves = [(0.31, 1.0), (0.47, 0.5), (1.13, 0.2)];
-            let at = |(omega, amplitude): &(f64, f64)| amplitude * (omega * n as f64).sin();
-            (-1e-3 * n as f64).exp() * waves.iter().map(at).sum::<f64>()
-        };
-        let mut samples: Vec<f64> = (0..400).map(rings).collect();
-        let (before, after) = unpredicted(&samples, 300, 2).unwrap();
-        // The ridge of 10^-12 leaves some 10^-6 of the amplitude.
-        assert!(before < 1e-4 && after < 1e-4, "{before} {after}");
-        samples[320] += 0.01;
-        let (before, after) = unpredicted(&samples, 300, 2).unwrap();
-        assert!(after > 10.0 * before, "{before} {after}");
-        assert_eq!(unpredicted(&samples, 90, 2), None);
     }
 }

@@ -1,6 +1,7 @@
 //! The two searches: pulses of force, by a threshold over noise and drift, with hysteresis; and without a hammer
 //! sudden rises of the responses after quiet or decay. And the force about one tap, drift taken out, pulses upwards.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::{Event, Found, TapRemark, TapSettings};
@@ -22,6 +23,7 @@ const LONGEST_PULSE: f64 = 0.05;
 const MOST_SURVEYED: u64 = 1024;
 
 /// The channel's drift, piece by piece, interpolated between their middles.
+#[derive(Debug, Clone)]
 struct Baseline {
     medians: Vec<f64>,
     /// Length of a piece (samples).
@@ -58,7 +60,20 @@ impl Baseline {
     }
 }
 
+/// A piece of the force channel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SurveyedPiece {
+    /// Its median.
+    centre: f64,
+    /// Median and root mean square of the distances from it.
+    deviation: f64,
+    root: f64,
+    /// The largest of them.
+    reached: f64,
+}
+
 /// Survey of the force channel.
+#[derive(Debug, Clone)]
 pub(super) struct Survey {
     baseline: Baseline,
     noise: f64,
@@ -71,6 +86,11 @@ pub(super) struct Survey {
 }
 
 impl Survey {
+    /// Returns true where the pulses point downwards.
+    pub(super) fn is_inverted(&self) -> bool {
+        self.polarity < 0.0
+    }
+
     /// Most force that some samples of an outline's piece may have.
     fn most_force(&self, piece: usize) -> f64 {
         let extremes = self.outline.pieces[piece];
@@ -93,23 +113,31 @@ impl Survey {
     }
 }
 
-/// Surveys drift, noise and direction of the force channel.
-fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingError> {
+/// Surveys drift, noise and direction of the force channel. `known` holds its whole pieces that were surveyed before.
+fn survey(
+    recording: &Recording,
+    channel: usize,
+    known: &mut BTreeMap<u64, SurveyedPiece>,
+) -> Result<Survey, RecordingError> {
     let frames = ((PIECE * recording.sample_rate()) as u64).max(32);
     let pieces = recording.frames().div_ceil(frames);
     let stride = pieces.div_ceil(MOST_SURVEYED).max(1);
     let (mut medians, mut deviations) = (Vec::new(), Vec::new());
     let (mut roots, mut reached) = (Vec::new(), Vec::new());
     for piece in (0..pieces).step_by(stride as usize) {
-        let start = piece * frames;
-        let mut samples = recording.read(channel, start..start + frames)?;
-        let Extremes { low, high } = Extremes::of(&samples);
-        let centre = median(&mut samples);
-        samples.iter_mut().for_each(|x| *x = (*x - centre).abs());
-        roots.push(root_mean_square(&samples));
-        deviations.push(median(&mut samples));
-        medians.push(centre);
-        reached.push((high - centre).max(centre - low));
+        let own = piece * frames..(piece + 1) * frames;
+        let is_whole = own.end <= recording.frames();
+        let surveyed = match known.get(&piece) {
+            Some(surveyed) => *surveyed,
+            None => surveyed(recording, channel, own)?,
+        };
+        if is_whole {
+            known.insert(piece, surveyed);
+        }
+        roots.push(surveyed.root);
+        deviations.push(surveyed.deviation);
+        medians.push(surveyed.centre);
+        reached.push(surveyed.reached);
     }
     let baseline = Baseline {
         medians,
@@ -158,6 +186,24 @@ fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingErro
     })
 }
 
+/// Surveys a piece of the force channel.
+fn surveyed(
+    recording: &Recording,
+    channel: usize,
+    frames: Range<u64>,
+) -> Result<SurveyedPiece, RecordingError> {
+    let mut samples = recording.read(channel, frames)?;
+    let Extremes { low, high } = Extremes::of(&samples);
+    let centre = median(&mut samples);
+    samples.iter_mut().for_each(|x| *x = (*x - centre).abs());
+    Ok(SurveyedPiece {
+        centre,
+        root: root_mean_square(&samples),
+        deviation: median(&mut samples),
+        reached: (high - centre).max(centre - low),
+    })
+}
+
 /// A stretch of force above the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Excursion {
@@ -166,13 +212,14 @@ struct Excursion {
     peak: f64,
 }
 
-/// Finds the pulses of force.
+/// Finds the pulses of force. `known` holds pieces that were surveyed before, and takes new ones.
 pub(super) fn find_pulses(
     recording: &Recording,
     channel: usize,
     settings: &TapSettings,
+    known: &mut BTreeMap<u64, SurveyedPiece>,
 ) -> Result<Found, RecordingError> {
-    let survey = survey(recording, channel)?;
+    let survey = survey(recording, channel, known)?;
     // Hum reaches 1.4 times its rms and no more, where noise reaches five times: two and a half times
     // what a piece usually reaches is clear of either.
     let floor = (settings.over_noise * survey.noise).min(2.5 * survey.usual.max(survey.noise));
@@ -223,7 +270,7 @@ pub(super) fn find_pulses(
             count: all - excursions.len(),
         });
     }
-    let distance = (settings.least_distance * recording.sample_rate()) as u64;
+    let distance = settings.least_distance_in(recording);
     Ok(Found {
         events: group(&excursions, distance, settings.double_hit),
         noise: survey.noise,
@@ -468,7 +515,7 @@ pub(super) fn find_rises(
         .fold(0.0, f64::max);
     // The floor is the 10 % point of the pieces' peaks; noise peaks reach some two times that.
     let threshold = (0.6 * settings.over_noise).max(settings.of_largest * highest);
-    let distance = (settings.least_distance * recording.sample_rate()) as u64;
+    let distance = settings.least_distance_in(recording);
     let (mut triggers, mut remarks) = (Vec::new(), Vec::new());
     let first = envelope.combined(0..1)?;
     if first

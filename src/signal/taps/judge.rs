@@ -1,0 +1,265 @@
+//! Accepting and rejecting taps: each by itself, and those whose records are too short beside the others'.
+
+use super::double_hit::{SecondHit, least_candidate, second_hit};
+use super::pulse::Pulse;
+use super::search::Force;
+use super::{Event, Found, Overload, Rejection, Tap, TapSettings, TapSource};
+use crate::recording::{Recording, RecordingError};
+use std::ops::Range;
+use tapjoint_numerics::stats::median;
+
+/// A record shorter than this share of the median one is not worth shortening all others for.
+const SHORT_OF_MEDIAN: f64 = 0.5;
+/// A second hit is looked for so long after the first (s): longer than records usually last, and a bound
+/// on memory.
+const SEARCHED: f64 = 10.0;
+/// The last record may be cut to this share of the shortest other one.
+const CUT_OF_SHORTEST: f64 = 0.8;
+
+/// What is measured of one event, before it is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Facts {
+    /// Frame in which the force pulse has died away; `None` without a hammer.
+    pulse_end: Option<u64>,
+    pulse: Option<Pulse>,
+    second_hit: Option<SecondHit>,
+    overload: Option<Overload>,
+}
+
+/// Frames of an event's record. It ends with the pre-trigger of the next hit, or with the file.
+pub(super) fn record_of(
+    recording: &Recording,
+    events: &[Event],
+    index: usize,
+    weakest: f64,
+    settings: &TapSettings,
+) -> Range<u64> {
+    let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
+    let mut later = events.iter().skip(index + 1);
+    let next = later.find(|next| next.is_hit(weakest));
+    let end = next.map_or(recording.frames(), |next| {
+        next.trigger.saturating_sub(before)
+    });
+    let start = events[index].trigger.saturating_sub(before);
+    start..end.max(start)
+}
+
+/// Measures one event in its record.
+pub(super) fn facts(
+    recording: &Recording,
+    source: &TapSource,
+    found: &Found,
+    index: usize,
+    record: &Range<u64>,
+    settings: &TapSettings,
+) -> Result<Facts, RecordingError> {
+    let event = &found.events[index];
+    let least = settings.least_distance_in(recording);
+    let mut facts = Facts {
+        pulse_end: None,
+        pulse: None,
+        second_hit: None,
+        overload: overload(recording, source, record)?,
+    };
+    if let Some(force) = force_of(recording, source, found, index, record, settings)? {
+        let own = force.index(record.end.min(event.trigger + least));
+        let end = force.pulse_end(event, own);
+        let start = force.index(record.start);
+        let about = start..force.index(end).max(start);
+        facts.pulse = Pulse::of(&force.samples[about], force.noise, recording.sample_rate());
+        facts.pulse_end = Some(end);
+        facts.second_hit = second_hit(&force, event, own, settings);
+    }
+    Ok(facts)
+}
+
+/// Judges one event. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).
+pub(super) fn judge(
+    event: &Event,
+    record: Range<u64>,
+    facts: &Facts,
+    weakest: f64,
+    rate: f64,
+    settings: &TapSettings,
+) -> Tap {
+    let double = facts.second_hit;
+    let fault = match double.filter(|double| double.ratio >= settings.double_hit) {
+        _ if !event.answered => Some(Rejection::NoResponse),
+        _ if event.peak < weakest => Some(Rejection::TooWeak {
+            peak: event.peak,
+            limit: weakest,
+        }),
+        Some(double) => Some(Rejection::DoubleHit {
+            delay: double.delay,
+            ratio: double.ratio,
+            limit: settings.double_hit,
+        }),
+        None => None,
+    };
+    let overload = facts.overload.filter(|_| fault.is_none() || event.by_hand);
+    let (rejection, overruled) = match event.by_hand {
+        true => (None, fault),
+        false => (fault.or(overload.map(Rejection::Overload)), None),
+    };
+    let is_known = overload.is_none_or(|overload| !overload.is_force);
+    Tap {
+        file: None,
+        time: event.trigger as f64 / rate,
+        peak: event.peak,
+        pulse_end: facts.pulse_end,
+        pulse: facts.pulse.filter(|_| is_known),
+        record,
+        second_hit: facts.second_hit,
+        overload,
+        rejection,
+        overruled,
+    }
+}
+
+/// Surroundings of a tap whose disturbances are compared with a second hit (least distances of two taps).
+const SURROUNDINGS: u64 = 4;
+
+/// The force over an event's record and ahead of it, as far as that belongs to no other event; `None`
+/// without a hammer. Pulses that no sensor answers are taken out:
+/// they are no hits of the structure.
+fn force_of(
+    recording: &Recording,
+    source: &TapSource,
+    found: &Found,
+    index: usize,
+    record: &Range<u64>,
+    settings: &TapSettings,
+) -> Result<Option<Force>, RecordingError> {
+    let least = settings.least_distance_in(recording);
+    let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
+        return Ok(None);
+    };
+    let events = &found.events;
+    let trigger = events[index].trigger;
+    // Another hit of this event comes less than the least distance ahead, and after all of the last.
+    let before = index.checked_sub(1).and_then(|last| events.get(last));
+    let first = before.map_or(0, |last| last.trigger + least);
+    let first = trigger.saturating_sub(least).max(first).min(record.start);
+    // What comes nearer to the next tap than the least distance is the next one's.
+    let mut end = record.end;
+    if end < recording.frames() {
+        end = end.saturating_sub(least).max(end.min(trigger + least));
+    }
+    let longest = (SEARCHED * recording.sample_rate()) as u64;
+    let end = end.min(trigger + longest);
+    // Beyond the tap's surroundings only what may be a second hit is read.
+    let near = end.min(trigger + SURROUNDINGS * least);
+    let end = survey.last_reaching(least_candidate(settings) * events[index].peak, near..end);
+    let mut force = Force::read(recording, *channel, survey, first..end)?;
+    let inside = events.partition_point(|event| event.trigger + least < first)
+        ..events.partition_point(|event| event.trigger < end + least);
+    for (event, other) in events[inside.clone()].iter().zip(inside) {
+        if other != index && !event.answered && !event.by_hand {
+            let start = force.index(event.trigger.saturating_sub(least / 100));
+            let end = force.index(event.trigger + least);
+            force.samples[start..end].fill(0.0);
+        }
+    }
+    Ok(Some(force))
+}
+
+/// Samples after the last one at a limit that are left out as well. 4: the filter ahead of a converter spreads what was
+/// cut off over its neighbours.
+const RECOVERY: u64 = 4;
+
+/// Samples of a record at a channel's rails, and where the last of any response is over; `None` without any.
+fn overload(
+    recording: &Recording,
+    source: &TapSource,
+    record: &Range<u64>,
+) -> Result<Option<Overload>, RecordingError> {
+    let mut found: Option<Overload> = None;
+    for channel in source.channels() {
+        let Some(info) = recording.channels().get(channel) else {
+            continue;
+        };
+        let [low, high] = info.health.rails;
+        if low.is_none() && high.is_none() {
+            continue;
+        }
+        // A hair inside, so that rescaling by a unit cannot make a sample slip through.
+        let hair = 1e-9 * info.health.peak;
+        let low = low.map_or(f64::NEG_INFINITY, |low| low + hair);
+        let high = high.map_or(f64::INFINITY, |high| high - hair);
+        let outline = recording.outline(channel).unwrap_or_default();
+        let mut pieces = outline.pieces[outline.pieces_of(record.clone())].iter();
+        if !pieces.any(|piece| piece.high >= high || piece.low <= low) {
+            continue;
+        }
+        let samples = recording.read(channel, record.clone())?;
+        let cut_off = samples.iter().enumerate();
+        let cut_off = cut_off.filter(|(_, x)| **x >= high || **x <= low);
+        let (count, last) = cut_off.fold((0, None), |(count, _), (at, _)| (count + 1, Some(at)));
+        let Some(last) = last else {
+            continue;
+        };
+        let overload = found.get_or_insert(Overload {
+            channel: channel + 1,
+            samples: count,
+            whole_from: record.start,
+            is_force: false,
+        });
+        // The clipped pulse of a hammer spoils no decay.
+        if matches!(source, TapSource::Hammer { channel: force, .. } if *force == channel) {
+            overload.is_force = true;
+        } else {
+            let whole_from = record.start + last as u64 + 1 + RECOVERY;
+            overload.whole_from = overload.whole_from.max(whole_from);
+        }
+    }
+    Ok(found)
+}
+
+/// Rejects records much shorter than the others: all averages share one block, and the shortest
+/// record sets its length. `lasts` are the last taps of the files, which may be cut off. The record of the tap `going_on`
+/// has not ended.
+pub(super) fn reject_short(
+    taps: &mut [Tap],
+    lasts: &[usize],
+    going_on: Option<usize>,
+    rate: f64,
+    wanted: Option<f64>,
+) {
+    let ended = taps.iter().enumerate();
+    let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
+    let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
+    let typical = median(&mut lengths);
+    let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
+    for (index, tap) in taps.iter_mut().enumerate() {
+        let available = tap.frames() as f64 / rate;
+        // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
+        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
+            tap.rejection = Some(if let Some(overload) = tap.overload {
+                Rejection::Overload(overload)
+            } else if lasts.contains(&index) {
+                Rejection::CutOff { available, needed }
+            } else {
+                Rejection::NextTooSoon { available, needed }
+            });
+        }
+    }
+    let others = taps
+        .iter()
+        .enumerate()
+        .filter(|(index, tap)| tap.accepted() && !lasts.contains(index));
+    let shortest = others
+        .map(|(_, tap)| tap.frames() as f64 / rate)
+        .fold(f64::INFINITY, f64::min);
+    let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
+    for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
+        let tap = &mut taps[last];
+        let available = tap.frames() as f64 / rate;
+        if tap.accepted()
+            && tap.is_whole()
+            && needed.is_finite()
+            && available < CUT_OF_SHORTEST * needed
+        {
+            tap.rejection = Some(Rejection::CutOff { available, needed });
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What was found of a growing recording before, so that a look at it costs little.
+
+use super::answered::is_answered;
+use super::judge::{Facts, facts, judge, record_of};
+use super::search::{SurveyedPiece, find_pulses, find_rises};
+use super::{Found, Tap, TapSettings, TapSource};
+use crate::recording::{Recording, RecordingError};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// What was measured of a tap holds while the channel's noise is the same within this share. 10 %: a second hit is judged
+/// by limits of 4 and 10 % of the peak, far above the noise of a tap that counts.
+const SAME_NOISE: f64 = 0.1;
+
+/// What was found of a recording before.
+#[derive(Debug, Default)]
+pub struct TapMemo {
+    parts: Vec<PartMemo>,
+}
+
+impl TapMemo {
+    /// Returns what was found of a file (0-based).
+    pub(super) fn part(&mut self, number: usize) -> &mut PartMemo {
+        if self.parts.len() <= number {
+            self.parts.resize_with(number + 1, PartMemo::default);
+        }
+        &mut self.parts[number]
+    }
+}
+
+/// What was found of one file.
+#[derive(Debug, Default)]
+pub(super) struct PartMemo {
+    /// Frames of the file and its events; a file that has not grown has the same.
+    found: Option<(u64, Found)>,
+    /// Pieces of the force channel, by their numbers.
+    pieces: BTreeMap<u64, SurveyedPiece>,
+    /// Whether a sensor answers the event at a frame.
+    answered: BTreeMap<u64, bool>,
+    /// What was measured of events, and the conditions that it holds for.
+    facts: BTreeMap<Place, Facts>,
+    conditions: Option<Conditions>,
+}
+
+/// Frames of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    trigger: u64,
+    /// Trigger of the event before.
+    before: Option<u64>,
+    /// Its record.
+    start: u64,
+    end: u64,
+}
+
+/// What the measurements of all events depend on.
+#[derive(Debug, Clone, PartialEq)]
+struct Conditions {
+    noise: f64,
+    is_inverted: bool,
+    /// Levels at which channels are cut off.
+    rails: Vec<[Option<f64>; 2]>,
+}
+
+impl Conditions {
+    fn of(recording: &Recording, found: &Found) -> Self {
+        let channels = recording.channels().iter();
+        Self {
+            noise: found.noise,
+            is_inverted: found
+                .survey
+                .as_ref()
+                .is_some_and(|survey| survey.is_inverted()),
+            rails: channels.map(|info| info.health.rails).collect(),
+        }
+    }
+
+    fn hold_for(&self, other: &Self) -> bool {
+        let difference = (self.noise - other.noise).abs();
+        difference <= SAME_NOISE * self.noise
+            && (self.is_inverted, &self.rails) == (other.is_inverted, &other.rails)
+    }
+}
+
+impl PartMemo {
+    /// Finds the events of a file.
+    pub(super) fn search(
+        &mut self,
+        recording: &Recording,
+        source: &TapSource,
+        settings: &TapSettings,
+    ) -> Result<Found, RecordingError> {
+        if let Some((frames, found)) = &self.found
+            && *frames == recording.frames()
+        {
+            return Ok(found.clone());
+        }
+        let found = match source {
+            TapSource::Hammer { channel, responses } => {
+                let mut found = find_pulses(recording, *channel, settings, &mut self.pieces)?;
+                for event in &mut found.events {
+                    let frame = event.trigger;
+                    let known = self.answered.get(&frame).copied();
+                    event.answered = match known {
+                        Some(answered) => answered,
+                        None => is_answered(recording, responses, event)?,
+                    };
+                    // Later samples may still show the answer to the last event.
+                    if frame + settings.least_distance_in(recording) <= recording.frames() {
+                        self.answered.insert(frame, event.answered);
+                    }
+                }
+                found
+            }
+            TapSource::Responses(channels) => find_rises(recording, channels, settings)?,
+        };
+        self.found = Some((recording.frames(), found.clone()));
+        Ok(found)
+    }
+
+    /// Judges the events of a file. Peaks below `weakest` are too weak.
+    pub(super) fn judge(
+        &mut self,
+        recording: &Recording,
+        source: &TapSource,
+        found: &Found,
+        weakest: f64,
+        settings: &TapSettings,
+    ) -> Result<Vec<Tap>, RecordingError> {
+        let now = Conditions::of(recording, found);
+        if self
+            .conditions
+            .as_ref()
+            .is_none_or(|earlier| !earlier.hold_for(&now))
+        {
+            self.facts.clear();
+            self.conditions = Some(now);
+        }
+        let events = &found.events;
+        let mut places: Vec<(Place, Range<u64>)> = Vec::with_capacity(events.len());
+        for (index, event) in events.iter().enumerate() {
+            let record = record_of(recording, events, index, weakest, settings);
+            let before = index.checked_sub(1).map(|before| events[before].trigger);
+            let place = Place {
+                trigger: event.trigger,
+                before,
+                start: record.start,
+                end: record.end,
+            };
+            places.push((place, record));
+        }
+        let missing: Vec<usize> = (0..events.len())
+            .filter(|index| !self.facts.contains_key(&places[*index].0))
+            .collect();
+        let measured = missing.into_par_iter().map(|index| {
+            let (place, record) = &places[index];
+            let measured = facts(recording, source, found, index, record, settings)?;
+            Ok((*place, measured))
+        });
+        // Collected in order, so that of several errors the first is reported.
+        let measured: Vec<Result<(Place, Facts), RecordingError>> = measured.collect();
+        // What belongs to no event any more is forgotten.
+        let mut facts = BTreeMap::new();
+        for (place, _) in &places {
+            if let Some(known) = self.facts.remove(place) {
+                facts.insert(*place, known);
+            }
+        }
+        for one in measured {
+            let (place, measured) = one?;
+            facts.insert(place, measured);
+        }
+        self.facts = facts;
+        let rate = recording.sample_rate();
+        let mut taps = Vec::with_capacity(events.len());
+        for (event, (place, record)) in events.iter().zip(places) {
+            taps.push(judge(
+                event,
+                record,
+                &self.facts[&place],
+                weakest,
+                rate,
+                settings,
+            ));
+        }
+        Ok(taps)
+    }
+}

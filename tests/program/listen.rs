@@ -1,0 +1,256 @@
+//! A stream is recorded, and its hits are judged while it is recorded.
+
+use super::{golden::assert_snapshot, program, samples, tapjoint};
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+
+const LOW: &str = "recordings/cantilever/low.wav";
+
+/// Starts `listen` in a folder, its standard input in the hands of the test.
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(program())
+        .current_dir(folder)
+        .arg("listen")
+        .args(arguments)
+        .env("COLUMNS", "100")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Feeds bytes to `listen` and returns what it prints. It may end before it has taken all of them.
+fn fed(folder: &Path, arguments: &[&str], bytes: &[u8]) -> Output {
+    let mut listening = start(folder, arguments);
+    let _ = listening.stdin.take().unwrap().write_all(bytes);
+    listening.wait_with_output().unwrap()
+}
+
+fn refused(folder: &Path, arguments: &[&str], bytes: &[u8]) -> String {
+    let ended = fed(folder, arguments, bytes);
+    assert_eq!(ended.status.code(), Some(2), "{arguments:?}");
+    String::from_utf8(ended.stderr).unwrap()
+}
+
+/// Length of the head of a WAV file.
+fn head_of(file: &[u8]) -> usize {
+    file.windows(4).position(|four| four == b"data").unwrap() + 8
+}
+
+fn log(path: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(path).unwrap();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.collect::<Result<_, _>>().unwrap()
+}
+
+#[test]
+fn regress_words_while_a_recording_is_played() {
+    let folder = samples();
+    let given = [
+        "listen",
+        "recordings/cantilever/test.toml",
+        "--replay",
+        LOW,
+        "--speed",
+        "max",
+        "--out",
+        "report",
+    ];
+    let printed = tapjoint(folder.path(), &given, 0);
+    // The answer of `run` follows after an empty line.
+    let (heard, answer) = printed.split_once("\n\n").unwrap();
+    assert_snapshot("listen_low", heard);
+    let run = ["run", "recordings/cantilever/test.toml", "--out", "report"];
+    assert_eq!(answer, tapjoint(folder.path(), &run, 0));
+    // It was played, and nothing was written beside it.
+    let entries = fs::read_dir(folder.path().join("recordings/cantilever")).unwrap();
+    let mut names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert!(names.all(|name| !name.contains("listen")));
+}
+
+#[test]
+fn recover_the_stream_and_the_answer_of_run() {
+    let folder = samples();
+    let place = folder.path();
+    let low = fs::read(place.join(LOW)).unwrap();
+    // As WAV, its head included, and as samples without a head.
+    let given = [
+        "new.wav", "--hammer", "1", "--out", "one", "--json", "one.json",
+    ];
+    assert_eq!(fed(place, &given, &low).status.code(), Some(0));
+    assert!(fs::read(place.join("new.wav")).unwrap() == low);
+    let head = head_of(&low);
+    let raw = [
+        "raw.wav",
+        "--hammer",
+        "1",
+        "--out",
+        "two",
+        "--json",
+        "two.json",
+        "--rate",
+        "2560",
+        "--channels",
+        "3",
+        "--format",
+        "s24le",
+    ];
+    assert_eq!(fed(place, &raw, &low[head..]).status.code(), Some(0));
+    let own = fs::read(place.join("raw.wav")).unwrap();
+    assert!(own[own.len() - (low.len() - head)..] == low[head..]);
+    tapjoint(
+        place,
+        &[
+            "run", LOW, "--hammer", "1", "--out", "run", "--json", "run.json",
+        ],
+        0,
+    );
+    let read = |name: &str| -> Value {
+        serde_json::from_slice(&fs::read(place.join(name)).unwrap()).unwrap()
+    };
+    let wanted = read("run.json");
+    for (name, log_name) in [("one.json", "new"), ("two.json", "raw")] {
+        let found = read(name);
+        for key in ["taps", "sample_rate", "seconds"] {
+            assert_eq!(
+                found["recordings"][0][key], wanted["recordings"][0][key],
+                "{name}: {key}"
+            );
+        }
+        let modes = |report: &Value| -> Vec<Value> {
+            let modes = report["modes"].as_array().unwrap().iter();
+            modes.map(|mode| mode["frequency"].clone()).collect()
+        };
+        assert_eq!(modes(&found), modes(&wanted), "{name}");
+        let told = log(&place.join(log_name).with_extension("listen.jsonl"));
+        let taps = wanted["recordings"][0]["taps"].as_array().unwrap();
+        assert_eq!(told.len(), taps.len());
+        for (line, tap) in told.iter().zip(taps) {
+            assert_eq!(line["news"], "hit");
+            for key in ["time", "accepted", "reason"] {
+                assert_eq!(line[key], tap[key], "{key}");
+            }
+            // Before the end, and not before the record of the hit has ended.
+            let [heard, time] = ["heard", "time"].map(|key| line[key].as_f64().unwrap());
+            assert!(
+                (2.0..2.2).contains(&(heard - time)),
+                "{heard} s for {time} s"
+            );
+        }
+    }
+}
+
+#[test]
+fn regress_a_killed_program_leaves_what_it_heard_and_goes_on() {
+    let folder = samples();
+    let place = folder.path();
+    let low = fs::read(place.join(LOW)).unwrap();
+    let mut listening = start(place, &["taps.wav", "--hammer", "1"]);
+    let mut input = listening.stdin.take().unwrap();
+    let most = 2 * low.len() / 3;
+    input.write_all(&low[..most]).unwrap();
+    // The second hit of the file, at 5.5 s, is told once its record is there.
+    let mut lines = BufReader::new(listening.stdout.take().unwrap()).lines();
+    assert!(lines.any(|line| line.unwrap().starts_with("hit at 5.5")));
+    listening.kill().unwrap();
+    listening.wait().unwrap();
+    let inspected = tapjoint(
+        place,
+        &["inspect", "taps.wav", "--hammer", "1", "--json", "-"],
+        0,
+    );
+    let inspected: Value = serde_json::from_str(&inspected).unwrap();
+    let recording = &inspected["recordings"][0];
+    let frames = recording["seconds"].as_f64().unwrap() * 2560.0;
+    let left = fs::read(place.join("taps.wav")).unwrap();
+    let head = head_of(&low);
+    assert!(left[head..] == low[head..left.len()]);
+    // Of 9 bytes each; a frame may have been on its way.
+    assert_eq!((left.len() - head) / 9, frames.round() as usize);
+    assert!(!log(&place.join("taps.listen.jsonl")).is_empty());
+    // Another file takes what follows, and the first one stays.
+    let given = ["taps.wav", "--hammer", "1", "--resume"];
+    let ended = fed(place, &given, &low);
+    let printed = String::from_utf8(ended.stdout).unwrap();
+    assert_eq!(ended.status.code(), Some(0), "{printed}");
+    assert!(printed.starts_with("going on with taps.wav"), "{printed}");
+    assert!(
+        printed.ends_with(
+            "one recording in 2 files: write files = [\"taps.wav\", \"taps-2.wav\"] in the description, then run the test\n"
+        ),
+        "{printed}"
+    );
+    assert!(fs::read(place.join("taps.wav")).unwrap() == left);
+    assert!(fs::read(place.join("taps-2.wav")).unwrap() == low);
+    let error = refused(place, &["taps.wav"], &low);
+    assert_snapshot("listen_existing", &error);
+}
+
+#[test]
+fn regress_a_description_names_the_next_recording() {
+    let folder = samples();
+    let place = folder.path();
+    let test = place.join("recordings/cantilever");
+    let both = ["low.wav", "high.wav"].map(|name| fs::read(test.join(name)).unwrap());
+    for name in ["low.wav", "high.wav"] {
+        fs::remove_file(test.join(name)).unwrap();
+    }
+    let given = ["recordings/cantilever/test.toml", "--out", "report"];
+    let first = String::from_utf8(fed(place, &given, &both[0]).stdout).unwrap();
+    assert!(
+        first.starts_with("recording low.wav, tap at 0.385 m; 5 hits are wanted"),
+        "{first}"
+    );
+    let last = first.lines().last().unwrap();
+    assert_eq!(last, "next: high.wav, tap at 0.385 m; start `listen` again");
+    assert!(!place.join("report").exists());
+    let second = fed(place, &given, &both[1]);
+    assert_eq!(second.status.code(), Some(0));
+    assert!(place.join("report/report.html").is_file());
+    let error = refused(place, &given, &both[0]);
+    assert_snapshot("listen_all_there", &error);
+}
+
+#[test]
+fn regress_broken_streams_are_named_and_nothing_is_lost() {
+    let folder = samples();
+    let place = folder.path();
+    let low = fs::read(place.join(LOW)).unwrap();
+    let form = ["--rate", "1000", "--channels", "2", "--format", "f32le"];
+    let with = |name: &'static str| [&[name][..], &form].concat();
+    let mut errors = Vec::new();
+    errors.push(refused(place, &["a.wav"], b"time,force\n0,0\n"));
+    errors.push(refused(place, &["a.wav"], b""));
+    errors.push(refused(place, &["a.wav"], &low[..20]));
+    errors.push(refused(place, &["a.wav"], &low[..44]));
+    errors.push(refused(place, &with("a.wav"), b""));
+    assert!(!place.join("a.wav").exists());
+    errors.push(refused(place, &["a.csv"], &low));
+    errors.push(refused(place, &["a.wav", "--hammer", "4"], &low));
+    // Ten seconds, then a sample that is no number.
+    let mut samples: Vec<u8> = (0..20_000_u32)
+        .flat_map(|n| ((n % 97) as f32 / 97.0).to_le_bytes())
+        .collect();
+    samples.extend(f32::NAN.to_le_bytes());
+    samples.extend([0; 4004]);
+    errors.push(refused(place, &with("nan.wav"), &samples));
+    assert!(fs::read(place.join("nan.wav")).unwrap()[44..] == samples);
+    assert_snapshot("listen_broken_streams", &errors.concat());
+    // A stream that ends within a frame.
+    let cut = fed(
+        place,
+        &["cut.wav", "--hammer", "1", "--out", "cut"],
+        &low[..low.len() - 4],
+    );
+    let warning = String::from_utf8(cut.stderr).unwrap();
+    assert!(
+        warning.starts_with(
+            "warning: the stream ended within a sample; its last 5 bytes are left out\n"
+        ),
+        "{warning}"
+    );
+}

@@ -404,6 +404,9 @@ band = [0, "200 Hz"]
 block = 2048
 at = { A = 0.20 }
 sample_rate = "5 kHz"
+overload = "keep"
+accept_taps = [1.5, "2500 ms"]
+reject_taps = [4.905]
 torque = 12
 temperature = "20 degC"
 date = 2026-03-14

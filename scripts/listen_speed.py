@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 """Measures how soon `tapjoint listen` judges a hit, and what a long stream costs.
 
-usage: scripts/listen_speed.py PROGRAM [--taps N] [--gap S] [--hours H]
+usage: scripts/listen_speed.py PROGRAM [--taps N] [--gap S] [--hours H] [--kills N]
 
 Makes a stream of 4 channels of 16 bit at 51.2 kHz: a hammer and three accelerometers on a structure of five modes, and a tap
 every S seconds. Feeds it to the program as fast as it would be recorded. A verdict is due when the record of 2 s has ended, or
 when the next hit comes. Prints the time from there to the line of the verdict (median and worst), the processor
 time in percent of one core, and the peak memory.
 
-With --hours the stream is fed as fast as the program takes it. Prints the length over the time, the peak memory at a quarter,
-a half and the end, and whether all samples are in the files, bit for bit. Needs numpy and Linux.
+With --hours the stream is fed as fast as the program takes it. Prints the time, the hits that were told, the peak memory at a
+quarter, a half and the end, and whether all samples are in the files, bit for bit. A day takes 35 GB.
+
+With --kills the program is killed at random moments, and started again with --resume. Prints how much of what was fed is not in
+the files, and whether the rest is. Needs numpy and Linux.
 """
 
 import argparse
@@ -19,6 +22,7 @@ import subprocess
 import tempfile
 import threading
 import time
+import wave
 from pathlib import Path
 
 import numpy as np
@@ -42,15 +46,15 @@ def stretch(random, seconds, dampings, shapes):
     for channel in range(CHANNELS - 1):
         for mode, frequency in enumerate(FREQUENCIES):
             decay = np.exp(-2 * np.pi * frequency * dampings[mode] * since)
-            wave = np.sin(2 * np.pi * frequency * since)
-            samples[start:, 1 + channel] += 0.1 * peak * shapes[channel, mode] * decay * wave
+            tone = np.sin(2 * np.pi * frequency * since)
+            samples[start:, 1 + channel] += 0.1 * peak * shapes[channel, mode] * decay * tone
     bytes_ = np.clip(np.round(32768 * samples), -32768, 32767).astype("<i2").tobytes()
     return bytes_, start / RATE
 
 
-def start(program, folder):
+def start(program, folder, *more):
     command = [program, "listen", "taps.wav", "--hammer", "1", "--zoom", "0:3500", "--record", str(RECORD)]
-    command += ["--rate", str(RATE), "--channels", str(CHANNELS), "--format", "s16le", "--out", "report"]
+    command += ["--rate", str(RATE), "--channels", str(CHANNELS), "--format", "s16le", "--out", "report", *more]
     return subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=False)
 
 
@@ -124,13 +128,18 @@ def long(program, folder, hours, gap):
         piece = some[int(random.integers(0, len(some)))]
         given.update(piece)
         process.stdin.write(piece)
-        if number + 1 in (count // 4, count // 2, count):
-            passed = time.perf_counter() - begin
-            heard = (number + 1) * gap
-            print(f"{heard / 3600:.2f} h: {heard / passed:.1f} times as fast as recorded, peak memory {memory(process):.0f} MB")
+        if number + 1 in (count // 4, count // 2):
+            print(f"{(number + 1) * gap / 3600:.2f} h fed: peak memory {memory(process):.0f} MB", flush=True)
     process.stdin.close()
+    peak = 0.0
+    # Samples are written as they come, and judged behind that.
+    while process.poll() is None:
+        peak = max(peak, memory(process))
+        time.sleep(0.05)
     reader.join()
-    process.wait()
+    passed = time.perf_counter() - begin
+    told = sum(line.startswith(b"hit at") for line in lines)
+    print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, {told} of {count} hits told, peak memory {peak:.0f} MB")
     print(lines[-1].decode().strip() if lines else "no answer")
     written = hashlib.sha256()
     files = sorted(folder.glob("taps*.wav"), key=lambda file: (len(file.name), file.name))
@@ -145,16 +154,59 @@ def long(program, folder, hours, gap):
         raise SystemExit(1)
 
 
+def killed(program, folder, kills):
+    """Kills the program at random moments, and goes on with --resume. Every file must be readable by other programs too."""
+    random = np.random.default_rng(1)
+    dampings, shapes = random.uniform(0.008, 0.02, 5), random.uniform(0.3, 1.0, (3, 5))
+    piece = stretch(random, 2.5, dampings, shapes)[0]
+    step, most_lost, bad = int(PIECE * RATE) * CHANNELS * 2, 0, 0
+    for _ in range(kills):
+        before = set(folder.glob("taps*.wav"))
+        process = start(program, folder, *(["--resume"] if before else []))
+        reader = threading.Thread(target=process.stdout.read)
+        reader.start()
+        moment, begin, fed = random.uniform(0.0, 2.4), time.perf_counter(), 0
+        while time.perf_counter() - begin < moment:
+            process.stdin.write(piece[fed : fed + step])
+            process.stdin.flush()
+            fed += step
+            time.sleep(PIECE)
+        process.kill()
+        process.wait()
+        reader.join()
+        try:
+            process.stdin.close()
+        except BrokenPipeError:
+            pass
+        found = b""
+        # None where it was killed before it began.
+        for file in set(folder.glob("taps*.wav")) - before:
+            with wave.open(str(file), "rb") as samples:
+                found = samples.readframes(samples.getnframes())
+        bad += found != piece[: len(found)]
+        most_lost = max(most_lost, fed - len(found))
+    process = start(program, folder, "--resume")
+    output, _ = process.communicate(piece)
+    lost = most_lost / (RATE * CHANNELS * 2)
+    print(f"{kills} kills: most that was lost {1e3 * lost:.0f} ms, {bad} files with other samples; --resume goes on: {process.returncode}")
+    print(output.decode().strip().splitlines()[-1][:100])
+    if bad or lost > 1.0 or process.returncode not in (0, 1):
+        raise SystemExit(1)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", help="the program, such as target/release/tapjoint")
     parser.add_argument("--taps", type=int, default=50)
     parser.add_argument("--gap", type=float, default=2.5, help="time between two taps (s)")
     parser.add_argument("--hours", type=float, help="length of a long stream")
+    parser.add_argument("--kills", type=int, help="kill the program so many times")
     arguments = parser.parse_args()
     program = str(Path(arguments.program).resolve())
     with tempfile.TemporaryDirectory() as folder:
-        if arguments.hours:
+        if arguments.kills:
+            killed(program, Path(folder), arguments.kills)
+        elif arguments.hours:
             long(program, Path(folder), arguments.hours, arguments.gap)
         else:
             live(program, Path(folder), arguments.taps, arguments.gap)

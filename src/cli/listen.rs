@@ -44,7 +44,7 @@ use target::{Target, bare_target, described_target};
 pub(super) struct ListenArguments {
     #[command(flatten)]
     pub(super) run: RunArguments,
-    /// Sample rate of a stream without a head, such as 51200 or "51.2 kHz" (Hz)
+    /// Sample rate of a stream without a head, 100 to 1e8, such as 51200 or "51.2 kHz" (Hz)
     #[arg(long, value_name = "HZ", requires_all = ["channels", "format"], value_parser = rate)]
     rate: Option<u32>,
     /// Channels of a stream without a head
@@ -87,9 +87,9 @@ fn sample_form() -> impl TypedValueParser<Value = SampleForm> {
 
 fn rate(text: &str) -> Result<u32, String> {
     let rate = parse_quantity(text, Dimension::Rate).map_err(|error| error.to_string())?;
-    match rate.fract() == 0.0 && (1.0..=1e8).contains(&rate) {
+    match rate.fract() == 0.0 && (100.0..=1e8).contains(&rate) {
         true => Ok(rate as u32),
-        false => Err(format!("{rate} Hz; give a whole number from 1 to 1e8 Hz")),
+        false => Err(format!("{rate} Hz; give a whole number from 100 to 1e8 Hz")),
     }
 }
 
@@ -465,7 +465,7 @@ mod tests {
         assert_eq!(rate("51.2 kHz"), Ok(51_200));
         assert_eq!(
             rate("0.5 Hz").unwrap_err(),
-            "0.5 Hz; give a whole number from 1 to 1e8 Hz"
+            "0.5 Hz; give a whole number from 100 to 1e8 Hz"
         );
         assert_eq!(speed("max"), Ok(None));
         assert_eq!(speed("2"), Ok(Some(2.0)));

@@ -136,6 +136,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             watch::run(arguments, line.common.quiet, || timed(&line, &matches))
         }
         Command::Listen(arguments) => {
+            // What the run would refuse is refused before anybody taps.
+            checked_files(&line, &matches, None)?;
             listen::run(arguments, &line.common, || timed(&line, &matches))
         }
         _ => timed(&line, &matches),
@@ -190,14 +192,15 @@ fn timed(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
     outcome
 }
 
-/// Runs the command; `session` is the program that it runs in, if that is another one.
-fn run_command(
+/// Returns the files that the command reads and writes, from its arguments and its test description.
+///
+/// # Errors
+/// It would replace a file that it must not replace.
+fn checked_files(
     line: &CommandLine,
     matches: &ArgMatches,
-    stopwatch: Option<Arc<Stopwatch>>,
-    session: Option<Arc<Session>>,
-) -> anyhow::Result<Outcome> {
-    // The files that the command reads and writes, from its arguments and its test description.
+    session: Option<&Session>,
+) -> anyhow::Result<Files> {
     let mut files = Files::default();
     if let Some((_, own)) = matches.subcommand() {
         let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
@@ -210,7 +213,7 @@ fn run_command(
         }
         let description = named.first().map(PathBuf::as_path);
         let description = description.filter(|path| test.is_some() || is_description(path));
-        let given = session.as_deref().zip(description);
+        let given = session.zip(description);
         let given = given.and_then(|(session, path)| session.described(path));
         let test = given.or_else(|| description.and_then(described));
         let expanded = line.command.expanded(test.as_ref());
@@ -228,6 +231,17 @@ fn run_command(
         Command::Batch(_) => files.check_distinct()?,
         _ => files.check()?,
     }
+    Ok(files)
+}
+
+/// Runs the command; `session` is the program that it runs in, if that is another one.
+fn run_command(
+    line: &CommandLine,
+    matches: &ArgMatches,
+    stopwatch: Option<Arc<Stopwatch>>,
+    session: Option<Arc<Session>>,
+) -> anyhow::Result<Outcome> {
+    let files = checked_files(line, matches, session.as_deref())?;
     let terminal = Terminal::new(&line.common, files, stopwatch, session)?;
     let seed = line.common.seed;
     match &line.command {

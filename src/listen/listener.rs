@@ -157,9 +157,8 @@ impl<'a> Listener<'a> {
         self.growing.grow_to_end()?;
         let number = self.settings.earlier.len() + 1;
         let name = format!("{} ({number})", self.settings.name);
-        self.settings
-            .earlier
-            .push(self.growing.snapshot().renamed(name));
+        let finished = self.with_headers(self.growing.finished());
+        self.settings.earlier.push(finished.renamed(name));
         self.growing = next;
         // The record of a hit may end in the next file.
         let waiting = self.due.is_some();
@@ -186,12 +185,17 @@ impl<'a> Listener<'a> {
         earlier.sum::<f64>() + self.growing.frames() as f64 / self.growing.sample_rate()
     }
 
+    /// Returns the recording with the names, units and scales that are known from elsewhere.
+    fn with_headers(&self, recording: Recording) -> Recording {
+        match &self.settings.headers {
+            Some(headers) => recording.with_headers_of(headers),
+            None => recording,
+        }
+    }
+
     /// Finds the taps of the recording so far, and compares them with what was told.
     fn look(&mut self, is_growing: bool) -> Result<Vec<News>, ListenError> {
-        let mut recording = self.growing.snapshot();
-        if let Some(headers) = &self.settings.headers {
-            recording = recording.with_headers_of(headers);
-        }
+        let mut recording = self.with_headers(self.growing.snapshot());
         let name = &self.settings.name;
         recording = match self.settings.earlier.as_slice() {
             [] => recording.renamed(name),

@@ -70,6 +70,19 @@ const TABLE: &[Row] = &[
         &[folder("--out", "modes.uff", None)],
     ),
     row(
+        &[
+            "listen",
+            "test.toml",
+            "--replay",
+            "taps.wav",
+            "--speed",
+            "max",
+        ],
+        &["test.toml", "taps.wav"],
+        &[],
+        &[folder("--out", "updated-model.toml", Some("test.toml"))],
+    ),
+    row(
         &["watch", "test.toml", "--runs", "1", "--interval", "0.1"],
         &["test.toml", "taps.wav"],
         &[],
@@ -717,7 +730,7 @@ fn prop_the_table_has_every_option_with_a_file() {
         let given = row.arguments.iter().filter(|argument| {
             [
                 "--report", "--folder", "--truth", "--before", "--after", "--pair", "--series",
-                "--from", "--table",
+                "--from", "--table", "--replay",
             ]
             .contains(argument)
         });

@@ -112,6 +112,16 @@ impl GrowingRecording {
         Ok(rest)
     }
 
+    /// Returns the whole recording once it has ended. Its outlines are coarse, so that many such recordings take little
+    /// memory.
+    pub fn finished(&self) -> Recording {
+        let mut finished = self.snapshot();
+        for info in &mut finished.channels {
+            info.health.outline = Arc::new(info.health.outline.coarse());
+        }
+        finished
+    }
+
     /// Returns the recording so far. Its samples are read from the file, which goes on growing behind them.
     pub fn snapshot(&self) -> Recording {
         let meters = self.meters.iter().cloned();

@@ -10,6 +10,9 @@ const FIRST_LENGTH: usize = 64;
 /// Most pieces (512 kB). An hour at 51.2 kHz has pieces of 160 ms.
 const MOST_PIECES: usize = 1 << 15;
 
+/// Most pieces of a coarse outline (16 kB).
+const MOST_COARSE: usize = 1 << 10;
+
 /// Lowest and highest of some values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremes {
@@ -106,9 +109,7 @@ impl Outline {
         while !rest.is_empty() {
             if self.pieces.is_empty() || self.filled == self.length {
                 if self.pieces.len() == MOST_PIECES {
-                    let pairs = self.pieces.chunks(2);
-                    self.pieces = pairs.map(|pair| pair[0].with(pair[1])).collect();
-                    self.length *= 2;
+                    self.halve();
                 }
                 self.pieces.push(Extremes::NONE);
                 self.filled = 0;
@@ -120,6 +121,26 @@ impl Outline {
             self.filled += now.len();
             rest = later;
         }
+    }
+
+    /// Makes one piece of two neighbours.
+    fn halve(&mut self) {
+        let first = self.pieces.len().saturating_sub(1) / 2 * 2;
+        let in_last: usize = self.pieces[first..].len().saturating_sub(1) * self.length;
+        let pairs = self.pieces.chunks(2);
+        let merged = pairs.map(|pair| pair.iter().fold(Extremes::NONE, |all, one| all.with(*one)));
+        self.pieces = merged.collect();
+        self.filled += in_last;
+        self.length *= 2;
+    }
+
+    /// Returns the outline in fewer pieces, for a recording that is kept beside many others.
+    pub(super) fn coarse(&self) -> Self {
+        let mut coarse = self.clone();
+        while coarse.pieces.len() > MOST_COARSE {
+            coarse.halve();
+        }
+        coarse
     }
 
     /// The outline of the samples multiplied by `factor`.
@@ -166,6 +187,24 @@ mod tests {
         }
         let turned = outline.scaled(-2.0);
         assert_eq!(turned.pieces[0].high, -2.0 * outline.pieces[0].low);
+    }
+
+    #[test]
+    fn prop_a_coarse_outline_is_that_of_longer_pieces_and_goes_on() {
+        let samples: Vec<f64> = (0..90_000_u32)
+            .map(|n| f64::from(n * 7919 % 1013) - 500.0)
+            .collect();
+        for count in [65_536, 65_537, 65_600, 65_663, 65_664, 66_000] {
+            let mut outline = Outline::default();
+            outline.add(&samples[..count]);
+            let mut coarse = outline.coarse();
+            assert!(coarse.pieces.len() <= MOST_COARSE, "{count}");
+            coarse.add(&samples[count..]);
+            for (piece, samples) in coarse.pieces.iter().zip(samples.chunks(coarse.length)) {
+                assert_eq!(*piece, Extremes::of(samples), "{count}");
+            }
+            assert_eq!(coarse.pieces.len(), samples.len().div_ceil(coarse.length));
+        }
     }
 
     #[test]

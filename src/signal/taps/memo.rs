@@ -8,6 +8,7 @@ use crate::recording::{Recording, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// What was measured of a tap holds while the channel's noise is the same within this share. 10 %: a second hit is judged
 /// by limits of 4 and 10 % of the peak, far above the noise of a tap that counts.
@@ -33,7 +34,7 @@ impl TapMemo {
 #[derive(Debug, Default)]
 pub(super) struct PartMemo {
     /// Frames of the file and its events; a file that has not grown has the same.
-    found: Option<(u64, Found)>,
+    found: Option<(u64, Arc<Found>)>,
     /// Pieces of the force channel, by their numbers.
     pieces: BTreeMap<u64, SurveyedPiece>,
     /// Whether a sensor answers the event at a frame.
@@ -90,7 +91,7 @@ impl PartMemo {
         recording: &Recording,
         source: &TapSource,
         settings: &TapSettings,
-    ) -> Result<Found, RecordingError> {
+    ) -> Result<Arc<Found>, RecordingError> {
         if let Some((frames, found)) = &self.found
             && *frames == recording.frames()
         {
@@ -115,8 +116,15 @@ impl PartMemo {
             }
             TapSource::Responses(channels) => find_rises(recording, channels, settings)?,
         };
+        let found = Arc::new(found);
         self.found = Some((recording.frames(), found.clone()));
         Ok(found)
+    }
+
+    /// Forgets what only a file that grows needs.
+    pub(super) fn has_ended(&mut self) {
+        self.pieces.clear();
+        self.answered.clear();
     }
 
     /// Judges the events of a file. Peaks below `weakest` are too weak.

@@ -20,6 +20,7 @@ pub use pulse::{FORCE_OVER_NOISE, Pulse};
 
 use std::fmt;
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
 use judge::reject_short;
@@ -472,8 +473,12 @@ pub fn find_taps_again(
     let joined = !parts.is_empty();
     let parts = if joined { parts } else { vec![(0, recording)] };
     let mut searched = Vec::new();
+    let last = parts.len() - 1;
     for (number, (start, file)) in parts.into_iter().enumerate() {
         let found = memo.part(number).search(file, source, settings)?;
+        if number < last {
+            memo.part(number).has_ended();
+        }
         searched.push((start, file, found));
     }
     let events = searched.iter().flat_map(|(.., found)| &found.events);
@@ -487,9 +492,14 @@ pub fn find_taps_again(
         .iter()
         .map(|(start, ..)| *start as f64 / rate)
         .collect();
-    let found = searched.iter_mut();
-    let mut files: Vec<&mut [Event]> = found.map(|(.., found)| &mut found.events[..]).collect();
-    let mut remarks = settings.by_hand.mark(&mut files, &starts, rate);
+    let mut remarks = Vec::new();
+    if !settings.by_hand.accept.is_empty() {
+        let found = searched.iter_mut();
+        let mut files: Vec<&mut [Event]> = found
+            .map(|(.., found)| &mut Arc::make_mut(found).events[..])
+            .collect();
+        remarks = settings.by_hand.mark(&mut files, &starts, rate);
+    }
     let mut taps = Vec::with_capacity(peaks.len());
     // Last tap of each file.
     let mut lasts = Vec::new();
@@ -527,9 +537,9 @@ pub fn find_taps_again(
     let mut noise = 0.0_f64;
     for (_, file, found) in searched {
         noise = noise.max(found.noise);
-        for remark in found.remarks {
-            if !remarks.contains(&remark) {
-                remarks.push(remark);
+        for remark in &found.remarks {
+            if !remarks.contains(remark) {
+                remarks.push(remark.clone());
             }
         }
         let name = Some(file.name());

@@ -105,7 +105,7 @@ def played(program, source, hammer):
         if line["news"] == "doubt":
             continue
         is_live = line["heard"] < length - 1e-6
-        revised += is_live and line["news"] != "hit"
+        revised += is_live and line["news"] != "tap"
         for lines_ in [told, live] if is_live else [told]:
             lines_[:] = [other for other in lines_ if abs(other["time"] - line["time"]) > NEAR]
             if line["news"] != "gone":

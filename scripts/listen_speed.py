@@ -84,7 +84,7 @@ def live(program, folder, taps, gap):
 
     def listen():
         for line in process.stdout:
-            if line.startswith(b"hit at"):
+            if line.startswith(b"tap at"):
                 told.append((float(line.split()[2]), time.perf_counter()))
 
     reader = threading.Thread(target=listen)
@@ -138,7 +138,7 @@ def long(program, folder, hours, gap):
         time.sleep(0.05)
     reader.join()
     passed = time.perf_counter() - begin
-    told = sum(line.startswith(b"hit at") for line in lines)
+    told = sum(line.startswith(b"tap at") for line in lines)
     print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, {told} of {count} hits told, peak memory {peak:.0f} MB")
     print(lines[-1].decode().strip() if lines else "no answer")
     written = hashlib.sha256()

@@ -28,8 +28,6 @@ pub struct BareSettings {
     pub window: Option<WindowKind>,
     /// Way of reading the frequencies.
     pub reading: ReadBy,
-    /// True while the recording goes on: its end then cuts off no tap.
-    pub is_growing: bool,
 }
 
 /// Reasons for which a file without a description cannot be analysed.
@@ -71,7 +69,6 @@ impl BareSettings {
         measure.band = self.band;
         measure.window = self.window;
         measure.taps.keep_overload = self.keep_overload.unwrap_or(false);
-        measure.taps.is_growing = self.is_growing;
         measure.reading = self.reading;
     }
 

@@ -82,7 +82,8 @@ pub use warnings::{WARNING_CODES, Warning, meaning_of, severity_of, together};
 use warnings::{neglected_effects, of_amplitude};
 use wiring::finish;
 pub use wiring::{
-    PipelineError, Wiring, inspect_bare, measure_bare, measure_bare_watched, si_unit,
+    PipelineError, Wiring, described_reading, inspect_bare, measure_bare, measure_bare_watched,
+    si_unit,
 };
 
 use std::path::Path;

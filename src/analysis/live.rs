@@ -34,8 +34,8 @@ pub struct TapsSoFar {
     pub taps: Taps,
     /// Unit of their peaks; `None` where it is not known.
     pub peak_unit: Option<String>,
-    /// End of the band that is analysed (Hz).
-    pub band_end: f64,
+    /// End of the band (Hz), where one is stated.
+    pub band_end: Option<f64>,
     /// Length of signal that the wanted block needs (s), where a block is given.
     pub wanted: Option<f64>,
 }
@@ -82,7 +82,7 @@ pub fn taps_so_far(
         peak_unit: wiring.tap_unit(),
         source: settings.source,
         taps,
-        band_end: lines.high,
+        band_end: settings.band.map(|(_, high)| high),
         wanted: limits.wanted,
         recording,
     })

@@ -62,12 +62,7 @@ fn measure_described(
 ) -> Result<RecordingResult, PipelineError> {
     let path = folder.join(&description.file);
     let file = description.name();
-    let read = ReadSettings {
-        sample_rate: description.sample_rate,
-        time_unit: description.time_unit,
-        values: description.values,
-        variables: description.variables.clone(),
-    };
+    let read = described_reading(description);
     if let Some(form) = description.form {
         let mut functions = open_frequency_responses(&path, &read)?;
         if let FunctionForm::Response(form) = form
@@ -144,6 +139,16 @@ fn open_joined(
     Recording::joined(description.name(), parts)
 }
 
+/// Returns what a description says of the file of a recording.
+pub fn described_reading(description: &RecordingDescription) -> ReadSettings {
+    ReadSettings {
+        sample_rate: description.sample_rate,
+        time_unit: description.time_unit,
+        values: description.values,
+        variables: description.variables.clone(),
+    }
+}
+
 /// Returns the settings of a described recording.
 pub(super) fn described_settings(
     test: &TestDescription,
@@ -154,7 +159,6 @@ pub(super) fn described_settings(
     settings.band = description.band;
     settings.block = description.block;
     settings.taps.keep_overload = description.keep_overload;
-    settings.taps.is_growing = description.is_growing;
     settings.taps.by_hand = TapsByHand {
         accept: description.accept_taps.clone(),
         reject: description.reject_taps.clone(),

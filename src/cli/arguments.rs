@@ -179,7 +179,6 @@ impl RecordingArguments {
             band: spectrum.zoom,
             window: spectrum.window,
             reading,
-            is_growing: false,
         }
     }
 

@@ -1,4 +1,4 @@
-//! `tapjoint listen`: a stream is recorded, and each hit is judged while it is recorded.
+//! `tapjoint listen`: a stream is recorded, and each tap is judged while it is recorded.
 
 mod log;
 mod recorder;
@@ -15,10 +15,10 @@ use super::run::RunArguments;
 use super::staging::ledger;
 use super::terminal::Terminal;
 use crate::listen::{ListenError, ListenSettings, Listener, News};
-use crate::pipeline::{BareSettings, RecordingPlan};
+use crate::pipeline::{BareSettings, RecordingPlan, described_reading};
 use crate::quantity::{Dimension, parse_quantity};
-use crate::recording::{GrowingRecording, PcmLayout, ReadSettings, Recording, SampleForm};
-use anyhow::{Context, ensure};
+use crate::recording::{Format, GrowingRecording, PcmLayout, ReadSettings, Recording, SampleForm};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use log::Log;
@@ -28,15 +28,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
-use stream::{Event, Source};
+use stream::{Destination, End, Event, Source};
 use target::{Target, bare_target, described_target};
 
-/// Record a stream of samples, and judge each hit while you tap.
+/// Record a stream of samples, and judge each tap as it comes.
 ///
-/// Reads WAV from standard input, or samples without a head with --rate, --channels and --format. Writes the first
-/// [[recording]] of the description whose file is missing, or FILE itself if it is no description. Says after
-/// each hit whether it counts and why, then what all hits give so far. Ctrl-C ends the recording. Once no file is missing,
-/// the test is run as by `tapjoint run`, with the options of `run`.
+/// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is a test description (.toml), of
+/// which the first [[recording]] without a file is written, or the WAV file to be written. Says after each tap
+/// whether it counts and why, then what all taps give so far. Ctrl-C ends the recording. Once no recording is missing, the
+/// test is run as by `tapjoint run`, with the options of `run`; --json is written then.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  arecord -f S16_LE -r 48000 -c 2 -t raw | tapjoint listen test.toml --rate 48000 --channels 2 --format s16le\n  rec -q -t wav - | tapjoint listen taps.wav --hammer 1\n  tapjoint listen test.toml --replay low.wav"
@@ -44,30 +44,30 @@ use target::{Target, bare_target, described_target};
 pub(super) struct ListenArguments {
     #[command(flatten)]
     pub(super) run: RunArguments,
-    /// Sample rate of a stream without a head, 100 to 1e8, such as 51200 or "51.2 kHz" (Hz)
+    /// Sample rate of raw samples, 100 to 1e8, such as 51200 or "51.2 kHz" (Hz)
     #[arg(long, value_name = "HZ", requires_all = ["channels", "format"], value_parser = rate)]
     rate: Option<u32>,
-    /// Channels of a stream without a head
+    /// Channels of raw samples
     #[arg(long, value_name = "N", requires_all = ["rate", "format"], value_parser = RangedU64ValueParser::<u16>::new().range(1..=MOST_CHANNELS))]
     channels: Option<u16>,
-    /// Form of its samples, as sox and ffmpeg name it
+    /// Form of raw samples, as sox and ffmpeg name it
     #[arg(long, value_name = "F", requires_all = ["rate", "channels"], value_parser = sample_form())]
     format: Option<SampleForm>,
-    /// Play a recording instead of a stream, or with --rate a file of samples without a head. A recording of the test is
-    /// played and not written again
+    /// Play a recording instead of a stream, or with --rate a file of raw samples. A recording of the test is played and not
+    /// written again
     #[arg(long, value_name = "FILE")]
     replay: Option<PathBuf>,
     /// Speed of --replay, 0.1 to 1000, 1 = as it was recorded; or `max`: as fast as possible, without the results between
-    /// the hits
+    /// the taps
     #[arg(long, value_name = "X", default_value = "1", requires = "replay", value_parser = speed)]
     speed: Speed,
-    /// Go on with the last recording, in another file beside it
+    /// Continue the last recording, in a new file beside it
     #[arg(long, conflicts_with = "replay")]
     resume: bool,
-    /// Hits that are wanted in each recording
+    /// Taps that are wanted in each recording
     #[arg(long, value_name = "N", default_value = "5", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     taps: usize,
-    /// A hit is judged so long after it, or when the next one comes; a described `block` may need longer (s)
+    /// A tap is judged so long after it, or when the next one comes; a described `block` may need longer (s)
     #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
     record: f64,
 }
@@ -114,8 +114,8 @@ fn record(text: &str) -> Result<f64, String> {
 }
 
 impl ListenArguments {
-    /// Returns where the samples come from.
-    fn source(&self) -> anyhow::Result<Source> {
+    /// Returns where the samples come from. A recording that is played is read as `read` says.
+    fn source(&self, read: &ReadSettings) -> anyhow::Result<Source> {
         let layout = match (self.rate, self.channels, self.format) {
             (Some(rate), Some(channels), Some(form)) => Some(PcmLayout::new(rate, channels, form)?),
             _ => None,
@@ -125,7 +125,7 @@ impl ListenArguments {
         };
         let recording = match &layout {
             Some(_) => None,
-            None => Some(Recording::open(path, &self.run.recording.settings())?),
+            None => Some(Recording::open(path, read)?),
         };
         Ok(Source::Replay {
             path: path.clone(),
@@ -162,22 +162,28 @@ pub(super) fn run(
         None => bare_target(path, replayed, arguments.resume)?,
     };
     let heard = listen(arguments, described.as_ref(), &target, &terminal)?;
-    let ended = heard.ended.map(|rest| {
-        if rest > 0 {
-            terminal.warn(&format!(
-                "the stream ended within a sample; its last {rest} bytes are left out"
-            ));
-        }
-    });
-    if let Err(cause) = ended {
-        // What was recorded stays, and the fault decides.
-        return Err(cause);
+    let end = heard.ended?;
+    if end.rest > 0 {
+        terminal.warn(&format!(
+            "the stream ended within a frame; its last {} bytes are left out",
+            end.rest
+        ));
     }
-    if heard.files.len() > 1 {
-        let names = heard
-            .files
-            .iter()
-            .map(|file| format!("\"{}\"", file_name(file)));
+    if end.missing > 0.0 {
+        terminal.warn(&format!(
+            "the stream ended {:.2} s before the length that its header promises; check the recorder's messages",
+            end.missing
+        ));
+    }
+    let name = file_name(&target.file);
+    if heard.files.len() == target.earlier.len() {
+        bail!("{name}: nothing was recorded");
+    }
+    let known = described.iter().flat_map(|file| described_files(file));
+    let known: Vec<PathBuf> = known.collect();
+    if heard.files.len() > 1 && heard.files.iter().any(|file| !known.contains(file)) {
+        let names = heard.files.iter();
+        let names = names.map(|file| format!("\"{}\"", file_name(file)));
         let names = names.collect::<Vec<_>>().join(", ");
         terminal.say(&format!(
             "one recording in {} files: write files = [{names}] in the description, then run the test\n",
@@ -188,49 +194,77 @@ pub(super) fn run(
     if let Some(file) = &described
         && let Ok(next) = described_target(file, None, false)
     {
-        terminal.say(&format!(
-            "next: {}; start `listen` again\n",
-            asked_for(file, &next)
-        ))?;
+        terminal.say(&match heard.accepted {
+            0 => format!(
+                "no tap of {name} counts: continue it with --resume, or remove it and record it again\n"
+            ),
+            _ => format!("next: {}; start `listen` again\n", asked_for(file, &next)),
+        })?;
         return Ok(Outcome::of(heard.accepted > 0));
     }
     terminal.say("")?;
     once()
 }
 
+/// The files of all recordings of a description.
+fn described_files(file: &TestFile) -> Vec<PathBuf> {
+    let recordings = file.test.recordings.iter();
+    let files = recordings.flat_map(|recording| recording.files());
+    files.map(|name| file.path_of(name)).collect()
+}
+
 /// What was heard.
 struct Heard {
     /// Files of the recording.
     files: Vec<PathBuf>,
-    /// Hits that count.
+    /// Taps that count.
     accepted: usize,
-    /// How the stream ended: with so many bytes left over.
-    ended: anyhow::Result<usize>,
+    /// How the stream ended.
+    ended: anyhow::Result<End>,
 }
 
-/// Records the stream and tells of each hit.
+/// Records the stream and reports each tap.
 fn listen(
     arguments: &ListenArguments,
     described: Option<&TestFile>,
     target: &Target,
     terminal: &Terminal,
 ) -> anyhow::Result<Heard> {
-    let source = arguments.source()?;
     let bare = arguments.run.bare();
+    let plan = plan_of(described, target, &bare);
+    let read = match plan {
+        RecordingPlan::Described { recording, .. } if target.is_played => {
+            described_reading(recording)
+        }
+        _ => bare.read.clone(),
+    };
+    let source = arguments.source(&read)?;
+    // What is written anew has numbers of channels alone, as a stream has.
     let headers = match &source {
-        Source::Replay { recording, .. } => recording.clone(),
-        Source::Standard(_) => None,
+        Source::Replay { recording, .. } if target.is_played => recording.clone(),
+        _ => None,
     };
+    // Results between the taps are worked out from the file, which may lack names and units.
+    let is_whole = headers
+        .as_ref()
+        .is_none_or(|recording| is_wav(recording.format()));
+    let states = (arguments.speed.is_some() && is_whole)
+        .then(|| States::begin(Subject::of(described, target, &bare)));
     // A recording that is there already is played into a folder that is removed.
-    let aside = tempfile::Builder::new().prefix("tapjoint-").tempdir();
-    let aside = aside.context("no temporary folder can be made")?;
-    let first = match target.is_played {
-        true => aside.path().join("played.wav"),
-        false => target.file.clone(),
+    let aside = target.is_played.then(|| {
+        let folder = tempfile::Builder::new().prefix("tapjoint-").tempdir();
+        folder.context("no temporary folder can be made")
+    });
+    let aside = aside.transpose()?;
+    let first = match &aside {
+        Some(folder) => folder
+            .path()
+            .join(file_name(&target.file))
+            .with_extension("wav"),
+        None => target.file.clone(),
     };
-    let is_live = arguments.speed.is_some();
     let mut hearing = Hearing {
-        plan: plan_of(described, target, &bare),
+        plan,
         settings: ListenSettings {
             name: file_name(&target.file),
             record: arguments.record,
@@ -238,8 +272,8 @@ fn listen(
             earlier: opened(&target.earlier)?,
         },
         listener: None,
-        log: Log::beside(&first),
-        states: is_live.then(|| States::begin(Subject::of(described, target, &bare))),
+        log: Some(Log::beside(&first)),
+        states,
         wanted: arguments.taps,
         files: target.earlier.clone(),
         fault: None,
@@ -248,20 +282,41 @@ fn listen(
     terminal.say(&introduction(arguments, described, target))?;
     let stop = Arc::new(AtomicBool::new(false));
     ledger().stop = Some(stop.clone());
-    let events = stream::record(source, first, stop.clone());
+    let destination = Destination {
+        first,
+        reserved: target.reserved.clone(),
+        stop: stop.clone(),
+    };
+    let events = stream::record(source, destination);
     let mut ended = None;
     while ended.is_none() && !stop.load(Ordering::Relaxed) {
         match events.recv_timeout(PAUSE) {
-            Ok(Event::File(path)) => hearing.go_on_in(path)?,
+            Ok(Event::File(path)) => hearing.go_on_in(path),
             Ok(Event::Ended(how)) => ended = Some(how),
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(0)),
+            Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(End::default())),
         }
         hearing.catch_up(&stop)?;
+        // A description that does not fit is to be corrected before the first tap.
+        if hearing.is_refused() {
+            stop.store(true, Ordering::Relaxed);
+        }
+    }
+    // A piece that is being written is waited for. One that comes after that is not written.
+    while ended.is_none()
+        && let Ok(event) = events.recv_timeout(LAST_PIECE)
+    {
+        match event {
+            Event::File(path) => hearing.go_on_in(path),
+            Event::Ended(how) => ended = Some(how),
+        }
     }
     ledger().stop = None;
-    hearing.end(ended.unwrap_or(Ok(0)))
+    hearing.end(ended.unwrap_or(Ok(End::default())))
 }
+
+/// Time for which the last piece of a stream is waited for, once it was stopped.
+const LAST_PIECE: Duration = Duration::from_secs(1);
 
 /// A recording that is listened to.
 struct Hearing<'a> {
@@ -269,33 +324,36 @@ struct Hearing<'a> {
     settings: ListenSettings,
     /// `None` before the first samples.
     listener: Option<Listener<'a>>,
-    log: Log,
-    /// `None` where no results are wanted between the hits.
+    /// `None` once it could not be written.
+    log: Option<Log>,
+    /// `None` where no results are wanted between the taps.
     states: Option<States>,
-    /// Hits that are wanted.
+    /// Taps that are wanted.
     wanted: usize,
     files: Vec<PathBuf>,
-    /// Why hits are no longer judged, while the recording goes on.
+    /// Why taps are no longer judged.
     fault: Option<ListenError>,
     terminal: &'a Terminal,
 }
 
 impl Hearing<'_> {
     /// Listens to the next file of the recording.
-    fn go_on_in(&mut self, path: PathBuf) -> anyhow::Result<()> {
-        let growing = GrowingRecording::open(&path)?;
+    fn go_on_in(&mut self, path: PathBuf) {
+        let opened = GrowingRecording::open(&path);
         self.files.push(path);
-        match &mut self.listener {
-            None => {
+        if self.fault.is_some() {
+            return;
+        }
+        let news = match (opened, &mut self.listener) {
+            (Err(fault), _) => Err(fault.into()),
+            (Ok(growing), Some(listener)) => listener.go_on_in(growing),
+            (Ok(growing), None) => {
                 let settings = self.settings.clone();
                 self.listener = Some(Listener::new(growing, self.plan, settings));
-                Ok(())
+                return;
             }
-            Some(listener) => {
-                let news = listener.go_on_in(growing);
-                self.take(news)
-            }
-        }
+        };
+        self.take(news);
     }
 
     /// Judges what the file holds by now.
@@ -303,72 +361,100 @@ impl Hearing<'_> {
         while let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none())
             && !stop.load(Ordering::Relaxed)
         {
-            let news = listener.step().transpose();
-            let Some(news) = news else {
+            let Some(news) = listener.step().transpose() else {
                 break;
             };
-            self.take(news)?;
+            self.take(news);
         }
         match &mut self.states {
-            Some(states) => states.tell(self.terminal),
+            Some(states) => states.report(self.terminal),
             None => Ok(()),
         }
     }
 
-    /// Prints and logs what is new. A sample that is no number ends the judging, and not the recording.
-    fn take(&mut self, news: Result<Vec<News>, ListenError>) -> anyhow::Result<()> {
+    /// Prints and logs what is new. A fault ends the judging, and not the recording.
+    fn take(&mut self, news: Result<Vec<News>, ListenError>) {
         let Some(listener) = &self.listener else {
-            return Ok(());
+            return;
         };
         let news = match news {
             Ok(news) => news,
-            Err(fault @ ListenError::Recording(_)) => {
-                let words =
-                    format!("{fault}; hits are not judged any more, and the recording goes on");
-                self.terminal.warn(&words);
+            Err(fault) => {
+                let words = "taps are not judged any more, and the recording goes on";
+                let warning = format!("{fault}; {words}");
                 self.fault = Some(fault);
-                return Ok(());
+                if !self.is_refused() {
+                    self.terminal.warn(&warning);
+                }
+                return;
             }
-            Err(fault) => return Err(fault.into()),
         };
-        self.log.note(listener.seconds(), &news)?;
+        if let Some(log) = &mut self.log
+            && let Err(cause) = log.note(listener.seconds(), &news)
+        {
+            self.terminal
+                .warn(&format!("{cause:#}; the recording goes on without a log"));
+            self.log = None;
+        }
         let screen = self.terminal.screen();
+        let mut text = String::new();
         for one in &news {
-            self.terminal.say(&screen.wrapped(&one.to_string(), 2))?;
+            text.push_str(&screen.wrapped(&one.to_string(), 2));
         }
         if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
             let (accepted, wanted) = (listener.accepted(), self.wanted);
             let what = match wanted.saturating_sub(accepted) {
-                0 => "enough: Ctrl-C ends the recording".to_owned(),
+                0 => "enough; Ctrl-C ends the recording".to_owned(),
                 1 => "1 more is wanted".to_owned(),
                 missing => format!("{missing} more are wanted"),
             };
-            self.terminal
-                .say(&format!("  {accepted} of {wanted} hits; {what}\n"))?;
+            let reach = listener.reach().map_or(String::new(), |(reach, end)| {
+                format!("; a harder tip: the taps excite up to {reach:.0} Hz, and the band ends at {end:.0} Hz")
+            });
+            let count = match accepted {
+                1 => "1 tap counts".to_owned(),
+                count => format!("{count} taps count"),
+            };
+            text.push_str(&screen.wrapped(&format!("{count}; {what}{reach}"), 2));
             if let Some(states) = &mut self.states {
                 states.ask(accepted, &self.files);
             }
         }
-        Ok(())
+        if !text.is_empty() {
+            // Who has closed standard output still wants the recording.
+            let _ = self.terminal.say(&text);
+        }
     }
 
-    /// Judges all hits for good.
-    fn end(mut self, ended: anyhow::Result<usize>) -> anyhow::Result<Heard> {
+    /// Returns true where the recording does not fit its description or the options, which its first samples show.
+    fn is_refused(&self) -> bool {
+        let taps = self.listener.as_ref().map_or(0, Listener::taps);
+        taps == 0 && matches!(self.fault, Some(ListenError::Pipeline(_)))
+    }
+
+    /// Judges all taps for good.
+    fn end(mut self, ended: anyhow::Result<End>) -> anyhow::Result<Heard> {
+        self.states = None;
+        if self.is_refused() {
+            // The next call is to find the place as this one did.
+            for file in &self.files[self.settings.earlier.len()..] {
+                let _ = std::fs::remove_file(file);
+            }
+        }
         if self.fault.is_none()
             && let Some(listener) = &mut self.listener
         {
             let news = listener.finish();
-            self.states = None;
-            self.take(news)?;
+            self.take(news);
         }
         let mut accepted = 0;
         if let Some(listener) = &self.listener {
             accepted = listener.accepted();
             self.terminal.say(&format!(
-                "{}: {:.1} s, {accepted} of {} hits count\n",
+                "{}: {:.1} s, {accepted} of {} taps count\n",
                 self.settings.name,
                 listener.seconds(),
-                listener.hits(),
+                listener.taps(),
             ))?;
         }
         Ok(Heard {
@@ -384,6 +470,11 @@ impl Hearing<'_> {
 
 /// Time between two looks at a file that does not grow: short beside the least time to a verdict.
 const PAUSE: Duration = Duration::from_millis(10);
+
+/// True of WAV, whose channels have no names and units.
+fn is_wav(format: Format) -> bool {
+    matches!(format, Format::WavInteger { .. } | Format::WavFloat { .. })
+}
 
 /// What is known of the recording before it begins.
 fn plan_of<'a>(
@@ -450,10 +541,10 @@ fn introduction(
     let verb = match (target.is_played, &target.earlier[..]) {
         (true, _) => "playing",
         (false, []) => "recording",
-        (false, _) => "going on with",
+        (false, _) => "continuing",
     };
     let wanted = arguments.taps;
-    format!("{verb} {what}; {wanted} hits are wanted; Ctrl-C ends\n")
+    format!("{verb} {what}; {wanted} taps are wanted; Ctrl-C ends\n")
 }
 
 #[cfg(test)]
@@ -474,6 +565,6 @@ mod tests {
             "\"0\" is no speed; give 0.1 to 1000, or max"
         );
         assert_eq!(record("400 ms"), Ok(0.4));
-        assert_eq!(record("1 h").is_err(), true);
+        assert_eq!(record("700 s").unwrap_err(), "700 s; give 0.05 to 600 s");
     }
 }

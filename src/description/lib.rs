@@ -313,8 +313,6 @@ pub struct RecordingDescription {
     pub accept_taps: Vec<f64>,
     /// Taps that are left out: times as above. None of them is within 0.1 s of one of `accept_taps`.
     pub reject_taps: Vec<f64>,
-    /// True while it is being recorded, which no description says: its end then cuts off no tap.
-    pub is_growing: bool,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,
     /// Carried to the outputs: temperature (degrees Celsius).

@@ -372,7 +372,6 @@ pub(super) fn read_recording(
         keep_overload: table.choice("overload", &OVERLOADS)?.unwrap_or(false),
         accept_taps,
         reject_taps,
-        is_growing: false,
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,

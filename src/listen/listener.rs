@@ -1,8 +1,8 @@
-//! The listener: reads a growing file in steps, looks when a record has ended, and tells what is new.
+//! The listener: reads a growing file in steps, looks when a record has ended, and reports what is new.
 
 use crate::alarm::Alarm;
-use crate::news::{Hit, News};
-use std::mem::{Discriminant, discriminant};
+use crate::news::{JudgedTap, News};
+use std::mem::discriminant;
 use tapjoint_analysis::{PipelineError, RecordingPlan, TapsSoFar, taps_so_far};
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::quality::remedy_of;
@@ -14,6 +14,8 @@ use tapjoint_signal::taps::{REACH, Tap, TapMemo, TapRemark, TapSource};
 const STEP: f64 = 0.05;
 /// A record longer than this says no more of how far it rings down (s): a bound on memory.
 const LONGEST_DECAY: f64 = 10.0;
+/// Share of the band that the taps have to excite, or a harder tip is proposed.
+const ENOUGH_OF_BAND: f64 = 0.8;
 /// Noise before the taps is read over this length (s).
 const QUIET: f64 = 1.0;
 
@@ -33,7 +35,7 @@ pub enum ListenError {
 pub struct ListenSettings {
     /// Name of the recording, for messages.
     pub name: String,
-    /// A hit is judged so long after its trigger (s), or when the next one comes. A described block that needs more gets
+    /// A tap is judged so long after its trigger (s), or when the next one comes. A described block that needs more gets
     /// more.
     pub record: f64,
     /// A recording whose channels have the names, units and scales of this one; `None` where the file itself has them.
@@ -42,9 +44,9 @@ pub struct ListenSettings {
     pub earlier: Vec<Recording>,
 }
 
-/// A hit that was told.
+/// A tap that was reported.
 #[derive(Debug, Clone, PartialEq)]
-struct Told {
+struct Reported {
     time: f64,
     /// Why it does not count.
     reason: Option<String>,
@@ -61,13 +63,13 @@ pub struct Listener<'a> {
     watched: Vec<usize>,
     alarm: Alarm,
     memo: TapMemo,
-    /// Frame at which the record of the last hit has ended, if no other hit comes first.
+    /// Frame at which the record of the last tap has ended, if no other hit comes first.
     due: Option<u64>,
-    told: Vec<Told>,
-    /// Code and channel of the doubts that were told.
+    reported: Vec<Reported>,
+    /// Code and channel of the doubts that were reported.
     doubts: Vec<(&'static str, Option<usize>)>,
-    /// The remarks that were told.
-    remarks: Vec<Discriminant<TapRemark>>,
+    /// The remarks that were reported: what each is about.
+    remarks: Vec<String>,
     /// What the last look has found.
     latest: Option<TapsSoFar>,
 }
@@ -89,7 +91,7 @@ impl<'a> Listener<'a> {
             alarm: Alarm::default(),
             memo: TapMemo::default(),
             due: None,
-            told: Vec::new(),
+            reported: Vec::new(),
             doubts: Vec::new(),
             remarks: Vec::new(),
             latest: None,
@@ -106,7 +108,7 @@ impl<'a> Listener<'a> {
             return Ok(None);
         };
         if self.watched.is_empty() {
-            // A wrong channel is found before the first hit.
+            // A wrong channel is found before the first tap.
             let news = self.look(true)?;
             self.watched = match self.latest.as_ref().map(|found| &found.source) {
                 Some(TapSource::Hammer { channel, .. }) => vec![*channel],
@@ -129,18 +131,20 @@ impl<'a> Listener<'a> {
             news = self.look(true)?;
         }
         if hears {
-            let wanted = self.latest.as_ref().and_then(|found| found.wanted);
-            let record = self.settings.record.max(wanted.unwrap_or(0.0));
+            let record = self.latest.as_ref().map(|found| self.record(found));
+            let record = record.unwrap_or(self.settings.record);
             self.due = Some(now + (record * self.growing.sample_rate()) as u64);
         }
         Ok(Some(news))
     }
 
-    /// Takes what is left of the file, and judges all hits as `run` does. Returns what is new.
+    /// Takes what is left of the file, and judges all taps as `run` does. Returns what is new.
     ///
     /// # Errors
     /// Those of [`step`](Self::step).
     pub fn finish(&mut self) -> Result<Vec<News>, ListenError> {
+        // The first samples have shown how all lie in their bytes; now all of them show it.
+        self.growing = self.growing.reopened()?;
         self.growing.grow_to_end()?;
         self.look(false)
     }
@@ -160,22 +164,32 @@ impl<'a> Listener<'a> {
         let finished = self.with_headers(self.growing.finished());
         self.settings.earlier.push(finished.renamed(name));
         self.growing = next;
-        // The record of a hit may end in the next file.
+        // The record of a tap may end in the next file.
+        let record = self.latest.as_ref().map(|found| self.record(found));
+        let record = record.unwrap_or(self.settings.record);
         let waiting = self.due.is_some();
-        self.due = waiting.then(|| (self.settings.record * self.growing.sample_rate()) as u64);
+        self.due = waiting.then(|| (record * self.growing.sample_rate()) as u64);
         Ok(news)
     }
 
-    /// Number of hits that were told.
-    pub fn hits(&self) -> usize {
-        self.told.len()
+    /// Returns how far the taps excite the structure in the mean, and the end of the stated band (Hz), where they do not reach
+    /// four fifths of it. `None` otherwise, and without a hammer.
+    pub fn reach(&self) -> Option<(f64, f64)> {
+        let found = self.latest.as_ref()?;
+        let (pulse, end) = (found.taps.mean_pulse()?, found.band_end?);
+        (pulse.usable_to < ENOUGH_OF_BAND * end).then_some((pulse.usable_to, end))
     }
 
-    /// Number of hits that count.
+    /// Number of taps that were reported.
+    pub fn taps(&self) -> usize {
+        self.reported.len()
+    }
+
+    /// Number of taps that count.
     pub fn accepted(&self) -> usize {
-        self.told
+        self.reported
             .iter()
-            .filter(|told| told.reason.is_none())
+            .filter(|reported| reported.reason.is_none())
             .count()
     }
 
@@ -193,7 +207,7 @@ impl<'a> Listener<'a> {
         }
     }
 
-    /// Finds the taps of the recording so far, and compares them with what was told.
+    /// Finds the taps of the recording so far, and compares them with what was reported.
     fn look(&mut self, is_growing: bool) -> Result<Vec<News>, ListenError> {
         let mut recording = self.with_headers(self.growing.snapshot());
         let name = &self.settings.name;
@@ -210,14 +224,15 @@ impl<'a> Listener<'a> {
         }
         let found = taps_so_far(recording, &self.plan, is_growing, &mut self.memo)?;
         let mut news = Vec::new();
-        // Before the first hit a channel may rest, and nothing is strange about it.
+        // Before the first tap a channel may rest, and nothing is strange about it.
         if self.latest.is_some() {
-            news.extend(self.new_doubts(&found));
+            news.extend(self.new_doubts(&found, is_growing));
         }
         let taps = &found.taps.taps;
-        let mut told = Vec::with_capacity(taps.len());
+        let mut reported = Vec::with_capacity(taps.len());
+        let mut waiting = None;
         // Both are in order of time.
-        let mut earlier = self.told.iter().peekable();
+        let mut earlier = self.reported.iter().peekable();
         for (place, tap) in taps.iter().enumerate() {
             while let Some(gone) = earlier.next_if(|one| one.time < tap.time - REACH) {
                 news.push(News::Gone { time: gone.time });
@@ -225,29 +240,37 @@ impl<'a> Listener<'a> {
             let before = earlier.next_if(|one| one.time <= tap.time + REACH);
             let is_last = place + 1 == taps.len();
             // The record of the last one has not ended while it is still waited for.
-            if is_growing && is_last && before.is_none() && !self.has_ended(&found, tap) {
+            if is_growing && is_last && before.is_none() && !self.is_long_enough(&found, tap) {
+                waiting = Some(tap.time);
                 continue;
             }
+            let has_ended = !(is_growing && is_last);
             let reason = tap.rejection.as_ref().map(ToString::to_string);
             match before {
-                None => news.push(News::Hit(hit_of(&found, tap)?)),
+                None => news.push(News::Tap(judged(&found, tap, has_ended)?)),
                 // Numbers in the reason move with every tap.
                 Some(before) if before.reason.is_none() != reason.is_none() => {
-                    news.push(News::Revised(hit_of(&found, tap)?));
+                    news.push(News::Revised(judged(&found, tap, has_ended)?));
                 }
                 Some(_) => {}
             }
             let time = tap.time;
-            told.push(Told { time, reason });
+            reported.push(Reported { time, reason });
         }
         news.extend(earlier.map(|one| News::Gone { time: one.time }));
-        self.told = told;
+        if let Some(time) = waiting {
+            // Another alarm came just before it.
+            let before = self.seconds() - self.growing.frames() as f64 / self.growing.sample_rate();
+            let end = time + self.record(&found) - before;
+            self.due = Some((end * self.growing.sample_rate()).ceil().max(0.0) as u64);
+        }
+        self.reported = reported;
         self.latest = Some(found);
         Ok(news)
     }
 
-    /// Returns the doubts about a recording and its taps of a kind that was not told yet.
-    fn new_doubts(&mut self, found: &TapsSoFar) -> Vec<News> {
+    /// Returns the doubts about a recording and its taps of a kind that was not reported yet.
+    fn new_doubts(&mut self, found: &TapsSoFar, is_growing: bool) -> Vec<News> {
         let mut news = Vec::new();
         let recording = &found.recording;
         let parts = recording.parts().map(|(_, part)| part.warnings());
@@ -260,8 +283,18 @@ impl<'a> Listener<'a> {
             }
         }
         for remark in &found.taps.remarks {
-            let kind = discriminant(remark);
-            if !self.remarks.contains(&kind) {
+            // What is missing so far may still come.
+            let is_early = match remark {
+                TapRemark::NoTapThere { time, .. } => *time > found.recording.duration(),
+                TapRemark::FileWithoutTap { .. } | TapRemark::AllOverloaded { .. } => true,
+                _ => false,
+            };
+            let kind = match remark {
+                TapRemark::NoTapThere { time, .. } => format!("{time}"),
+                TapRemark::FileWithoutTap { file } => file.clone(),
+                other => format!("{:?}", discriminant(other)),
+            };
+            if !(is_growing && is_early) && !self.remarks.contains(&kind) {
                 news.push(News::Doubt(remark.to_string()));
                 self.remarks.push(kind);
             }
@@ -269,21 +302,28 @@ impl<'a> Listener<'a> {
         news
     }
 
+    /// Length of signal after which a tap is judged (s).
+    fn record(&self, found: &TapsSoFar) -> f64 {
+        self.settings.record.max(found.wanted.unwrap_or(0.0))
+    }
+
     /// Returns true where so much of a tap's record is there as is waited for.
-    fn has_ended(&self, found: &TapsSoFar, tap: &Tap) -> bool {
-        let record = self.settings.record.max(found.wanted.unwrap_or(0.0));
+    fn is_long_enough(&self, found: &TapsSoFar, tap: &Tap) -> bool {
+        let record = self.record(found);
         // The alarm comes up to two steps after the trigger.
         found.recording.duration() - tap.time >= record - 2.0 * STEP
     }
 }
 
 /// A tap in the words of a listener.
-fn hit_of(found: &TapsSoFar, tap: &Tap) -> Result<Hit, RecordingError> {
+fn judged(found: &TapsSoFar, tap: &Tap, has_ended: bool) -> Result<JudgedTap, RecordingError> {
     let remaining = match tap.accepted() {
         true => remaining(found, tap)?,
         false => None,
     };
-    Ok(Hit {
+    Ok(JudgedTap {
+        seconds: tap.frames() as f64 / found.recording.sample_rate(),
+        has_ended,
         time: tap.time,
         peak: tap.peak,
         unit: found.peak_unit.clone(),
@@ -409,19 +449,19 @@ mod tests {
         )
         .unwrap();
         let whole = whole.taps.taps.iter();
-        let whole: Vec<Told> = whole
-            .map(|tap| Told {
+        let whole: Vec<Reported> = whole
+            .map(|tap| Reported {
                 time: tap.time,
                 reason: tap.rejection.as_ref().map(ToString::to_string),
             })
             .collect();
-        assert_eq!(listener.told, whole);
+        assert_eq!(listener.reported, whole);
         all
     }
 
     fn rejection(news: &News) -> Option<&Rejection> {
         match news {
-            News::Hit(hit) | News::Revised(hit) => hit.rejection.as_ref(),
+            News::Tap(hit) | News::Revised(hit) => hit.rejection.as_ref(),
             _ => None,
         }
     }
@@ -434,15 +474,16 @@ mod tests {
         let hits = [(0.8, 1.0), (3.0, 1.1), (3.7, 0.9), (6.0, 1.0), (6.05, 0.4)];
         let samples = samples(8.0, &hits);
         let all = heard(&samples, &path, 137);
-        let told: Vec<(f64, f64)> = all
+        let reported: Vec<(f64, f64)> = all
             .iter()
             .map(|(now, news)| match news {
-                News::Hit(hit) => (*now, hit.time),
+                News::Tap(hit) => (*now, hit.time),
                 other => panic!("{other}"),
             })
             .collect();
         for ((now, time), (hit, ended)) in
-            told.iter()
+            reported
+                .iter()
                 .zip([(0.8, 1.8), (3.0, 3.7), (3.7, 4.7), (6.0, 7.0)])
         {
             assert!((time - hit).abs() < 2e-3, "{time} for {hit}");
@@ -452,7 +493,7 @@ mod tests {
                 "{now} for {ended}"
             );
         }
-        assert_eq!(told.len(), 4);
+        assert_eq!(reported.len(), 4);
         assert!(matches!(
             rejection(&all[3].1),
             Some(Rejection::DoubleHit { .. })
@@ -479,7 +520,7 @@ mod tests {
             "{news}"
         );
         assert!(*now < 9.0, "{words:?}");
-        assert!(words[0].starts_with("hit at 0.80 s accepted"), "{words:?}");
+        assert!(words[0].starts_with("tap at 0.80 s accepted"), "{words:?}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a listener tells, and its words.
+//! What a listener reports, and its words.
 
 use std::fmt;
 use tapjoint_report::format::significant;
@@ -8,9 +8,9 @@ use tapjoint_signal::taps::{Pulse, Rejection};
 /// Digits of a number: who taps wants a glance.
 const DIGITS: i32 = 3;
 
-/// One hit as it was judged.
+/// One tap as it was judged.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hit {
+pub struct JudgedTap {
     /// Time of its trigger (s from the start of the recording; files follow one another).
     pub time: f64,
     /// Peak of the force (N), or of the response on which it was found (its unit).
@@ -19,7 +19,11 @@ pub struct Hit {
     pub unit: Option<String>,
     /// Its force pulse; `None` without a hammer.
     pub pulse: Option<Pulse>,
-    /// Amplitude at the end of its record over the largest one (1), of the response that keeps most. `None` of a hit that is
+    /// Length of its record so far (s).
+    pub seconds: f64,
+    /// True where the next tap, or the end of the recording, has ended its record.
+    pub has_ended: bool,
+    /// Amplitude at the end of its record over the largest one (1), of the response that keeps most. `None` of a tap that is
     /// rejected, or sinks into the noise.
     pub remaining: Option<f64>,
     /// Why it does not count; `None` = it counts.
@@ -30,14 +34,14 @@ pub struct Hit {
     pub remedy: Option<&'static str>,
 }
 
-/// Something that a listener tells.
+/// Something that a listener reports.
 #[derive(Debug, Clone, PartialEq)]
 pub enum News {
-    /// The record of a hit has ended.
-    Hit(Hit),
-    /// Later samples change the decision on a hit.
-    Revised(Hit),
-    /// What was told as a hit is none, as later samples show.
+    /// A tap was judged for the first time.
+    Tap(JudgedTap),
+    /// Later samples change the decision on a tap.
+    Revised(JudgedTap),
+    /// What was reported as a tap is none, as later samples show.
     Gone {
         /// Its time (s).
         time: f64,
@@ -46,8 +50,8 @@ pub enum News {
     Doubt(String),
 }
 
-impl fmt::Display for Hit {
-    /// Writes "accepted: peak 18.2 N, pulse 1.21 ms, excites up to 830 Hz, decays to 0.4 %".
+impl fmt::Display for JudgedTap {
+    /// Writes "accepted: peak 18.2 N, pulse 1.21 ms, excites up to 830 Hz, decays to 0.4 % in 5.0 s".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(rejection) = &self.rejection {
             return write!(f, "REJECTED: {rejection}");
@@ -65,10 +69,13 @@ impl fmt::Display for Hit {
             let (width, end) = (significant(width, DIGITS), significant(end, DIGITS));
             write!(f, ", pulse {width} ms, excites up to {end} Hz")?;
         }
-        match self.remaining.map(|remaining| 100.0 * remaining) {
-            None => Ok(()),
-            Some(percent) if percent < 0.1 => f.write_str(", decays to less than 0.1 %"),
-            Some(percent) => write!(f, ", decays to {} %", significant(percent, DIGITS)),
+        let Some(remaining) = self.remaining else {
+            return Ok(());
+        };
+        let (percent, seconds) = (significant(100.0 * remaining, 2), self.seconds);
+        match self.has_ended {
+            true => write!(f, ", decays to {percent} % in {seconds:.1} s"),
+            false => write!(f, ", still {percent} % after {seconds:.1} s"),
         }
     }
 }
@@ -77,20 +84,23 @@ impl fmt::Display for News {
     /// Writes one or two sentences.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            News::Hit(hit) => write!(f, "hit at {:.2} s {hit}", hit.time)?,
-            News::Revised(hit) => write!(f, "hit at {:.2} s is now {hit}", hit.time)?,
-            News::Gone { time } => write!(f, "hit at {time:.2} s was none, as later samples show")?,
+            News::Tap(tap) => write!(f, "tap at {:.2} s {tap}", tap.time)?,
+            News::Revised(tap) => write!(f, "tap at {:.2} s is now {tap}", tap.time)?,
+            News::Gone { time } => write!(
+                f,
+                "the event at {time:.2} s was no tap, as later samples show"
+            )?,
             News::Doubt(text) => return write!(f, "doubt: {text}"),
         }
-        let (News::Hit(hit) | News::Revised(hit)) = self else {
+        let (News::Tap(tap) | News::Revised(tap)) = self else {
             return Ok(());
         };
-        if let Some(remedy) = hit.remedy {
+        if let Some(remedy) = tap.remedy {
             return write!(f, ". {remedy}");
         }
-        match hit.remaining {
-            Some(remaining) if remaining > RUNG_DOWN => {
-                f.write_str(". Wait longer before the next hit.")
+        match tap.remaining {
+            Some(remaining) if remaining > RUNG_DOWN && tap.has_ended => {
+                f.write_str(". Wait longer before the next tap.")
             }
             _ => Ok(()),
         }
@@ -101,8 +111,8 @@ impl fmt::Display for News {
 mod tests {
     use super::*;
 
-    fn hit() -> Hit {
-        Hit {
+    fn judged() -> JudgedTap {
+        JudgedTap {
             time: 4.9051,
             peak: 18.24,
             unit: Some("N".to_owned()),
@@ -112,6 +122,8 @@ mod tests {
                 fall_20_db: None,
                 usable_to: 832.0,
             }),
+            seconds: 4.96,
+            has_ended: true,
             remaining: Some(0.0042),
             rejection: None,
             overruled: None,
@@ -126,26 +138,31 @@ mod tests {
             ratio: 0.341,
             limit: 0.1,
         };
-        let rejected = Hit {
+        let rejected = JudgedTap {
             rejection: Some(double.clone()),
             remedy: Some("Hit shorter."),
-            ..hit()
+            ..judged()
         };
-        let by_hand = Hit {
+        let by_hand = JudgedTap {
             overruled: Some(double),
             pulse: None,
             unit: None,
             remaining: None,
-            ..hit()
+            ..judged()
         };
-        let ringing = Hit {
+        let ringing = JudgedTap {
             remaining: Some(0.1234),
-            ..hit()
+            ..judged()
+        };
+        let going_on = JudgedTap {
+            has_ended: false,
+            ..ringing.clone()
         };
         let told = [
-            News::Hit(hit()),
-            News::Hit(ringing),
-            News::Hit(rejected.clone()),
+            News::Tap(judged()),
+            News::Tap(ringing),
+            News::Tap(going_on),
+            News::Tap(rejected.clone()),
             News::Revised(rejected),
             News::Revised(by_hand),
             News::Gone { time: 4.9051 },
@@ -154,15 +171,16 @@ mod tests {
         let told = told.map(|news| news.to_string()).join("\n");
         assert_eq!(
             told,
-            "hit at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 0.420 %\n\
-             hit at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 12.3 %. Wait longer \
-             before the next hit.\n\
-             hit at 4.91 s REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit 10 %). Hit shorter.\n\
-             hit at 4.91 s is now REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit 10 %). Hit \
+            "tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 0.42 % in 5.0 s\n\
+             tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 12 % in 5.0 s. Wait \
+             longer before the next tap.\n\
+             tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, still 12 % after 5.0 s\n\
+             tap at 4.91 s REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit 10 %). Hit shorter.\n\
+             tap at 4.91 s is now REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit 10 %). Hit \
              shorter.\n\
-             hit at 4.91 s is now accepted by hand in spite of a fault: double hit: a second excursion of 34 % after 31.2 \
+             tap at 4.91 s is now accepted by hand in spite of a fault: double hit: a second excursion of 34 % after 31.2 \
              ms (limit 10 %): peak 18.2\n\
-             hit at 4.91 s was none, as later samples show\n\
+             the event at 4.91 s was no tap, as later samples show\n\
              doubt: channel 2: every sample is 0"
         );
     }

@@ -81,7 +81,7 @@ pub fn render_progress(document: &Document, screen: Screen) -> String {
     }
     let mut text = String::new();
     for line in lines {
-        text.push_str(&screen.wrapped(&format!("  {line}"), 4));
+        text.push_str(&screen.wrapped(&line, 2));
     }
     text
 }

@@ -130,7 +130,7 @@ fn recover_the_stream_and_the_answer_of_run() {
         let taps = wanted["recordings"][0]["taps"].as_array().unwrap();
         assert_eq!(told.len(), taps.len());
         for (line, tap) in told.iter().zip(taps) {
-            assert_eq!(line["news"], "hit");
+            assert_eq!(line["news"], "tap");
             for key in ["time", "accepted", "reason"] {
                 assert_eq!(line[key], tap[key], "{key}");
             }
@@ -144,6 +144,142 @@ fn recover_the_stream_and_the_answer_of_run() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn regress_a_signal_ends_the_recording_and_the_test_is_run() {
+    let folder = samples();
+    let place = folder.path();
+    let low = fs::read(place.join(LOW)).unwrap();
+    let interrupt = |listening: &Child| {
+        let sent = Command::new("kill")
+            .args(["-s", "INT", &listening.id().to_string()])
+            .status();
+        assert!(sent.unwrap().success());
+    };
+    // Before the first sample nothing is there to be run, and the name stays free.
+    let given = [
+        "taps.wav", "--hammer", "1", "--out", "report", "--json", "run.json",
+    ];
+    let mut early = Command::new("env");
+    early
+        .current_dir(place)
+        .arg("--default-signal=INT,TERM")
+        .arg(program())
+        .arg("listen")
+        .args(given)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut listening = early.spawn().unwrap();
+    let _open = listening.stdin.take();
+    let mut lines = BufReader::new(listening.stdout.take().unwrap()).lines();
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .unwrap()
+            .starts_with("recording taps.wav")
+    );
+    interrupt(&listening);
+    let ended = listening.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(2));
+    assert_eq!(
+        String::from_utf8(ended.stderr).unwrap(),
+        "error: taps.wav: nothing was recorded\n"
+    );
+    assert!(!place.join("taps.wav").exists());
+    // In the middle, while the stream stays open.
+    let mut listening = early.spawn().unwrap();
+    let mut input = listening.stdin.take().unwrap();
+    input.write_all(&low[..low.len() / 2]).unwrap();
+    let mut lines = BufReader::new(listening.stdout.take().unwrap()).lines();
+    assert!(lines.any(|line| line.unwrap().starts_with("tap at 5.5")));
+    interrupt(&listening);
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    assert_eq!(listening.wait().unwrap().code(), Some(0), "{rest:?}");
+    drop(input);
+    let run: Value = serde_json::from_slice(&fs::read(place.join("run.json")).unwrap()).unwrap();
+    let heard = format!(
+        "taps.wav: {:.1} s, ",
+        run["recordings"][0]["seconds"].as_f64().unwrap()
+    );
+    assert!(
+        rest.iter().any(|line| line.starts_with(&heard)),
+        "{heard} {rest:?}"
+    );
+}
+
+#[test]
+fn recover_a_played_table_with_names_and_a_refused_description() {
+    let folder = samples();
+    let place = folder.path();
+    let test = place.join("recordings/cantilever");
+    // A channel that the stream lacks is found with the first samples, and the next call finds the same place.
+    let text = fs::read_to_string(test.join("test.toml")).unwrap();
+    let low = fs::read(place.join(LOW)).unwrap();
+    fs::remove_file(test.join("low.wav")).unwrap();
+    assert!(text.contains("channel = 1"), "{text}");
+    fs::write(
+        test.join("test.toml"),
+        text.replacen("channel = 1", "channel = 7", 1),
+    )
+    .unwrap();
+    let error = refused(place, &["recordings/cantilever/test.toml"], &low);
+    assert!(error.contains("no channel 7"), "{error}");
+    assert!(!test.join("low.wav").exists());
+    fs::write(test.join("test.toml"), &text).unwrap();
+    let ended = fed(
+        place,
+        &["recordings/cantilever/test.toml", "--out", "report"],
+        &low,
+    );
+    assert_eq!(ended.status.code(), Some(0));
+    // Text with names and units.
+    let mut table = "time (s),force (N),tip (m/s2)\n".to_owned();
+    for n in 0..20_000 {
+        let time = f64::from(n) / 2000.0;
+        let since = (time - 0.6) % 2.5;
+        let force = if (0.0..2e-3).contains(&since) {
+            20.0
+        } else {
+            0.0
+        };
+        let motion = (-3.0 * since.max(0.0)).exp() * (740.0 * since.max(0.0)).sin();
+        table += &format!(
+            "{time},{force},{}\n",
+            4.0 * motion + 1e-3 * f64::from(n * 7919 % 101)
+        );
+    }
+    fs::write(place.join("taps.csv"), table).unwrap();
+    let described = "[beam]\nlength = 0.4\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850\n\
+                     [joint]\nkind = \"cantilever\"\n[hammer]\nchannel = \"force\"\n[[sensor]]\nname = \"tip\"\n\
+                     [[recording]]\nfile = \"taps.csv\"\n";
+    fs::write(place.join("csv.toml"), described).unwrap();
+    let given = [
+        "listen", "csv.toml", "--replay", "taps.csv", "--speed", "50", "--out", "csv",
+    ];
+    let run = Command::new(program())
+        .current_dir(place)
+        .args(given)
+        .output()
+        .unwrap();
+    let printed = String::from_utf8(run.stdout).unwrap();
+    let error = String::from_utf8(run.stderr).unwrap();
+    assert!(
+        printed.contains("taps.csv: 10.0 s, 3 of 4 taps count"),
+        "{printed}{error}"
+    );
+    assert!(!error.contains("no result so far"), "{error}");
+    // A copy has no names.
+    let error = refused(
+        place,
+        &["copy.wav", "--replay", "taps.csv", "--hammer", "force"],
+        b"",
+    );
+    assert!(error.contains("no channel named \"force\""), "{error}");
+    assert!(!place.join("copy.wav").exists());
+}
+
 #[test]
 fn regress_a_killed_program_leaves_what_it_heard_and_goes_on() {
     let folder = samples();
@@ -155,7 +291,7 @@ fn regress_a_killed_program_leaves_what_it_heard_and_goes_on() {
     input.write_all(&low[..most]).unwrap();
     // The second hit of the file, at 5.5 s, is told once its record is there.
     let mut lines = BufReader::new(listening.stdout.take().unwrap()).lines();
-    assert!(lines.any(|line| line.unwrap().starts_with("hit at 5.5")));
+    assert!(lines.any(|line| line.unwrap().starts_with("tap at 5.5")));
     listening.kill().unwrap();
     listening.wait().unwrap();
     let inspected = tapjoint(
@@ -177,7 +313,7 @@ fn regress_a_killed_program_leaves_what_it_heard_and_goes_on() {
     let ended = fed(place, &given, &low);
     let printed = String::from_utf8(ended.stdout).unwrap();
     assert_eq!(ended.status.code(), Some(0), "{printed}");
-    assert!(printed.starts_with("going on with taps.wav"), "{printed}");
+    assert!(printed.starts_with("continuing taps.wav"), "{printed}");
     assert!(
         printed.ends_with(
             "one recording in 2 files: write files = [\"taps.wav\", \"taps-2.wav\"] in the description, then run the test\n"
@@ -202,7 +338,7 @@ fn regress_a_description_names_the_next_recording() {
     let given = ["recordings/cantilever/test.toml", "--out", "report"];
     let first = String::from_utf8(fed(place, &given, &both[0]).stdout).unwrap();
     assert!(
-        first.starts_with("recording low.wav, tap at 0.385 m; 5 hits are wanted"),
+        first.starts_with("recording low.wav, tap at 0.385 m; 5 taps are wanted"),
         "{first}"
     );
     let last = first.lines().last().unwrap();
@@ -249,7 +385,7 @@ fn regress_broken_streams_are_named_and_nothing_is_lost() {
     let warning = String::from_utf8(cut.stderr).unwrap();
     assert!(
         warning.starts_with(
-            "warning: the stream ended within a sample; its last 5 bytes are left out\n"
+            "warning: the stream ended within a frame; its last 5 bytes are left out\n"
         ),
         "{warning}"
     );

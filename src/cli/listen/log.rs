@@ -1,6 +1,6 @@
 //! The log of the decisions, beside the recording: a line of JSON for each.
 
-use crate::listen::{Hit, News};
+use crate::listen::{JudgedTap, News};
 use anyhow::Context;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -24,7 +24,7 @@ impl Log {
         }
     }
 
-    /// Notes what was told once so many seconds were heard.
+    /// Notes what was reported once so many seconds were heard.
     ///
     /// # Errors
     /// The disk refuses.
@@ -50,25 +50,27 @@ impl Log {
 
 /// Returns a line of the log: times in s, frequencies in Hz, the rest as the report has it.
 fn line(heard: f64, news: &News) -> Value {
-    let of_hit = |kind: &str, hit: &Hit| {
-        json!({
-            "heard": heard,
-            "news": kind,
-            "time": hit.time,
-            "accepted": hit.rejection.is_none(),
-            "reason": hit.rejection.as_ref().map(ToString::to_string),
-            "overruled": hit.overruled.as_ref().map(ToString::to_string),
-            "peak": hit.peak,
-            "unit": hit.unit,
-            "pulse_width": hit.pulse.map(|pulse| pulse.width),
-            "usable_to": hit.pulse.map(|pulse| pulse.usable_to),
-            "remaining": hit.remaining,
-        })
-    };
     match news {
-        News::Hit(hit) => of_hit("hit", hit),
-        News::Revised(hit) => of_hit("revised", hit),
+        News::Tap(tap) => tap_line(heard, "tap", tap),
+        News::Revised(tap) => tap_line(heard, "revised", tap),
         News::Gone { time } => json!({ "heard": heard, "news": "gone", "time": time }),
         News::Doubt(text) => json!({ "heard": heard, "news": "doubt", "text": text }),
     }
+}
+
+fn tap_line(heard: f64, news: &str, tap: &JudgedTap) -> Value {
+    json!({
+        "heard": heard,
+        "news": news,
+        "time": tap.time,
+        "accepted": tap.rejection.is_none(),
+        "reason": tap.rejection.as_ref().map(ToString::to_string),
+        "overruled": tap.overruled.as_ref().map(ToString::to_string),
+        "peak": tap.peak,
+        "unit": tap.unit,
+        "pulse_width": tap.pulse.map(|pulse| pulse.width),
+        "usable_to": tap.pulse.map(|pulse| pulse.usable_to),
+        "seconds": tap.seconds,
+        "remaining": tap.remaining,
+    })
 }

@@ -1,5 +1,6 @@
 //! The WAV files that take the samples of a stream.
 
+use super::stream::Destination;
 use crate::recording::PcmLayout;
 use anyhow::{Context, bail};
 use std::fs::File;
@@ -16,6 +17,8 @@ const LARGEST: u64 = 1 << 30;
 pub(super) struct Recorder {
     /// Name of the first file.
     first: PathBuf,
+    /// Names that belong to other recordings.
+    reserved: Vec<PathBuf>,
     layout: PcmLayout,
     path: PathBuf,
     file: File,
@@ -28,14 +31,18 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Makes the next file of a recording whose first file has this name.
+    /// Makes the next file of a recording.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub(super) fn begin(first: &Path, layout: PcmLayout) -> anyhow::Result<Self> {
-        let (path, file) = next_file(first, &layout)?;
+    pub(super) fn begin(destination: &Destination, layout: PcmLayout) -> anyhow::Result<Self> {
+        let Destination {
+            first, reserved, ..
+        } = destination;
+        let (path, file) = next_file(first, reserved, &layout)?;
         Ok(Self {
-            first: first.to_owned(),
+            first: first.clone(),
+            reserved: reserved.clone(),
             largest: LARGEST - LARGEST % layout.frame_bytes,
             layout,
             path,
@@ -72,7 +79,7 @@ impl Recorder {
         if fitting == whole {
             return Ok(false);
         }
-        (self.path, self.file) = next_file(&self.first, &self.layout)?;
+        (self.path, self.file) = next_file(&self.first, &self.reserved, &self.layout)?;
         self.bytes = 0;
         self.append(whole - fitting)?;
         Ok(true)
@@ -103,10 +110,17 @@ impl Recorder {
     }
 }
 
-/// Makes the first file of a recording that is not there yet: taps.wav, taps-2.wav, taps-3.wav.
-fn next_file(first: &Path, layout: &PcmLayout) -> anyhow::Result<(PathBuf, File)> {
+/// Makes the first file of a recording that is not there yet and no other recording's: taps.wav, taps-2.wav, taps-3.wav.
+fn next_file(
+    first: &Path,
+    reserved: &[PathBuf],
+    layout: &PcmLayout,
+) -> anyhow::Result<(PathBuf, File)> {
     for number in 1..=MOST_PARTS {
         let path = part(first, number);
+        if reserved.contains(&path) {
+            continue;
+        }
         match File::create_new(&path) {
             Ok(mut file) => {
                 file.write_all(&layout.wav_head(0))
@@ -143,6 +157,14 @@ mod tests {
     use super::*;
     use crate::recording::{ReadSettings, Recording, SampleForm};
 
+    fn destination(first: &Path, reserved: Vec<PathBuf>) -> Destination {
+        Destination {
+            first: first.to_owned(),
+            reserved,
+            stop: std::sync::Arc::default(),
+        }
+    }
+
     fn samples(path: &Path) -> Vec<f64> {
         let opened = Recording::open(path, &ReadSettings::default()).unwrap();
         assert_eq!(opened.warnings().len(), 0, "{:?}", opened.warnings());
@@ -154,7 +176,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = folder.path().join("taps.wav");
         let layout = PcmLayout::new(1000, 2, SampleForm::S16).unwrap();
-        let mut recorder = Recorder::begin(&first, layout).unwrap();
+        let mut recorder = Recorder::begin(&destination(&first, Vec::new()), layout).unwrap();
         let bytes: Vec<u8> = (0..402_u32).map(|n| (n * 7 % 251) as u8).collect();
         let mut written = 0;
         // Pieces that cut frames.
@@ -176,13 +198,14 @@ mod tests {
         let first = folder.path().join("taps.wav");
         std::fs::write(folder.path().join("taps-2.wav"), "another's").unwrap();
         let layout = PcmLayout::new(1000, 2, SampleForm::S16).unwrap();
-        let mut recorder = Recorder::begin(&first, layout).unwrap();
+        let reserved = vec![folder.path().join("taps-3.wav")];
+        let mut recorder = Recorder::begin(&destination(&first, reserved), layout).unwrap();
         recorder.largest = 40;
         let bytes: Vec<u8> = (0..60).collect();
         assert!(!recorder.write(&bytes[..39]).unwrap());
         assert!(recorder.write(&bytes[39..]).unwrap());
-        assert_eq!(recorder.path(), folder.path().join("taps-3.wav"));
-        let parts = [1, 3].map(|number| std::fs::read(part(&first, number)).unwrap());
+        assert_eq!(recorder.path(), folder.path().join("taps-4.wav"));
+        let parts = [1, 4].map(|number| std::fs::read(part(&first, number)).unwrap());
         assert_eq!([&parts[0][44..], &parts[1][44..]].concat(), bytes);
         let kept = std::fs::read_to_string(folder.path().join("taps-2.wav")).unwrap();
         assert_eq!(kept, "another's");

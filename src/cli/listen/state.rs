@@ -1,4 +1,4 @@
-//! What all hits give so far, worked out beside the recording.
+//! What all taps give so far, worked out beside the recording.
 
 use super::super::input::TestFile;
 use super::super::terminal::Terminal;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
-/// Share of the hits by which their number has to change for a new state. A fifth: up to nine hits each gives one.
+/// Share of the taps by which their number has to change for a new state. A fifth: up to nine taps each gives one.
 const CHANGE: f64 = 0.2;
 
 /// What is analysed.
@@ -32,10 +32,7 @@ pub(super) enum Subject {
 impl Subject {
     pub(super) fn of(described: Option<&TestFile>, target: &Target, bare: &BareSettings) -> Self {
         let Some((file, table)) = described.zip(target.table) else {
-            return Self::Bare(BareSettings {
-                is_growing: true,
-                ..bare.clone()
-            });
+            return Self::Bare(bare.clone());
         };
         // Recordings that are still missing are no part of it.
         let recordings = file.test.recordings.iter().enumerate();
@@ -67,7 +64,6 @@ impl Subject {
         let document = match self {
             Self::Described { file, table } => {
                 let recording = &mut file.test.recordings[*table];
-                recording.is_growing = true;
                 // Names in the description are seen from its folder; others are whole.
                 let mut files = files.iter().map(std::path::absolute);
                 if let Some(first) = files.next() {
@@ -92,24 +88,30 @@ impl Subject {
     }
 }
 
+/// A question for the state.
+struct Question {
+    files: Vec<PathBuf>,
+    screen: Screen,
+}
+
 /// Works out states in a thread of its own. While one is worked out, only the newest question waits.
 pub(super) struct States {
-    ask: Sender<(Vec<PathBuf>, Screen)>,
+    ask: Sender<Question>,
     answers: Receiver<anyhow::Result<String>>,
     is_busy: bool,
     waiting: Option<Vec<PathBuf>>,
-    /// Hits that counted at the last question.
+    /// Taps that counted at the last question.
     accepted: usize,
 }
 
 impl States {
     pub(super) fn begin(mut subject: Subject) -> Self {
-        let (ask, questions) = channel::<(Vec<PathBuf>, Screen)>();
+        let (ask, questions) = channel::<Question>();
         let (reply, answers) = channel();
         thread::spawn(move || {
-            // One thread: the other processors judge hits.
+            // One thread: the other processors judge taps.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-            for (files, screen) in questions {
+            for Question { files, screen } in questions {
                 let answer = match &pool {
                     Ok(pool) => pool.install(|| subject.answer(&files, screen)),
                     Err(_) => subject.answer(&files, screen),
@@ -128,7 +130,7 @@ impl States {
         }
     }
 
-    /// Asks for the state of the recording in these files, if the number of hits that count has changed enough.
+    /// Asks for the state of the recording in these files, if the number of taps that count has changed enough.
     pub(super) fn ask(&mut self, accepted: usize, files: &[PathBuf]) {
         // The scatter of a mean falls with the square root of their number: among many one more says little.
         let change = accepted.abs_diff(self.accepted);
@@ -140,20 +142,23 @@ impl States {
 
     /// Prints a state that is ready, and begins with the next. A state that cannot be worked out is said, and the recording
     /// goes on.
-    pub(super) fn tell(&mut self, terminal: &Terminal) -> anyhow::Result<()> {
+    pub(super) fn report(&mut self, terminal: &Terminal) -> anyhow::Result<()> {
         if self.is_busy
             && let Ok(answer) = self.answers.try_recv()
         {
             self.is_busy = false;
             match answer {
-                Ok(text) => terminal.say(&text)?,
+                Ok(text) => {
+                    let _ = terminal.say(&text);
+                }
                 Err(cause) => terminal.warn(&format!("no result so far: {cause:#}")),
             }
         }
         if !self.is_busy
             && let Some(files) = self.waiting.take()
         {
-            self.is_busy = self.ask.send((files, terminal.screen())).is_ok();
+            let screen = terminal.screen();
+            self.is_busy = self.ask.send(Question { files, screen }).is_ok();
         }
         Ok(())
     }

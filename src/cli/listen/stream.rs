@@ -8,7 +8,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,75 +16,112 @@ use std::time::{Duration, Instant};
 const PIECE: usize = 1 << 14;
 /// Length of a stream that must be there before it is listened to (s): some of its signal shows how the samples lie.
 const FIRST: f64 = 0.5;
+/// Length of the pieces of a replay (s).
+const TACT: f64 = 0.02;
 
 /// Source of the samples.
 pub(super) enum Source {
-    /// Standard input: WAV, or samples of this layout.
+    /// Standard input: WAV, or raw samples of this layout.
     Standard(Option<PcmLayout>),
     /// A file that is played.
     Replay {
         /// The file.
         path: PathBuf,
-        /// The recording that it holds; `None` of samples without a head.
+        /// The recording that it holds; `None` of raw samples.
         recording: Option<Recording>,
-        /// Layout of samples without a head.
+        /// Layout of raw samples.
         layout: Option<PcmLayout>,
         /// Seconds of the recording in a second; `None` = as fast as it goes.
         speed: Option<f64>,
     },
 }
 
-/// What the thread tells.
+/// What the thread reports.
 pub(super) enum Event {
     /// A file is there, with its first samples.
     File(PathBuf),
-    /// The stream has ended. Bytes that were left over; or why it ended.
-    Ended(anyhow::Result<usize>),
+    /// The stream has ended, or it cannot be read or written.
+    Ended(anyhow::Result<End>),
 }
 
-/// Writes the samples of a source into files of which the first has this name, in a thread of its own. It ends with the
-/// stream, or once `stop` is set.
-pub(super) fn record(source: Source, first: PathBuf, stop: Arc<AtomicBool>) -> Receiver<Event> {
-    let (tell, events) = channel();
+/// End of a stream.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct End {
+    /// Bytes of an incomplete frame.
+    pub(super) rest: usize,
+    /// Length that the header promises and that did not come (s).
+    pub(super) missing: f64,
+}
+
+/// Where the samples go.
+pub(super) struct Destination {
+    /// Name of the first file.
+    pub(super) first: PathBuf,
+    /// Names that belong to other recordings.
+    pub(super) reserved: Vec<PathBuf>,
+    /// Nothing more is written once this is set.
+    pub(super) stop: Arc<AtomicBool>,
+}
+
+/// Writes the samples of a source in a thread of its own. It ends with the stream, or when it is stopped.
+pub(super) fn record(source: Source, destination: Destination) -> Receiver<Event> {
+    let (report, events) = channel();
     thread::spawn(move || {
-        let mut tell_file = |path: PathBuf| drop(tell.send(Event::File(path)));
-        let ended = match source {
-            Source::Standard(layout) => {
-                let input = io::stdin().lock();
-                write_stream(input, layout, None, &first, &stop, &mut tell_file)
-            }
+        let stream = match source {
+            Source::Standard(layout) => Ok(Stream {
+                input: Box::new(io::stdin()),
+                layout,
+                speed: None,
+                frames: None,
+            }),
             Source::Replay {
                 path,
                 recording,
                 layout,
                 speed,
-            } => open(&path, recording, layout).and_then(|(input, layout)| {
-                write_stream(input, layout, speed, &first, &stop, &mut tell_file)
-            }),
+            } => open(&path, recording, layout, speed),
         };
-        // Who no longer listens has ended.
-        let _ = tell.send(Event::Ended(ended));
+        let ended = stream.and_then(|stream| stream.write(&destination, &report));
+        // The command may have ended.
+        let _ = report.send(Event::Ended(ended));
     });
     events
 }
 
-/// Opens a file that is played, as a stream with its layout; `None` of WAV, which is played byte by byte.
+/// Samples as they come.
+struct Stream {
+    input: Box<dyn Read>,
+    /// Layout of raw samples; `None` of WAV.
+    layout: Option<PcmLayout>,
+    /// Seconds of samples in a second; `None` = as they come.
+    speed: Option<f64>,
+    /// Number of frames where it is known better than by the header.
+    frames: Option<u64>,
+}
+
+/// Opens a file that is played. WAV is played byte by byte.
 fn open(
     path: &Path,
     recording: Option<Recording>,
     layout: Option<PcmLayout>,
-) -> anyhow::Result<(Box<dyn Read>, Option<PcmLayout>)> {
-    let is_wav = |format| matches!(format, Format::WavInteger { .. } | Format::WavFloat { .. });
-    let Some(recording) = recording.filter(|recording| !is_wav(recording.format())) else {
-        let file = File::open(path);
-        let file = file.with_context(|| format!("{}: cannot be read", path.display()))?;
-        return Ok((Box::new(file), layout));
+    speed: Option<f64>,
+) -> anyhow::Result<Stream> {
+    let form = match recording.as_ref().map(Recording::format) {
+        None | Some(Format::WavInteger { .. } | Format::WavFloat { .. }) => {
+            let file = File::open(path);
+            let file = file.with_context(|| format!("{}: cannot be read", path.display()))?;
+            return Ok(Stream {
+                input: Box::new(file),
+                layout,
+                speed,
+                frames: recording.map(|recording| recording.frames()),
+            });
+        }
+        Some(Format::Flac { bits: 16 }) => SampleForm::S16,
+        Some(Format::Flac { bits: 24 }) => SampleForm::S24,
+        Some(_) => SampleForm::F64,
     };
-    let form = match recording.format() {
-        Format::Flac { bits: 16 } => SampleForm::S16,
-        Format::Flac { bits: 24 } => SampleForm::S24,
-        _ => SampleForm::F64,
-    };
+    let recording = recording.context("there is no recording")?;
     let rate = recording.sample_rate();
     if rate.fract() != 0.0 || rate < 1.0 {
         bail!(
@@ -100,7 +137,12 @@ fn open(
         bytes: Vec::new(),
         given: 0,
     };
-    Ok((Box::new(played), Some(layout)))
+    Ok(Stream {
+        input: Box::new(played),
+        layout: Some(layout),
+        speed,
+        frames: None,
+    })
 }
 
 /// A recording as a stream of bytes, in units of its file.
@@ -138,27 +180,96 @@ impl Read for Played {
     }
 }
 
-/// Writes a stream of WAV, or of samples of a known layout. Returns the bytes of an incomplete frame at its end.
-fn write_stream(
-    mut input: impl Read,
-    layout: Option<PcmLayout>,
-    speed: Option<f64>,
-    first: &Path,
-    stop: &AtomicBool,
-    tell: &mut impl FnMut(PathBuf),
-) -> anyhow::Result<usize> {
-    let mut piece = vec![0; PIECE];
-    let mut bytes = Vec::new();
-    let mut left = u64::MAX;
-    let layout = match layout {
-        Some(layout) => layout,
-        None => loop {
-            let count = read(&mut input, &mut piece)?;
+impl Stream {
+    /// Writes the stream, and reports its files.
+    fn write(mut self, destination: &Destination, report: &Sender<Event>) -> anyhow::Result<End> {
+        let mut bytes = Vec::new();
+        let Some((layout, promised)) = self.begin(&mut bytes, destination)? else {
+            return Ok(End::default());
+        };
+        let bytes_per_second = layout.frame_bytes as f64 * f64::from(layout.sample_rate);
+        let frames = self.frames.map(|frames| frames * layout.frame_bytes);
+        let mut left = frames.or(promised).unwrap_or(u64::MAX);
+        let is_known = left < u64::MAX;
+        let enough = (FIRST * bytes_per_second) as usize;
+        // Of a replay small pieces, so that it goes on as steadily as a recording.
+        let most = self
+            .speed
+            .map_or(PIECE as f64, |speed| TACT * speed * bytes_per_second);
+        let mut piece = vec![0; (most as usize).clamp(1, PIECE)];
+        let mut recorder: Option<Recorder> = None;
+        let (mut total, start) = (0_u64, Instant::now());
+        loop {
+            let is_there = bytes.len() as u64 >= left;
+            let count = match is_there {
+                true => 0,
+                false => read(&mut self.input, &mut piece)?,
+            };
+            total += count as u64;
+            if let Some(speed) = self.speed {
+                let due = Duration::from_secs_f64(total as f64 / bytes_per_second / speed);
+                thread::sleep(due.saturating_sub(start.elapsed()));
+            }
+            if destination.stop.load(Ordering::Relaxed) {
+                break;
+            }
             bytes.extend_from_slice(&piece[..count]);
-            if let Some(head) = PcmLayout::of_wav(&bytes)? {
+            // Chunks behind the samples are no samples.
+            bytes.truncate(left.min(bytes.len() as u64) as usize);
+            let is_over = count == 0 || bytes.len() as u64 == left;
+            // The file is begun with the first samples: a stream without any leaves none.
+            if recorder.is_none() && (bytes.len() >= enough || is_over) && !bytes.is_empty() {
+                recorder = Some(Recorder::begin(destination, layout.clone())?);
+            }
+            if let Some(recorder) = &mut recorder {
+                let is_first = recorder.bytes() == 0;
+                let is_next = recorder.write(&bytes)?;
+                if is_first || is_next {
+                    let _ = report.send(Event::File(recorder.path().to_owned()));
+                }
+                left -= bytes.len() as u64;
+                bytes.clear();
+            }
+            if is_over {
+                break;
+            }
+        }
+        let Some(recorder) = recorder else {
+            if destination.stop.load(Ordering::Relaxed) {
+                return Ok(End::default());
+            }
+            bail!("the stream ended before its first sample; check the recorder's messages");
+        };
+        Ok(End {
+            rest: recorder.rest(),
+            missing: if is_known {
+                left as f64 / bytes_per_second
+            } else {
+                0.0
+            },
+        })
+    }
+
+    /// Returns the layout, and the bytes of samples that a header promises. `bytes` takes the samples that came with the
+    /// header. `None` where it was stopped before.
+    fn begin(
+        &mut self,
+        bytes: &mut Vec<u8>,
+        destination: &Destination,
+    ) -> anyhow::Result<Option<(PcmLayout, Option<u64>)>> {
+        if let Some(layout) = self.layout.take() {
+            return Ok(Some((layout, None)));
+        }
+        let mut piece = vec![0; PIECE];
+        loop {
+            let count = read(&mut self.input, &mut piece)?;
+            if destination.stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            bytes.extend_from_slice(&piece[..count]);
+            if let Some(head) = PcmLayout::of_wav(bytes)? {
                 bytes.drain(..head.length);
-                left = head.data_bytes.unwrap_or(u64::MAX);
-                break head.layout;
+                return Ok(Some((head.layout, head.data_bytes)));
             }
             if count == 0 {
                 bail!(
@@ -166,48 +277,8 @@ fn write_stream(
                     bytes.len()
                 );
             }
-        },
-    };
-    let bytes_per_second = layout.frame_bytes as f64 * f64::from(layout.sample_rate);
-    let enough = (FIRST * bytes_per_second) as u64;
-    let mut recorder = Recorder::begin(first, layout)?;
-    let (mut is_told, mut total) = (false, 0_u64);
-    let start = Instant::now();
-    loop {
-        // Chunks behind the samples are no samples.
-        bytes.truncate(left.min(bytes.len() as u64) as usize);
-        left -= bytes.len() as u64;
-        total += bytes.len() as u64;
-        if recorder.write(&bytes)? {
-            tell(recorder.path().to_owned());
         }
-        if !is_told && recorder.bytes() > enough {
-            is_told = true;
-            tell(recorder.path().to_owned());
-        }
-        if let Some(speed) = speed {
-            let due = Duration::from_secs_f64(total as f64 / bytes_per_second / speed);
-            thread::sleep(due.saturating_sub(start.elapsed()));
-        }
-        if left == 0 || stop.load(Ordering::Relaxed) {
-            break;
-        }
-        let count = read(&mut input, &mut piece)
-            .with_context(|| format!("what came before is in {}", recorder.path().display()))?;
-        if count == 0 {
-            break;
-        }
-        bytes.clear();
-        bytes.extend_from_slice(&piece[..count]);
     }
-    if recorder.bytes() == 0 {
-        std::fs::remove_file(recorder.path())?;
-        bail!("the stream ended before its first sample; check the recorder's messages");
-    }
-    if !is_told {
-        tell(recorder.path().to_owned());
-    }
-    Ok(recorder.rest())
 }
 
 /// Reads some bytes; 0 at the end.

@@ -17,6 +17,8 @@ pub(super) struct Target {
     pub(super) earlier: Vec<PathBuf>,
     /// True where the file is there and is played: it is not written.
     pub(super) is_played: bool,
+    /// Files of other recordings, which are not to be written.
+    pub(super) reserved: Vec<PathBuf>,
 }
 
 /// Returns the recording that a description asks for next: the first whose file is missing, or the one that is played.
@@ -33,6 +35,11 @@ pub(super) fn described_target(
     let recordings = recordings.filter(|(_, recording)| recording.form.is_none());
     let mut last = None;
     for (table, recording) in recordings {
+        let others = file.test.recordings.iter().enumerate();
+        let others = others.filter(|(other, _)| *other != table);
+        let reserved: Vec<PathBuf> = others
+            .flat_map(|(_, other)| other.files().map(|name| file.path_of(name)))
+            .collect();
         let mut earlier = Vec::new();
         for name in recording.files() {
             let path = file.path_of(name);
@@ -49,6 +56,7 @@ pub(super) fn described_target(
                     file: path,
                     earlier: if is_played { Vec::new() } else { earlier },
                     is_played,
+                    reserved,
                 });
             }
             if path.exists() {
@@ -56,11 +64,11 @@ pub(super) fn described_target(
             }
         }
         if !earlier.is_empty() {
-            last = Some((table, earlier));
+            last = Some((table, earlier, reserved));
         }
     }
     match last {
-        Some((table, earlier)) if is_resumed => resumed(Some(table), earlier),
+        Some((table, earlier, reserved)) if is_resumed => resumed(Some(table), earlier, reserved),
         None => bail!(
             "{}: describes no recording of taps; add a [[recording]] with the file to be written",
             file.name
@@ -88,7 +96,7 @@ pub(super) fn bare_target(
         check_ending(path, None, "")?;
     }
     match (path.exists(), is_resumed) {
-        (true, true) if !is_played => resumed(None, vec![path.to_owned()]),
+        (true, true) if !is_played => resumed(None, vec![path.to_owned()], Vec::new()),
         (true, false) if !is_played => {
             bail!("{shown}: is there already; give another name, or go on with it by --resume")
         }
@@ -97,21 +105,30 @@ pub(super) fn bare_target(
             file: path.to_owned(),
             earlier: Vec::new(),
             is_played,
+            reserved: Vec::new(),
         }),
     }
 }
 
 /// The next file of a recording of which some are there.
-fn resumed(table: Option<usize>, mut earlier: Vec<PathBuf>) -> anyhow::Result<Target> {
+fn resumed(
+    table: Option<usize>,
+    mut earlier: Vec<PathBuf>,
+    reserved: Vec<PathBuf>,
+) -> anyhow::Result<Target> {
     let first = earlier[0].clone();
     for number in 2..=MOST_PARTS {
         let path = part(&first, number);
+        if reserved.contains(&path) {
+            continue;
+        }
         if !path.exists() {
             return Ok(Target {
                 table,
                 file: first,
                 earlier,
                 is_played: false,
+                reserved,
             });
         }
         if !earlier.contains(&path) {

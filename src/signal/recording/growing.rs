@@ -5,7 +5,7 @@ use super::health::{HealthMeter, check_finite};
 use super::outline::Extremes;
 use super::wav::WavSource;
 use super::{ChannelInfo, Cursor, Recording, RecordingWarning};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A WAV file that grows while it is read.
@@ -16,6 +16,7 @@ use std::sync::Arc;
 pub struct GrowingRecording {
     /// The file, up to the last frame that was read.
     source: WavSource,
+    path: PathBuf,
     /// Its name in messages.
     file: String,
     meters: Vec<HealthMeter>,
@@ -42,9 +43,18 @@ impl GrowingRecording {
             meters: source.meters(),
             block: vec![Vec::new(); source.channels],
             source,
+            path: path.to_owned(),
             file,
             warnings,
         })
+    }
+
+    /// Returns the file from its beginning again. How its samples lie is decided by all that is there now.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn reopened(&self) -> Result<Self, RecordingError> {
+        Self::open(&self.path)
     }
 
     /// Samples per second (Hz).

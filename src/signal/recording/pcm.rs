@@ -6,9 +6,9 @@ use super::wav::{WavHead, read_head};
 
 /// Longest head of a WAV stream (bytes). Recorders put some kilobytes of text there.
 const LONGEST_HEAD: usize = 1 << 20;
-/// From this size on a stream's head promises the largest number that its writer knows, and not its length: 2 GB less
-/// what a header takes.
-const NO_PROMISE: u32 = (1 << 31) - 256;
+/// From this size on a stream's header promises the largest number that its writer knows, and not its length. sox writes the
+/// multiple of a frame below 0x7ffff000; a frame has at most 64 kB.
+const NO_PROMISE: u32 = 0x7fff_f000 - (1 << 16);
 
 /// Form of the samples of a stream, little end first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +93,7 @@ pub struct PcmHead {
 }
 
 impl PcmLayout {
-    /// Layout of samples without a head.
+    /// Layout of raw samples.
     ///
     /// # Errors
     /// A sample rate or a number of channels that no recording has.
@@ -133,14 +133,14 @@ impl PcmLayout {
             .any(|known| known.starts_with(mark));
         let is_wave = bytes.len() < 12 || bytes.get(8..12) == Some(b"WAVE");
         if !is_riff || !is_wave {
-            let problem = "does not begin with the head of a WAV file; give --rate, --channels and --format for samples \
-                           without a head, or have the recorder write WAV";
+            let problem = "does not begin with the header of a WAV file; give --rate, --channels and --format for raw \
+                           samples, or have the recorder write WAV";
             return Err(RecordingError::new(NAME, problem));
         }
         let Some(head) = read_head(NAME, bytes)? else {
             if bytes.len() > LONGEST_HEAD {
                 let problem = format!(
-                    "a WAV head without samples in its first {LONGEST_HEAD} bytes; have the recorder write plain WAV"
+                    "a WAV header without samples in its first {LONGEST_HEAD} bytes; have the recorder write plain WAV"
                 );
                 return Err(RecordingError::new(NAME, problem));
             }
@@ -168,7 +168,7 @@ impl PcmLayout {
         }))
     }
 
-    /// Returns the head of a WAV file with so many bytes of samples. Its length does not depend on them.
+    /// Returns the header of a WAV file with so many bytes of samples. Its length does not depend on them.
     pub fn wav_head(&self, data_bytes: u32) -> Vec<u8> {
         let format = &self.format_chunk;
         let mut head = Vec::with_capacity(28 + format.len());
@@ -212,8 +212,8 @@ mod tests {
     #[test]
     fn limit_lengths_that_a_recorder_does_not_know_are_no_lengths() {
         let layout = PcmLayout::new(48_000, 2, SampleForm::S24).unwrap();
-        // sox and ffmpeg write the largest number, arecord 2 GB, others nothing.
-        for unknown in [0, u32::MAX, 1 << 31, (1 << 31) - 40] {
+        // ffmpeg writes the largest number, arecord 2 GB, sox the last whole frame of 4 bytes below 0x7ffff000, others nothing.
+        for unknown in [0, u32::MAX, 1 << 31, 0x7fff_f000, 0x7fff_eff8] {
             let head = PcmLayout::of_wav(&layout.wav_head(unknown)).unwrap();
             assert_eq!(head.expect("whole").data_bytes, None, "{unknown}");
         }
@@ -224,8 +224,8 @@ mod tests {
         let text = |bytes: &[u8]| PcmLayout::of_wav(bytes).unwrap_err().to_string();
         assert_eq!(
             text(b"time,force\n0,0\n"),
-            "the stream: does not begin with the head of a WAV file; give --rate, --channels and --format for samples \
-             without a head, or have the recorder write WAV"
+            "the stream: does not begin with the header of a WAV file; give --rate, --channels and --format for raw \
+             samples, or have the recorder write WAV"
         );
         let mut endless = PcmLayout::new(1000, 1, SampleForm::S16)
             .unwrap()
@@ -235,7 +235,7 @@ mod tests {
         endless.resize(LONGEST_HEAD + 2, 0);
         assert_eq!(
             text(&endless),
-            "the stream: a WAV head without samples in its first 1048576 bytes; have the recorder write plain WAV"
+            "the stream: a WAV header without samples in its first 1048576 bytes; have the recorder write plain WAV"
         );
     }
 

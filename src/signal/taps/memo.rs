@@ -55,6 +55,12 @@ struct Place {
     end: u64,
 }
 
+impl Place {
+    fn record(self) -> Range<u64> {
+        self.start..self.end
+    }
+}
+
 /// What the measurements of all events depend on.
 #[derive(Debug, Clone, PartialEq)]
 struct Conditions {
@@ -146,7 +152,7 @@ impl PartMemo {
             self.conditions = Some(now);
         }
         let events = &found.events;
-        let mut places: Vec<(Place, Range<u64>)> = Vec::with_capacity(events.len());
+        let mut places = Vec::with_capacity(events.len());
         for (index, event) in events.iter().enumerate() {
             let record = record_of(recording, events, index, weakest, settings);
             let before = index.checked_sub(1).map(|before| events[before].trigger);
@@ -156,21 +162,21 @@ impl PartMemo {
                 start: record.start,
                 end: record.end,
             };
-            places.push((place, record));
+            places.push(place);
         }
         let missing: Vec<usize> = (0..events.len())
-            .filter(|index| !self.facts.contains_key(&places[*index].0))
+            .filter(|index| !self.facts.contains_key(&places[*index]))
             .collect();
         let measured = missing.into_par_iter().map(|index| {
-            let (place, record) = &places[index];
-            let measured = facts(recording, source, found, index, record, settings)?;
-            Ok((*place, measured))
+            let place = places[index];
+            let measured = facts(recording, source, found, index, &place.record(), settings)?;
+            Ok((place, measured))
         });
         // Collected in order, so that of several errors the first is reported.
         let measured: Vec<Result<(Place, Facts), RecordingError>> = measured.collect();
         // What belongs to no event any more is forgotten.
         let mut facts = BTreeMap::new();
-        for (place, _) in &places {
+        for place in &places {
             if let Some(known) = self.facts.remove(place) {
                 facts.insert(*place, known);
             }
@@ -182,7 +188,8 @@ impl PartMemo {
         self.facts = facts;
         let rate = recording.sample_rate();
         let mut taps = Vec::with_capacity(events.len());
-        for (event, (place, record)) in events.iter().zip(places) {
+        for (event, place) in events.iter().zip(places) {
+            let record = place.record();
             taps.push(judge(
                 event,
                 record,

@@ -179,8 +179,7 @@ pub(super) fn run(
     if heard.files.len() == target.earlier.len() {
         bail!("{name}: nothing was recorded");
     }
-    let known = described.iter().flat_map(|file| described_files(file));
-    let known: Vec<PathBuf> = known.collect();
+    let known = described.as_ref().map(described_files).unwrap_or_default();
     if heard.files.len() > 1 && heard.files.iter().any(|file| !known.contains(file)) {
         let names = heard.files.iter();
         let names = names.map(|file| format!("\"{}\"", file_name(file)));

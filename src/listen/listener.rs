@@ -294,7 +294,8 @@ impl<'a> Listener<'a> {
                 TapRemark::FileWithoutTap { file } => file.clone(),
                 other => format!("{:?}", discriminant(other)),
             };
-            if !(is_growing && is_early) && !self.remarks.contains(&kind) {
+            let is_held_back = is_growing && is_early;
+            if !is_held_back && !self.remarks.contains(&kind) {
                 news.push(News::Doubt(remark.to_string()));
                 self.remarks.push(kind);
             }

@@ -358,12 +358,13 @@ fn regress_broken_streams_are_named_and_nothing_is_lost() {
     let low = fs::read(place.join(LOW)).unwrap();
     let form = ["--rate", "1000", "--channels", "2", "--format", "f32le"];
     let with = |name: &'static str| [&[name][..], &form].concat();
-    let mut errors = Vec::new();
-    errors.push(refused(place, &["a.wav"], b"time,force\n0,0\n"));
-    errors.push(refused(place, &["a.wav"], b""));
-    errors.push(refused(place, &["a.wav"], &low[..20]));
-    errors.push(refused(place, &["a.wav"], &low[..44]));
-    errors.push(refused(place, &with("a.wav"), b""));
+    let mut errors = vec![
+        refused(place, &["a.wav"], b"time,force\n0,0\n"),
+        refused(place, &["a.wav"], b""),
+        refused(place, &["a.wav"], &low[..20]),
+        refused(place, &["a.wav"], &low[..44]),
+        refused(place, &with("a.wav"), b""),
+    ];
     assert!(!place.join("a.wav").exists());
     errors.push(refused(place, &["a.csv"], &low));
     errors.push(refused(place, &["a.wav", "--hammer", "4"], &low));

@@ -21,7 +21,7 @@ pub(super) enum Subject {
     /// A described test, of which one recording goes on.
     Described {
         /// The test, with the recordings that are there.
-        file: TestFile,
+        file: Box<TestFile>,
         /// Place of the recording that goes on.
         table: usize,
     },
@@ -50,11 +50,11 @@ impl Subject {
             ..file.test.clone()
         };
         Self::Described {
-            file: TestFile {
+            file: Box::new(TestFile {
                 test,
                 name: file.name.clone(),
                 folder: file.folder.clone(),
-            },
+            }),
             table: own.unwrap_or(0),
         }
     }

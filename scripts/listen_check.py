@@ -161,7 +161,7 @@ def main():
     print(f"decisions after the last sample equal to those of run: {total['equal']} ({100 * total['equal'] / total['taps']:.2f} %)")
     print(f"told while it went on: {total['live']}, revised while it went on: {total['revised']}, at the end: {total['changed']}")
     print(f"double hits that run rejects, rejected while it went on: {total['doubles live']} of {total['doubles']}")
-    if total["equal"] < 0.995 * total["taps"]:
+    if total["equal"] < 0.995 * total["taps"] or total["doubles live"] < total["doubles"]:
         raise SystemExit(1)
 
 

@@ -1,6 +1,6 @@
 //! The taps of a recording that still goes on.
 
-use super::bare::BareSettings;
+use super::bare::{BareSettings, channel_of};
 use super::measurement::{MeasureError, MeasureSettings, lines_for};
 use super::wiring::{PipelineError, bare_wiring, described_settings, described_wiring};
 use tapjoint_description::{RecordingDescription, TestDescription};
@@ -64,6 +64,9 @@ pub fn taps_so_far(
             (wiring, settings)
         }
         RecordingPlan::Bare(bare) => {
+            if let Some(hammer) = &bare.hammer {
+                channel_of(&recording, "--hammer", hammer)?;
+            }
             let wiring = bare_wiring(&recording, bare.hammer.as_ref())?;
             let mut settings = MeasureSettings::new(wiring.source());
             bare.adjust(&mut settings);

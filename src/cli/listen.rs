@@ -180,9 +180,15 @@ pub(super) fn run(
         bail!("{name}: nothing was recorded");
     }
     let known = described.as_ref().map(described_files).unwrap_or_default();
-    if heard.files.len() > 1 && heard.files.iter().any(|file| !known.contains(file)) {
+    let has_more = heard.files.iter().any(|file| !known.contains(file));
+    if heard.files.len() > 1 && has_more && !target.is_played {
         let names = heard.files.iter();
-        let names = names.map(|file| format!("\"{}\"", file_name(file)));
+        let folder = described.as_ref().map(|file| file.folder.clone());
+        let folder = folder.unwrap_or_default();
+        let names = names.map(|file| {
+            let name = file.strip_prefix(&folder).unwrap_or(file);
+            format!("\"{}\"", name.display())
+        });
         let names = names.collect::<Vec<_>>().join(", ");
         terminal.say(&format!(
             "one recording in {} files: write files = [{names}] in the description, then run the test\n",
@@ -194,9 +200,7 @@ pub(super) fn run(
         && let Ok(next) = described_target(file, None, false)
     {
         terminal.say(&match heard.accepted {
-            0 => format!(
-                "no tap of {name} counts: continue it with --resume, or remove it and record it again\n"
-            ),
+            0 => format!("no tap of {name} counts: remove the file and record it again\n"),
             _ => format!("next: {}; start `listen` again\n", asked_for(file, &next)),
         })?;
         return Ok(Outcome::of(heard.accepted > 0));
@@ -246,7 +250,7 @@ fn listen(
     // Results between the taps are worked out from the file, which may lack names and units.
     let is_whole = headers
         .as_ref()
-        .is_none_or(|recording| is_wav(recording.format()));
+        .is_none_or(|recording| is_plain(recording.format()));
     let states = (arguments.speed.is_some() && is_whole)
         .then(|| States::begin(Subject::of(described, target, &bare)));
     // A recording that is there already is played into a folder that is removed.
@@ -373,9 +377,6 @@ impl Hearing<'_> {
 
     /// Prints and logs what is new. A fault ends the judging, and not the recording.
     fn take(&mut self, news: Result<Vec<News>, ListenError>) {
-        let Some(listener) = &self.listener else {
-            return;
-        };
         let news = match news {
             Ok(news) => news,
             Err(fault) => {
@@ -387,6 +388,9 @@ impl Hearing<'_> {
                 }
                 return;
             }
+        };
+        let Some(listener) = &self.listener else {
+            return;
         };
         if let Some(log) = &mut self.log
             && let Err(cause) = log.note(listener.seconds(), &news)
@@ -427,27 +431,33 @@ impl Hearing<'_> {
 
     /// Returns true where the recording does not fit its description or the options, which its first samples show.
     fn is_refused(&self) -> bool {
-        let taps = self.listener.as_ref().map_or(0, Listener::taps);
-        taps == 0 && matches!(self.fault, Some(ListenError::Pipeline(_)))
+        let has_looked = self.listener.as_ref().is_none_or(Listener::has_looked);
+        // Files of another rate or with other channels do not follow one another.
+        let is_described = match self.fault {
+            Some(ListenError::Pipeline(_)) => true,
+            Some(ListenError::Recording(_)) => !self.settings.earlier.is_empty(),
+            None => false,
+        };
+        is_described && !has_looked
     }
 
     /// Judges all taps for good.
     fn end(mut self, ended: anyhow::Result<End>) -> anyhow::Result<Heard> {
         self.states = None;
-        if self.is_refused() {
-            // The next call is to find the place as this one did.
-            for file in &self.files[self.settings.earlier.len()..] {
-                let _ = std::fs::remove_file(file);
-            }
-        }
         if self.fault.is_none()
             && let Some(listener) = &mut self.listener
         {
             let news = listener.finish();
             self.take(news);
         }
+        if self.is_refused() {
+            // The next call is to find the place as this one did.
+            for file in &self.files[self.settings.earlier.len()..] {
+                let _ = std::fs::remove_file(file);
+            }
+        }
         let mut accepted = 0;
-        if let Some(listener) = &self.listener {
+        if let Some(listener) = self.listener.as_ref().filter(|_| !self.is_refused()) {
             accepted = listener.accepted();
             self.terminal.say(&format!(
                 "{}: {:.1} s, {accepted} of {} taps count\n",
@@ -470,9 +480,10 @@ impl Hearing<'_> {
 /// Time between two looks at a file that does not grow: short beside the least time to a verdict.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// True of WAV, whose channels have no names and units.
-fn is_wav(format: Format) -> bool {
-    matches!(format, Format::WavInteger { .. } | Format::WavFloat { .. })
+/// True of formats whose channels have no names and units.
+fn is_plain(format: Format) -> bool {
+    use Format::{Flac, WavFloat, WavInteger};
+    matches!(format, WavInteger { .. } | WavFloat { .. } | Flac { .. })
 }
 
 /// What is known of the recording before it begins.

@@ -180,6 +180,11 @@ impl<'a> Listener<'a> {
         (pulse.usable_to < ENOUGH_OF_BAND * end).then_some((pulse.usable_to, end))
     }
 
+    /// Returns false before the first look, which shows whether the recording fits what is known of it.
+    pub fn has_looked(&self) -> bool {
+        self.latest.is_some()
+    }
+
     /// Number of taps that were reported.
     pub fn taps(&self) -> usize {
         self.reported.len()
@@ -230,6 +235,7 @@ impl<'a> Listener<'a> {
         }
         let taps = &found.taps.taps;
         let mut reported = Vec::with_capacity(taps.len());
+        let start = self.seconds() - self.growing.frames() as f64 / self.growing.sample_rate();
         let mut waiting = None;
         // Both are in order of time.
         let mut earlier = self.reported.iter().peekable();
@@ -238,7 +244,14 @@ impl<'a> Listener<'a> {
                 news.push(News::Gone { time: gone.time });
             }
             let before = earlier.next_if(|one| one.time <= tap.time + REACH);
-            let is_last = place + 1 == taps.len();
+            if self.latest.is_none() && tap.time < start {
+                // It was reported when its file was recorded.
+                let reason = tap.rejection.as_ref().map(ToString::to_string);
+                let time = tap.time;
+                reported.push(Reported { time, reason });
+                continue;
+            }
+            let is_last = place + 1 == taps.len() && tap.time >= start;
             // The record of the last one has not ended while it is still waited for.
             if is_growing && is_last && before.is_none() && !self.is_long_enough(&found, tap) {
                 waiting = Some(tap.time);
@@ -260,8 +273,7 @@ impl<'a> Listener<'a> {
         news.extend(earlier.map(|one| News::Gone { time: one.time }));
         if let Some(time) = waiting {
             // Another alarm came just before it.
-            let before = self.seconds() - self.growing.frames() as f64 / self.growing.sample_rate();
-            let end = time + self.record(&found) - before;
+            let end = time + self.record(&found) - start;
             self.due = Some((end * self.growing.sample_rate()).ceil().max(0.0) as u64);
         }
         self.reported = reported;

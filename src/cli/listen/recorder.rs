@@ -167,7 +167,10 @@ mod tests {
 
     fn samples(path: &Path) -> Vec<f64> {
         let opened = Recording::open(path, &ReadSettings::default()).unwrap();
-        assert_eq!(opened.warnings().len(), 0, "{:?}", opened.warnings());
+        let of_length = ["truncated", "unknown-length"];
+        for warning in opened.warnings() {
+            assert!(!of_length.contains(&warning.code()), "{warning}");
+        }
         opened.read(1, 0..u64::MAX).unwrap()
     }
 

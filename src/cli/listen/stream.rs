@@ -191,7 +191,7 @@ impl Stream {
         let frames = self.frames.map(|frames| frames * layout.frame_bytes);
         let mut left = frames.or(promised).unwrap_or(u64::MAX);
         let is_known = left < u64::MAX;
-        let enough = (FIRST * bytes_per_second) as usize;
+        let enough = (FIRST * bytes_per_second).max(layout.frame_bytes as f64) as usize;
         // Of a replay small pieces, so that it goes on as steadily as a recording.
         let most = self
             .speed
@@ -218,7 +218,13 @@ impl Stream {
             bytes.truncate(left.min(bytes.len() as u64) as usize);
             let is_over = count == 0 || bytes.len() as u64 == left;
             // The file is begun with the first samples: a stream without any leaves none.
-            if recorder.is_none() && (bytes.len() >= enough || is_over) && !bytes.is_empty() {
+            let is_enough = bytes.len()
+                >= if is_over {
+                    layout.frame_bytes as usize
+                } else {
+                    enough
+                };
+            if recorder.is_none() && is_enough {
                 recorder = Some(Recorder::begin(destination, layout.clone())?);
             }
             if let Some(recorder) = &mut recorder {
@@ -234,10 +240,10 @@ impl Stream {
                 break;
             }
         }
+        if destination.stop.load(Ordering::Relaxed) {
+            return Ok(End::default());
+        }
         let Some(recorder) = recorder else {
-            if destination.stop.load(Ordering::Relaxed) {
-                return Ok(End::default());
-            }
             bail!("the stream ended before its first sample; check the recorder's messages");
         };
         Ok(End {

@@ -40,14 +40,20 @@ pub(super) fn described_target(
         let reserved: Vec<PathBuf> = others
             .flat_map(|(_, other)| other.files().map(|name| file.path_of(name)))
             .collect();
-        let mut earlier = Vec::new();
+        let (mut earlier, mut missing) = (Vec::new(), None);
         for name in recording.files() {
             let path = file.path_of(name);
             let own = Place::of(&path);
             let is_played = own
                 .zip(played.as_ref())
                 .is_some_and(|(own, played)| own.is(played));
-            if is_played || !path.exists() && (last.is_none() || !is_resumed) {
+            let is_missing = !path.exists();
+            if is_missing && is_resumed && (last.is_some() || !earlier.is_empty()) {
+                // Of the last recording that is there the next file; others are not begun.
+                missing.get_or_insert(path);
+                continue;
+            }
+            if is_played || is_missing {
                 if !is_played {
                     check_ending(&path, Some(recording.line), &file.name)?;
                 }
@@ -59,16 +65,23 @@ pub(super) fn described_target(
                     reserved,
                 });
             }
-            if path.exists() {
-                earlier.push(path);
-            }
+            earlier.push(path);
         }
         if !earlier.is_empty() {
-            last = Some((table, earlier, reserved));
+            last = Some((table, earlier, reserved, missing));
         }
     }
     match last {
-        Some((table, earlier, reserved)) if is_resumed => resumed(Some(table), earlier, reserved),
+        Some((table, earlier, reserved, Some(file))) if is_resumed => Ok(Target {
+            table: Some(table),
+            file,
+            earlier,
+            is_played: false,
+            reserved,
+        }),
+        Some((table, earlier, reserved, None)) if is_resumed => {
+            resumed(Some(table), earlier, reserved)
+        }
         None => bail!(
             "{}: describes no recording of taps; add a [[recording]] with the file to be written",
             file.name

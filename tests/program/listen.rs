@@ -352,6 +352,49 @@ fn regress_a_description_names_the_next_recording() {
 }
 
 #[test]
+fn regress_a_resumed_recording_takes_its_own_next_file() {
+    let folder = samples();
+    let place = folder.path();
+    let test = place.join("recordings/cantilever");
+    let low = fs::read(place.join(LOW)).unwrap();
+    let text = fs::read_to_string(test.join("test.toml")).unwrap();
+    let text = text.replacen(
+        "file = \"high.wav\"",
+        "files = [\"high.wav\", \"more.wav\"]",
+        1,
+    );
+    assert!(text.contains("more.wav"), "{text}");
+    fs::write(test.join("test.toml"), text).unwrap();
+    let high = fs::read(test.join("high.wav")).unwrap();
+    // Another rate does not follow, and leaves no file.
+    let given = [
+        "recordings/cantilever/test.toml",
+        "--resume",
+        "--out",
+        "report",
+    ];
+    let mut other = low;
+    other[24..28].copy_from_slice(&5120_u32.to_le_bytes());
+    let error = refused(place, &given, &other);
+    assert!(
+        error.contains("5120 Hz, and high.wav has 2560 Hz"),
+        "{error}"
+    );
+    assert!(!test.join("more.wav").exists());
+    let ended = fed(place, &given, &high);
+    let printed = String::from_utf8(ended.stdout).unwrap();
+    assert_eq!(ended.status.code(), Some(0), "{printed}");
+    assert!(printed.starts_with("continuing more.wav"), "{printed}");
+    assert!(fs::read(test.join("more.wav")).unwrap() == high);
+    assert!(place.join("report/report.html").is_file());
+    // Taps of the earlier file are not reported again.
+    let reported = log(&test.join("more.listen.jsonl"));
+    let first = reported.iter().find(|line| line["news"] == "tap").unwrap();
+    // high.wav takes 25.5 s.
+    assert!(first["time"].as_f64().unwrap() > 25.0, "{first}");
+}
+
+#[test]
 fn regress_broken_streams_are_named_and_nothing_is_lost() {
     let folder = samples();
     let place = folder.path();

@@ -4,9 +4,9 @@
 usage: scripts/listen_check.py PROGRAM [--tests N] [--recordings FILE[:HAMMER] ...]
 
 Makes N recordings without tapjoint: a hammer and two accelerometers on a structure of five modes. Among the taps are double
-hits, weak hits, overloads, hits without an answer and records that are too short; some recordings have hum, a knocked table
-(the sensors move without a hit), or a hammer of the other sign. Plays each to `listen`, as it plays the given recordings.
-FILE:1 has its hammer in channel 1. Prints how many decisions after the last sample are those of `run`, how many were told
+hits, weak taps, overloads, taps without an answer and records that are too short; some recordings have hum, a knocked table
+(the sensors move without a tap), or a hammer of the other sign. Plays each to `listen`, as it plays the given recordings.
+FILE:1 has its hammer in channel 1. Prints how many decisions after the last sample are those of `run`, how many were reported
 while the recording went on, how many of these were revised later, and how many of the double hits that `run` rejects were
 rejected while it went on. Needs numpy.
 """
@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Time that names a hit (s).
+# Time that names a tap (s).
 NEAR = 0.05
 FREQUENCIES = np.array([45.0, 210.0, 560.0, 1150.0, 1900.0])
 
@@ -99,30 +99,30 @@ def played(program, source, hammer):
         run = json.loads((folder / "run.json").read_text())["recordings"][0]
         lines = [json.loads(line) for line in (folder / "copy.listen.jsonl").read_text().splitlines()]
     length = run["seconds"]
-    # A hit is named by its time, to 50 ms: its trigger moves a little as the threshold does.
-    told, live, revised = [], [], 0
+    # A tap is named by its time, to 50 ms: its trigger moves a little as the threshold does.
+    reported, live, revised = [], [], 0
     for line in lines:
         if line["news"] == "doubt":
             continue
         is_live = line["heard"] < length - 1e-6
         revised += is_live and line["news"] != "tap"
-        for lines_ in [told, live] if is_live else [told]:
+        for lines_ in [reported, live] if is_live else [reported]:
             lines_[:] = [other for other in lines_ if abs(other["time"] - line["time"]) > NEAR]
             if line["news"] != "gone":
                 lines_.append(line)
     taps = run["taps"]
     counts = {"taps": len(taps), "equal": 0, "live": 0, "revised": revised, "changed": 0, "doubles": 0, "doubles live": 0}
     for tap in taps:
-        own = [line for line in told if abs(line["time"] - tap["time"]) < NEAR]
+        own = [line for line in reported if abs(line["time"] - tap["time"]) < NEAR]
         counts["equal"] += len(own) == 1 and own[0]["accepted"] == tap["accepted"]
         early = [line for line in live if abs(line["time"] - tap["time"]) < NEAR]
         counts["live"] += bool(early)
         counts["changed"] += bool(early) and early[-1]["accepted"] != tap["accepted"]
         if is_double(tap.get("reason")):
-            # The last hit may end with the recording.
+            # The last tap may end with the recording.
             counts["doubles"] += bool(early)
             counts["doubles live"] += bool(early) and not early[-1]["accepted"]
-    counts["more"] = len(told) - len(taps)
+    counts["more"] = len(reported) - len(taps)
     return counts
 
 
@@ -159,7 +159,7 @@ def main():
     refused = sum(not isinstance(counts, dict) for counts in found)
     print(f"{len(found)} recordings, {refused} refused, {total['taps']} taps:")
     print(f"decisions after the last sample equal to those of run: {total['equal']} ({100 * total['equal'] / total['taps']:.2f} %)")
-    print(f"told while it went on: {total['live']}, revised while it went on: {total['revised']}, at the end: {total['changed']}")
+    print(f"reported while it went on: {total['live']}, revised while it went on: {total['revised']}, at the end: {total['changed']}")
     print(f"double hits that run rejects, rejected while it went on: {total['doubles live']} of {total['doubles']}")
     if total["equal"] < 0.995 * total["taps"] or total["doubles live"] < total["doubles"]:
         raise SystemExit(1)

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Measures how soon `tapjoint listen` judges a hit, and what a long stream costs.
+"""Measures how soon `tapjoint listen` judges a tap, and what a long stream costs.
 
 usage: scripts/listen_speed.py PROGRAM [--taps N] [--gap S] [--hours H] [--kills N]
 
 Makes a stream of 4 channels of 16 bit at 51.2 kHz: a hammer and three accelerometers on a structure of five modes, and a tap
 every S seconds. Feeds it to the program as fast as it would be recorded. A verdict is due when the record of 2 s has ended, or
-when the next hit comes. Prints the time from there to the line of the verdict (median and worst), the processor
+when the next tap comes. Prints the time from there to the line of the verdict (median and worst), the processor
 time in percent of one core, and the peak memory.
 
-With --hours the stream is fed as fast as the program takes it. Prints the time, the hits that were told, the peak memory at a
+With --hours the stream is fed as fast as the program takes it. Prints the time, the taps that were reported, the peak memory at a
 quarter, a half and the end, and whether all samples are in the files, bit for bit. A day takes 35 GB.
 
 With --kills the program is killed at random moments, and started again with --resume. Prints how much of what was fed is not in
@@ -80,12 +80,12 @@ def live(program, folder, taps, gap):
     hits = [gap * number + time_ for number, (_, time_) in enumerate(pieces)]
     stream = b"".join(piece for piece, _ in pieces)
     process = start(program, folder)
-    told = []
+    reported = []
 
     def listen():
         for line in process.stdout:
             if line.startswith(b"tap at"):
-                told.append((float(line.split()[2]), time.perf_counter()))
+                reported.append((float(line.split()[2]), time.perf_counter()))
 
     reader = threading.Thread(target=listen)
     reader.start()
@@ -105,10 +105,10 @@ def live(program, folder, taps, gap):
     delays = []
     for hit, end in zip(hits, ends):
         # The words have two decimals.
-        times = [when for heard, when in told if abs(heard - hit) < 0.02]
+        times = [when for heard, when in reported if abs(heard - hit) < 0.02]
         if times:
             delays.append(times[0] - begin - end)
-    print(f"{len(delays)} of {taps} hits were told")
+    print(f"{len(delays)} of {taps} taps were reported")
     print(f"verdict after the end of the record: median {1e3 * np.median(delays):.0f} ms, worst {1e3 * max(delays):.0f} ms")
     print(f"{100 * share:.1f} % of one core, peak memory {peak:.0f} MB")
 
@@ -138,8 +138,8 @@ def long(program, folder, hours, gap):
         time.sleep(0.05)
     reader.join()
     passed = time.perf_counter() - begin
-    told = sum(line.startswith(b"tap at") for line in lines)
-    print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, {told} of {count} hits told, peak memory {peak:.0f} MB")
+    reported = sum(line.startswith(b"tap at") for line in lines)
+    print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, {reported} of {count} taps reported, peak memory {peak:.0f} MB")
     print(lines[-1].decode().strip() if lines else "no answer")
     written = hashlib.sha256()
     files = sorted(folder.glob("taps*.wav"), key=lambda file: (len(file.name), file.name))

@@ -22,13 +22,14 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use log::Log;
+use recorder::Destination;
 use state::{States, Subject};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
-use stream::{Destination, End, Event, Source};
+use stream::{End, Event, Source};
 use target::{Target, bare_target, described_target};
 
 /// Record a stream of samples, and judge each tap as it comes.
@@ -424,7 +425,7 @@ impl Hearing<'_> {
             }
         }
         if !text.is_empty() {
-            // Who has closed standard output still wants the recording.
+            // The recording goes on where standard output was closed.
             let _ = self.terminal.say(&text);
         }
     }

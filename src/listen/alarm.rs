@@ -1,16 +1,16 @@
 //! Sudden rises of a signal, by its swing in short steps.
 
-/// A hit raises the swing of a step by this factor at least. Noise of 50 ms swings by a tenth more or less.
+/// A tap raises the swing of a step by this factor at least. Noise of 50 ms swings by a tenth more or less.
 const RISE: f64 = 1.5;
 /// Steps before the rise that are compared: as long as the least distance of two taps.
 const COMPARED: usize = 4;
 
-/// Watches for hits. A hit that it misses is found at the next look; a false alarm costs a look.
+/// Watches for taps. The next look finds a tap that it misses. A false alarm costs a look.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Alarm {
     /// Swings of the last steps, the newest last, of each channel.
     recent: Vec<Vec<f64>>,
-    /// Steps for which it stays silent: what rises so soon belongs to the same hit.
+    /// Steps for which it stays silent: what rises so soon belongs to the same tap.
     silent: usize,
 }
 
@@ -59,10 +59,10 @@ mod tests {
     }
 
     #[test]
-    fn prop_a_hit_is_one_alarm_wherever_its_step_begins() {
+    fn prop_a_tap_is_one_alarm_wherever_its_step_begins() {
         // The pulse lies in two steps.
         assert_eq!(alarms(&[1.0, 1.0, 4.0, 20.0, 9.0, 7.0, 5.0, 4.0]), [2]);
-        // A second hit while the first one rings.
+        // A second tap while the first one rings.
         let twice = [1.0, 20.0, 15.0, 12.0, 9.0, 7.0, 25.0, 20.0];
         assert_eq!(alarms(&twice), [1, 6]);
         // Any of several channels.

@@ -394,6 +394,15 @@ mod tests {
 
     const RATE: f64 = 5120.0;
 
+    fn settings() -> ListenSettings {
+        ListenSettings {
+            name: "taps.wav".to_owned(),
+            record: 1.0,
+            headers: None,
+            earlier: Vec::new(),
+        }
+    }
+
     /// A hammer pulse at each time (s) with its peak, and the decay of 118 Hz that it wakes.
     fn samples(seconds: f64, hits: &[(f64, f64)]) -> Vec<[f64; 2]> {
         let mut state = 7_u32;
@@ -427,12 +436,6 @@ mod tests {
             hammer: Some(ChannelRef::Number(1)),
             ..BareSettings::default()
         };
-        let settings = ListenSettings {
-            name: "taps.wav".to_owned(),
-            record: 1.0,
-            headers: None,
-            earlier: Vec::new(),
-        };
         let mut bytes = layout.wav_head(0);
         let mut listener = None;
         let mut all = Vec::new();
@@ -443,7 +446,7 @@ mod tests {
             std::fs::write(path, &bytes).unwrap();
             let listener = listener.get_or_insert_with(|| {
                 let growing = GrowingRecording::open(path).unwrap();
-                Listener::new(growing, RecordingPlan::Bare(&bare), settings.clone())
+                Listener::new(growing, RecordingPlan::Bare(&bare), settings())
             });
             while let Some(news) = listener.step().unwrap() {
                 let now = listener.seconds();
@@ -566,14 +569,8 @@ mod tests {
             hammer: Some(ChannelRef::Number(3)),
             ..BareSettings::default()
         };
-        let settings = ListenSettings {
-            name: "taps.wav".to_owned(),
-            record: 1.0,
-            headers: None,
-            earlier: Vec::new(),
-        };
         let growing = GrowingRecording::open(&path).unwrap();
-        let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings);
+        let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings());
         let problem = listener.step().unwrap_err().to_string();
         assert_eq!(
             problem,

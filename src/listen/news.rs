@@ -158,7 +158,7 @@ mod tests {
             has_ended: false,
             ..ringing.clone()
         };
-        let told = [
+        let words = [
             News::Tap(judged()),
             News::Tap(ringing),
             News::Tap(going_on),
@@ -168,9 +168,9 @@ mod tests {
             News::Gone { time: 4.9051 },
             News::Doubt("channel 2: every sample is 0".to_owned()),
         ];
-        let told = told.map(|news| news.to_string()).join("\n");
+        let words = words.map(|news| news.to_string()).join("\n");
         assert_eq!(
-            told,
+            words,
             "tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 0.42 % in 5.0 s\n\
              tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 12 % in 5.0 s. Wait \
              longer before the next tap.\n\

@@ -1,15 +1,26 @@
 //! The WAV files that take the samples of a stream.
 
-use super::stream::Destination;
 use crate::recording::PcmLayout;
 use anyhow::{Context, bail};
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Largest number of bytes of samples in one file. 1 GB: any program reads such a file, and 4 channels of 16 bits at
 /// 51.2 kHz take 43 minutes for it.
 const LARGEST: u64 = 1 << 30;
+
+/// Where the samples go.
+pub(super) struct Destination {
+    /// Name of the first file.
+    pub(super) first: PathBuf,
+    /// Names that belong to other recordings.
+    pub(super) reserved: Vec<PathBuf>,
+    /// Nothing more is written once this is set.
+    pub(super) stop: Arc<AtomicBool>,
+}
 
 /// Writes samples as they come. The sizes in the header are those of what is written, after every call: a process that is
 /// killed leaves a file that can be read.
@@ -161,7 +172,7 @@ mod tests {
         Destination {
             first: first.to_owned(),
             reserved,
-            stop: std::sync::Arc::default(),
+            stop: Arc::default(),
         }
     }
 

@@ -1,13 +1,12 @@
 //! The stream of samples, from standard input or a file, and the thread that writes it.
 
-use super::recorder::Recorder;
+use super::recorder::{Destination, Recorder};
 use crate::recording::{Format, PcmLayout, Recording, SampleForm};
 use anyhow::{Context, bail};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -51,16 +50,6 @@ pub(super) struct End {
     pub(super) rest: usize,
     /// Length that the header promises and that did not come (s).
     pub(super) missing: f64,
-}
-
-/// Where the samples go.
-pub(super) struct Destination {
-    /// Name of the first file.
-    pub(super) first: PathBuf,
-    /// Names that belong to other recordings.
-    pub(super) reserved: Vec<PathBuf>,
-    /// Nothing more is written once this is set.
-    pub(super) stop: Arc<AtomicBool>,
 }
 
 /// Writes the samples of a source in a thread of its own. It ends with the stream, or when it is stopped.

@@ -62,11 +62,6 @@ impl GrowingRecording {
         f64::from(self.source.sample_rate)
     }
 
-    /// Channels of the file.
-    pub fn channels(&self) -> usize {
-        self.source.channels
-    }
-
     /// Frames that were read so far.
     pub fn frames(&self) -> u64 {
         self.source.frames

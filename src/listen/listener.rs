@@ -3,20 +3,22 @@
 use crate::alarm::Alarm;
 use crate::news::{JudgedTap, News};
 use std::mem::discriminant;
+use std::ops::Range;
 use tapjoint_analysis::{PipelineError, RecordingPlan, TapsSoFar, taps_so_far};
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::quality::remedy_of;
 use tapjoint_signal::recording::{GrowingRecording, Recording, RecordingError};
 use tapjoint_signal::spectral::measure_decay;
-use tapjoint_signal::taps::{REACH, Tap, TapMemo, TapRemark, TapSource};
+use tapjoint_signal::taps::{REACH, Rejection, Tap, TapMemo, TapRemark, TapSource};
 
 /// Length of a step (s). A verdict waits for the end of its step.
 const STEP: f64 = 0.05;
-/// A record longer than this says no more of how far it rings down (s): a bound on memory.
-const LONGEST_DECAY: f64 = 10.0;
-/// Share of the band that the taps have to excite, or a harder tip is proposed.
+/// Of a longer record its beginning and its last half second are read for its decay (s): a bound on memory.
+const LONGEST_READ: f64 = 10.0;
+/// Share of the band that the taps have to excite, or a harder tip is proposed. 80 %: near the end of the band few modes lie.
+/// `run` judges the fall of the force itself (`limits::FORCE_FALL`).
 const ENOUGH_OF_BAND: f64 = 0.8;
-/// Noise before the taps is read over this length (s).
+/// Noise before the taps is read over this length (s). 1 s: a thousand samples and more, and a bound on memory.
 const QUIET: f64 = 1.0;
 
 /// Reasons for which listening ends.
@@ -47,9 +49,19 @@ pub struct ListenSettings {
 /// A tap that was reported.
 #[derive(Debug, Clone, PartialEq)]
 struct Reported {
+    /// Time of its trigger (s).
     time: f64,
-    /// Why it does not count.
-    reason: Option<String>,
+    /// Why it does not count; `None` = it counts.
+    rejection: Option<Rejection>,
+}
+
+impl From<&Tap> for Reported {
+    fn from(tap: &Tap) -> Self {
+        Self {
+            time: tap.time,
+            rejection: tap.rejection.clone(),
+        }
+    }
 }
 
 /// Listens to one recording.
@@ -59,17 +71,17 @@ pub struct Listener<'a> {
     growing: GrowingRecording,
     /// Frames of a step.
     step: u64,
-    /// Channels on which hits are heard (0-based); not known before the first look.
+    /// Channels on which taps are heard (0-based); not known before the first look.
     watched: Vec<usize>,
     alarm: Alarm,
     memo: TapMemo,
-    /// Frame at which the record of the last tap has ended, if no other hit comes first.
+    /// Frame at which the record of the last tap has ended, if no other tap comes first.
     due: Option<u64>,
     reported: Vec<Reported>,
     /// Code and channel of the doubts that were reported.
     doubts: Vec<(&'static str, Option<usize>)>,
-    /// The remarks that were reported: what each is about.
-    remarks: Vec<String>,
+    /// The remarks that were reported.
+    remarks: Vec<TapRemark>,
     /// What the last look has found.
     latest: Option<TapsSoFar>,
 }
@@ -125,15 +137,13 @@ impl<'a> Listener<'a> {
         let hears = self.alarm.hears(&swings);
         let is_over = self.due.is_some_and(|due| due <= now);
         let mut news = Vec::new();
-        // The next hit ends the record of the one before.
+        // The next tap ends the record of the one before.
         if is_over || hears && self.due.is_some() {
             self.due = None;
             news = self.look(true)?;
         }
         if hears {
-            let record = self.latest.as_ref().map(|found| self.record(found));
-            let record = record.unwrap_or(self.settings.record);
-            self.due = Some(now + (record * self.growing.sample_rate()) as u64);
+            self.due = Some(now + self.record_frames());
         }
         Ok(Some(news))
     }
@@ -165,10 +175,7 @@ impl<'a> Listener<'a> {
         self.settings.earlier.push(finished.renamed(name));
         self.growing = next;
         // The record of a tap may end in the next file.
-        let record = self.latest.as_ref().map(|found| self.record(found));
-        let record = record.unwrap_or(self.settings.record);
-        let waiting = self.due.is_some();
-        self.due = waiting.then(|| (record * self.growing.sample_rate()) as u64);
+        self.due = self.due.map(|_| self.record_frames());
         Ok(news)
     }
 
@@ -194,14 +201,13 @@ impl<'a> Listener<'a> {
     pub fn accepted(&self) -> usize {
         self.reported
             .iter()
-            .filter(|reported| reported.reason.is_none())
+            .filter(|reported| reported.rejection.is_none())
             .count()
     }
 
     /// Length of what was heard, of all files (s).
     pub fn seconds(&self) -> f64 {
-        let earlier = self.settings.earlier.iter().map(Recording::duration);
-        earlier.sum::<f64>() + self.growing.frames() as f64 / self.growing.sample_rate()
+        self.start() + self.growing.frames() as f64 / self.growing.sample_rate()
     }
 
     /// Returns the recording with the names, units and scales that are known from elsewhere.
@@ -235,7 +241,7 @@ impl<'a> Listener<'a> {
         }
         let taps = &found.taps.taps;
         let mut reported = Vec::with_capacity(taps.len());
-        let start = self.seconds() - self.growing.frames() as f64 / self.growing.sample_rate();
+        let start = self.start();
         let mut waiting = None;
         // Both are in order of time.
         let mut earlier = self.reported.iter().peekable();
@@ -246,9 +252,7 @@ impl<'a> Listener<'a> {
             let before = earlier.next_if(|one| one.time <= tap.time + REACH);
             if self.latest.is_none() && tap.time < start {
                 // It was reported when its file was recorded.
-                let reason = tap.rejection.as_ref().map(ToString::to_string);
-                let time = tap.time;
-                reported.push(Reported { time, reason });
+                reported.push(tap.into());
                 continue;
             }
             let is_last = place + 1 == taps.len() && tap.time >= start;
@@ -258,17 +262,15 @@ impl<'a> Listener<'a> {
                 continue;
             }
             let has_ended = !(is_growing && is_last);
-            let reason = tap.rejection.as_ref().map(ToString::to_string);
             match before {
                 None => news.push(News::Tap(judged(&found, tap, has_ended)?)),
                 // Numbers in the reason move with every tap.
-                Some(before) if before.reason.is_none() != reason.is_none() => {
+                Some(before) if before.rejection.is_none() != tap.accepted() => {
                     news.push(News::Revised(judged(&found, tap, has_ended)?));
                 }
                 Some(_) => {}
             }
-            let time = tap.time;
-            reported.push(Reported { time, reason });
+            reported.push(tap.into());
         }
         news.extend(earlier.map(|one| News::Gone { time: one.time }));
         if let Some(time) = waiting {
@@ -301,15 +303,10 @@ impl<'a> Listener<'a> {
                 TapRemark::FileWithoutTap { .. } | TapRemark::AllOverloaded { .. } => true,
                 _ => false,
             };
-            let kind = match remark {
-                TapRemark::NoTapThere { time, .. } => format!("{time}"),
-                TapRemark::FileWithoutTap { file } => file.clone(),
-                other => format!("{:?}", discriminant(other)),
-            };
             let is_held_back = is_growing && is_early;
-            if !is_held_back && !self.remarks.contains(&kind) {
+            if !is_held_back && !self.remarks.iter().any(|other| is_same(remark, other)) {
                 news.push(News::Doubt(remark.to_string()));
-                self.remarks.push(kind);
+                self.remarks.push(remark.clone());
             }
         }
         news
@@ -320,11 +317,37 @@ impl<'a> Listener<'a> {
         self.settings.record.max(found.wanted.unwrap_or(0.0))
     }
 
+    /// The same in frames, by what the last look has found.
+    fn record_frames(&self) -> u64 {
+        let record = self.latest.as_ref().map(|found| self.record(found));
+        let record = record.unwrap_or(self.settings.record);
+        (record * self.growing.sample_rate()) as u64
+    }
+
+    /// Time at which the file that grows begins (s).
+    fn start(&self) -> f64 {
+        self.settings.earlier.iter().map(Recording::duration).sum()
+    }
+
     /// Returns true where so much of a tap's record is there as is waited for.
     fn is_long_enough(&self, found: &TapsSoFar, tap: &Tap) -> bool {
         let record = self.record(found);
         // The alarm comes up to two steps after the trigger.
         found.recording.duration() - tap.time >= record - 2.0 * STEP
+    }
+}
+
+/// Returns true for two remarks about the same thing; their numbers move from look to look.
+fn is_same(one: &TapRemark, other: &TapRemark) -> bool {
+    match (one, other) {
+        (TapRemark::NoTapThere { time, .. }, TapRemark::NoTapThere { time: other, .. })
+        | (TapRemark::StillRejected { time, .. }, TapRemark::StillRejected { time: other, .. }) => {
+            time == other
+        }
+        (TapRemark::FileWithoutTap { file }, TapRemark::FileWithoutTap { file: other }) => {
+            file == other
+        }
+        _ => discriminant(one) == discriminant(other),
     }
 }
 
@@ -349,7 +372,7 @@ fn judged(found: &TapsSoFar, tap: &Tap, has_ended: bool) -> Result<JudgedTap, Re
 }
 
 /// Amplitude at the end of a tap's record over the largest one (1), of the response that keeps most; `None` where all have
-/// sunk into their noise.
+/// sunk into their noise. Of a long record its beginning and its end are read.
 fn remaining(found: &TapsSoFar, tap: &Tap) -> Result<Option<f64>, RecordingError> {
     let recording = &found.recording;
     let (TapSource::Hammer {
@@ -358,28 +381,38 @@ fn remaining(found: &TapsSoFar, tap: &Tap) -> Result<Option<f64>, RecordingError
     }
     | TapSource::Responses(channels)) = &found.source;
     let frames = |seconds: f64| (seconds * recording.sample_rate()) as u64;
-    let record = tap.usable_from()
-        ..tap
-            .record
-            .end
-            .min(tap.usable_from() + frames(LONGEST_DECAY));
     let quiet = &found.taps.quiet;
     let quiet = quiet.start.max(quiet.end.saturating_sub(frames(QUIET)))..quiet.end;
+    let (start, end) = (tap.usable_from(), tap.record.end);
+    // The decay is that from the largest to the last of twenty pieces.
+    let piece = frames(LONGEST_READ / 20.0);
+    let is_long = end - start > 20 * piece;
+    let first_end = if is_long { start + 19 * piece } else { end };
     let mut most = None;
     for &channel in channels {
-        let about_mean = |frames: &std::ops::Range<u64>| -> Result<Vec<f64>, RecordingError> {
-            let mean = recording.mean_at(channel, frames.start);
-            let mut samples = recording.read(channel, frames.clone())?;
-            samples.iter_mut().for_each(|sample| *sample -= mean);
-            Ok(samples)
-        };
-        let noise = root_mean_square(&about_mean(&quiet)?);
-        let decay = measure_decay(&about_mean(&record)?, noise);
+        let noise = root_mean_square(&about_mean(recording, channel, quiet.clone())?);
+        let mut samples = about_mean(recording, channel, start..first_end)?;
+        if is_long {
+            samples.extend(about_mean(recording, channel, end - piece..end)?);
+        }
+        let decay = measure_decay(&samples, noise);
         if decay.remaining > decay.noise {
             most = Some(decay.remaining.max(most.unwrap_or(0.0)));
         }
     }
     Ok(most)
+}
+
+/// Samples of a channel in these frames about its mean.
+fn about_mean(
+    recording: &Recording,
+    channel: usize,
+    frames: Range<u64>,
+) -> Result<Vec<f64>, RecordingError> {
+    let mean = recording.mean_at(channel, frames.start);
+    let mut samples = recording.read(channel, frames)?;
+    samples.iter_mut().for_each(|sample| *sample -= mean);
+    Ok(samples)
 }
 
 #[cfg(test)]
@@ -389,10 +422,16 @@ mod tests {
     use std::path::Path;
     use tapjoint_analysis::BareSettings;
     use tapjoint_description::ChannelRef;
-    use tapjoint_signal::recording::{PcmLayout, ReadSettings, SampleForm};
-    use tapjoint_signal::taps::Rejection;
+    use tapjoint_signal::recording::{Channel, PcmLayout, ReadSettings, SampleForm};
 
     const RATE: f64 = 5120.0;
+
+    fn bare(hammer: usize) -> BareSettings {
+        BareSettings {
+            hammer: Some(ChannelRef::Number(hammer)),
+            ..BareSettings::default()
+        }
+    }
 
     fn settings() -> ListenSettings {
         ListenSettings {
@@ -432,10 +471,7 @@ mod tests {
     #[expect(clippy::disallowed_methods, reason = "the test is the recorder")]
     fn heard(samples: &[[f64; 2]], path: &Path, piece: usize) -> Vec<(f64, News)> {
         let layout = PcmLayout::new(RATE as u32, 2, SampleForm::F64).unwrap();
-        let bare = BareSettings {
-            hammer: Some(ChannelRef::Number(1)),
-            ..BareSettings::default()
-        };
+        let bare = bare(1);
         let mut bytes = layout.wav_head(0);
         let mut listener = None;
         let mut all = Vec::new();
@@ -466,19 +502,14 @@ mod tests {
         )
         .unwrap();
         let whole = whole.taps.taps.iter();
-        let whole: Vec<Reported> = whole
-            .map(|tap| Reported {
-                time: tap.time,
-                reason: tap.rejection.as_ref().map(ToString::to_string),
-            })
-            .collect();
+        let whole: Vec<Reported> = whole.map(Reported::from).collect();
         assert_eq!(listener.reported, whole);
         all
     }
 
     fn rejection(news: &News) -> Option<&Rejection> {
         match news {
-            News::Tap(hit) | News::Revised(hit) => hit.rejection.as_ref(),
+            News::Tap(tap) | News::Revised(tap) => tap.rejection.as_ref(),
             _ => None,
         }
     }
@@ -494,7 +525,7 @@ mod tests {
         let reported: Vec<(f64, f64)> = all
             .iter()
             .map(|(now, news)| match news {
-                News::Tap(hit) => (*now, hit.time),
+                News::Tap(tap) => (*now, tap.time),
                 other => panic!("{other}"),
             })
             .collect();
@@ -519,6 +550,28 @@ mod tests {
         for piece in [1000, 41_000] {
             assert_eq!(heard(&samples, &path, piece), all, "pieces of {piece}");
         }
+    }
+
+    #[test]
+    fn val_a_long_record_is_read_to_its_end() {
+        let rate = 1000.0;
+        let samples: Vec<f64> = (0..30_000)
+            .map(|n| (-0.1 * f64::from(n) / rate).exp() * (TAU * 118.0 * f64::from(n) / rate).sin())
+            .collect();
+        let channel = Channel {
+            samples: [vec![0.0; 2000], samples].concat(),
+            ..Channel::default()
+        };
+        let recording = Recording::from_samples("taps", rate, vec![channel]).unwrap();
+        let plan = RecordingPlan::Bare(&BareSettings::default());
+        let mut memo = TapMemo::default();
+        let found = taps_so_far(recording, &plan, false, &mut memo).unwrap();
+        let decay = remaining(&found, &found.taps.taps[0])
+            .unwrap()
+            .expect("it rings");
+        // From the middle of the first to that of the last half second: exp(-0.1 x 29.5).
+        let wanted = (-0.1_f64 * 29.5).exp();
+        assert!((decay / wanted - 1.0).abs() < 0.01, "{decay} for {wanted}");
     }
 
     #[test]
@@ -565,10 +618,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("taps.wav");
         assert_eq!(heard(&samples(3.0, &[]), &path, 400), []);
-        let bare = BareSettings {
-            hammer: Some(ChannelRef::Number(3)),
-            ..BareSettings::default()
-        };
+        let bare = bare(3);
         let growing = GrowingRecording::open(&path).unwrap();
         let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings());
         let problem = listener.step().unwrap_err().to_string();

@@ -17,7 +17,9 @@ use super::terminal::Terminal;
 use crate::listen::{ListenError, ListenSettings, Listener, News};
 use crate::pipeline::{BareSettings, RecordingPlan, described_reading};
 use crate::quantity::{Dimension, parse_quantity};
-use crate::recording::{Format, GrowingRecording, PcmLayout, ReadSettings, Recording, SampleForm};
+use crate::recording::{
+    Format, GrowingRecording, MAX_CHANNELS, PcmLayout, ReadSettings, Recording, SampleForm,
+};
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
@@ -32,14 +34,15 @@ use std::time::Duration;
 use stream::{End, Event, Source};
 use target::{Target, bare_target, described_target};
 
-/// Record a stream of samples, and judge each tap as it comes.
+/// Record a stream of samples, and judge each tap while you go on tapping.
 ///
-/// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is a test description (.toml), of
-/// which the first [[recording]] without a file is written, or the WAV file to be written. Says after each tap
-/// whether it counts and why, then what all taps give so far. Ctrl-C ends the recording. Once no recording is missing, the
+/// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is the WAV file to be written, or a
+/// test description (.toml). Of a description the first [[recording]] without a file is written. Says after each tap
+/// whether it counts and why, then what all taps give so far. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing, the
 /// test is run as by `tapjoint run`, with the options of `run`; --json is written then.
 #[derive(Debug, Args)]
 #[command(
+    mut_arg("file", |file| file.help("Test description (.toml), or the WAV file to be written").long_help(None)),
     after_help = "Examples:\n  arecord -f S16_LE -r 48000 -c 2 -t raw | tapjoint listen test.toml --rate 48000 --channels 2 --format s16le\n  rec -q -t wav - | tapjoint listen taps.wav --hammer 1\n  tapjoint listen test.toml --replay low.wav"
 )]
 pub(super) struct ListenArguments {
@@ -68,13 +71,13 @@ pub(super) struct ListenArguments {
     /// Taps that are wanted in each recording
     #[arg(long, value_name = "N", default_value = "5", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     taps: usize,
-    /// A tap is judged so long after it, or when the next one comes; a described `block` may need longer (s)
+    /// Time from a tap to its verdict (s). The next tap shortens it, and a described `block` may lengthen it
     #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
     record: f64,
 }
 
 /// As many as a recording may have.
-const MOST_CHANNELS: u64 = 4096;
+const MOST_CHANNELS: u64 = MAX_CHANNELS as u64;
 
 /// Speed of a replay: seconds of the recording in a second; `None` = as fast as possible.
 type Speed = Option<f64>;
@@ -191,8 +194,12 @@ pub(super) fn run(
             format!("\"{}\"", name.display())
         });
         let names = names.collect::<Vec<_>>().join(", ");
+        let place = match &described {
+            Some(_) => "the description",
+            None => "a description (`tapjoint init` prints one)",
+        };
         terminal.say(&format!(
-            "one recording in {} files: write files = [{names}] in the description, then run the test\n",
+            "one recording in {} files, no report yet: write files = [{names}] in {place}, then run the test\n",
             heard.files.len()
         ))?;
         return Ok(Outcome::of(heard.accepted > 0));
@@ -276,7 +283,7 @@ fn listen(
             earlier: opened(&target.earlier)?,
         },
         listener: None,
-        log: Some(Log::beside(&first)),
+        log: aside.is_none().then(|| Log::beside(&first)),
         states,
         wanted: arguments.taps,
         files: target.earlier.clone(),
@@ -328,7 +335,7 @@ struct Hearing<'a> {
     settings: ListenSettings,
     /// `None` before the first samples.
     listener: Option<Listener<'a>>,
-    /// `None` once it could not be written.
+    /// `None` of a recording that is only played, and once it could not be written.
     log: Option<Log>,
     /// `None` where no results are wanted between the taps.
     states: Option<States>,
@@ -413,7 +420,7 @@ impl Hearing<'_> {
                 missing => format!("{missing} more are wanted"),
             };
             let reach = listener.reach().map_or(String::new(), |(reach, end)| {
-                format!("; a harder tip: the taps excite up to {reach:.0} Hz, and the band ends at {end:.0} Hz")
+                format!("; take a harder tip: the taps excite up to {reach:.0} Hz of a band to {end:.0} Hz")
             });
             let count = match accepted {
                 1 => "1 tap counts".to_owned(),

@@ -88,7 +88,7 @@ impl fmt::Display for News {
             News::Revised(tap) => write!(f, "tap at {:.2} s is now {tap}", tap.time)?,
             News::Gone { time } => write!(
                 f,
-                "the event at {time:.2} s was no tap, as later samples show"
+                "tap at {time:.2} s withdrawn: later samples show that it was none"
             )?,
             News::Doubt(text) => return write!(f, "doubt: {text}"),
         }
@@ -180,7 +180,7 @@ mod tests {
              shorter.\n\
              tap at 4.91 s is now accepted by hand in spite of a fault: double hit: a second excursion of 34 % after 31.2 \
              ms (limit 10 %): peak 18.2\n\
-             the event at 4.91 s was no tap, as later samples show\n\
+             tap at 4.91 s withdrawn: later samples show that it was none\n\
              doubt: channel 2: every sample is 0"
         );
     }

@@ -1,6 +1,6 @@
 //! The WAV files that take the samples of a stream.
 
-use crate::recording::PcmLayout;
+use crate::recording::{MOST_FILES, PcmLayout};
 use anyhow::{Context, bail};
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -127,7 +127,7 @@ fn next_file(
     reserved: &[PathBuf],
     layout: &PcmLayout,
 ) -> anyhow::Result<(PathBuf, File)> {
-    for number in 1..=MOST_PARTS {
+    for number in 1..=MOST_FILES {
         let path = part(first, number);
         if reserved.contains(&path) {
             continue;
@@ -146,13 +146,10 @@ fn next_file(
         }
     }
     bail!(
-        "{}: has {MOST_PARTS} files already; give another name",
+        "{}: has {MOST_FILES} files already; give another name",
         first.display()
     )
 }
-
-/// Most files of a recording that is listened to: a day of 4 channels at 51.2 kHz and 32 bits has 66.
-pub(super) const MOST_PARTS: usize = 200;
 
 /// Returns the name of a file of a recording, from 1: taps.wav, taps-2.wav.
 pub(super) fn part(first: &Path, number: usize) -> PathBuf {

@@ -2,7 +2,8 @@
 
 use super::super::input::TestFile;
 use super::super::place::{Place, is_description};
-use super::recorder::{MOST_PARTS, part};
+use super::recorder::part;
+use crate::recording::MOST_FILES;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -130,7 +131,7 @@ fn resumed(
     reserved: Vec<PathBuf>,
 ) -> anyhow::Result<Target> {
     let first = earlier[0].clone();
-    for number in 2..=MOST_PARTS {
+    for number in 2..=MOST_FILES {
         let path = part(&first, number);
         if reserved.contains(&path) {
             continue;
@@ -149,7 +150,7 @@ fn resumed(
         }
     }
     bail!(
-        "{}: has {MOST_PARTS} files already; record into another file",
+        "{}: has {MOST_FILES} files already; record into another file",
         first.display()
     )
 }

@@ -213,9 +213,9 @@ pub fn remedy_of(rejection: &Rejection) -> Option<&'static str> {
         Rejection::Overload(_) => Some(Check::Overload.remedy()),
         Rejection::TooWeak { .. } => Some(Check::WeakTap.remedy()),
         Rejection::NextTooSoon { .. } => Some(Check::Decay.remedy()),
-        Rejection::NoResponse => Some(
-            "Nothing needs to be done where it was no hit; else check the sensors and their cables.",
-        ),
+        Rejection::NoResponse => {
+            Some("If it was no tap, do nothing. Otherwise check the sensors and their cables.")
+        }
         Rejection::CutOff { .. } => {
             Some("Let the recording go on until the structure has come to rest.")
         }

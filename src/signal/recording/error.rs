@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io;
 
 /// More channels than this are taken for a damaged header; the largest front ends have hundreds.
-const MAX_CHANNELS: usize = 4096;
+pub const MAX_CHANNELS: usize = 4096;
 
 /// Error of opening, reading or writing a recording: the file, and the line where there is one;
 /// what was found, what is allowed, what to do. Poor data are [`RecordingWarning`]s instead.

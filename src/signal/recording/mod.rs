@@ -44,7 +44,7 @@ mod units;
 mod wav;
 mod write;
 
-pub use error::{RecordingError, RecordingWarning};
+pub use error::{MAX_CHANNELS, RecordingError, RecordingWarning};
 pub use growing::GrowingRecording;
 pub use health::{ChannelHealth, EqualRun};
 pub use joined::MOST_FILES;

@@ -6,8 +6,8 @@ use super::wav::{WavHead, read_head};
 
 /// Longest head of a WAV stream (bytes). Recorders put some kilobytes of text there.
 const LONGEST_HEAD: usize = 1 << 20;
-/// From this size on a stream's header promises the largest number that its writer knows, and not its length. sox writes the
-/// multiple of a frame below 0x7ffff000; a frame has at most 64 kB.
+/// From this size on (bytes) the length in a stream's header is a placeholder. sox writes the last whole frame below 0x7ffff000. A
+/// frame has at most 32 kB; 64 kB leave room.
 const NO_PROMISE: u32 = 0x7fff_f000 - (1 << 16);
 
 /// Form of the samples of a stream, little end first.

@@ -26,7 +26,7 @@ pub(super) struct Facts {
     overload: Option<Overload>,
 }
 
-/// Frames of an event's record. It ends with the pre-trigger of the next hit, or with the file.
+/// Frames of an event's record. It ends with the pre-trigger of the next tap, or with the file.
 pub(super) fn record_of(
     recording: &Recording,
     events: &[Event],

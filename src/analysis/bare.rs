@@ -10,6 +10,7 @@ use tapjoint_description::{ChannelRef, ReadBy, WindowKind};
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
+use tapjoint_signal::taps::TapsByHand;
 
 /// Settings for a file without a description.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,6 +21,8 @@ pub struct BareSettings {
     pub read: ReadSettings,
     /// True to keep the decay of clipped taps; `None` = not stated, they are rejected.
     pub keep_overload: Option<bool>,
+    /// Taps that are accepted or rejected by hand.
+    pub by_hand: TapsByHand,
     /// Block size (samples); `None` = the longest that fits the shortest tap.
     pub block: Option<usize>,
     /// Band (Hz); `None` = from 0 to sample rate/2.56.
@@ -69,6 +72,7 @@ impl BareSettings {
         measure.band = self.band;
         measure.window = self.window;
         measure.taps.keep_overload = self.keep_overload.unwrap_or(false);
+        measure.taps.by_hand = self.by_hand.clone();
         measure.reading = self.reading;
     }
 
@@ -79,6 +83,8 @@ impl BareSettings {
             ("--sample-rate", self.read.sample_rate.is_some()),
             ("--time-unit", self.read.time_unit.is_some()),
             ("--overload", self.keep_overload.is_some()),
+            ("--accept-taps", !self.by_hand.accept.is_empty()),
+            ("--reject-taps", !self.by_hand.reject.is_empty()),
             ("--block", self.block.is_some()),
             ("--window", self.window.is_some()),
         ];

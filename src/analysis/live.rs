@@ -5,7 +5,7 @@ use super::measurement::{MeasureError, MeasureSettings, lines_for};
 use super::wiring::{PipelineError, bare_wiring, described_settings, described_wiring};
 use tapjoint_description::{RecordingDescription, TestDescription};
 use tapjoint_signal::recording::Recording;
-use tapjoint_signal::taps::{TapMemo, TapSource, Taps, find_taps_again};
+use tapjoint_signal::taps::{TapMemo, TapSource, Taps, TapsByHand, find_taps_again};
 
 /// What is known of a recording before it begins.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +23,16 @@ pub enum RecordingPlan<'a> {
     Bare(&'a BareSettings),
 }
 
+impl RecordingPlan<'_> {
+    /// The taps that are accepted or rejected by hand before the recording begins.
+    pub fn by_hand(&self) -> TapsByHand {
+        match self {
+            Self::Described { recording, .. } => recording.by_hand.clone(),
+            Self::Bare(bare) => bare.by_hand.clone(),
+        }
+    }
+}
+
 /// The taps of a recording so far.
 #[derive(Debug, Clone)]
 pub struct TapsSoFar {
@@ -30,6 +40,8 @@ pub struct TapsSoFar {
     pub recording: Recording,
     /// Channels on which taps were looked for.
     pub source: TapSource,
+    /// The same channels with the names of their sensors, the hammer first.
+    pub names: Vec<(usize, String)>,
     /// The taps. The record of the last one may not have ended.
     pub taps: Taps,
     /// Unit of their peaks; `None` where it is not known.
@@ -40,14 +52,15 @@ pub struct TapsSoFar {
     pub wanted: Option<f64>,
 }
 
-/// Finds the taps of a recording as the whole chain does. The end of one that `is_growing` cuts off no tap. `memo` holds
-/// what was found in it before.
+/// Finds the taps of a recording as the whole chain does, with these decisions `by_hand` in place of those of the plan. The
+/// end of a recording that `is_growing` cuts off no tap. `memo` holds what was found in it before, with the same decisions.
 ///
 /// # Errors
 /// An unknown channel, an unreadable recording, a band or block that does not fit.
 pub fn taps_so_far(
     mut recording: Recording,
     plan: &RecordingPlan<'_>,
+    by_hand: &TapsByHand,
     is_growing: bool,
     memo: &mut TapMemo,
 ) -> Result<TapsSoFar, PipelineError> {
@@ -80,8 +93,10 @@ pub fn taps_so_far(
     })?;
     let mut limits = settings.tap_settings(&lines);
     limits.is_growing = is_growing;
+    limits.by_hand = by_hand.clone();
     let taps = find_taps_again(&recording, &settings.source, &limits, memo)?;
     Ok(TapsSoFar {
+        names: wiring.names(),
         peak_unit: wiring.tap_unit(),
         source: settings.source,
         taps,

@@ -19,7 +19,7 @@ use tapjoint_description::{
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::taps::{TapSettings, TapSource, TapsByHand, find_taps};
+use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
 
 /// Reasons for which an analysis stops.
 #[derive(Debug, thiserror::Error)]
@@ -159,10 +159,7 @@ pub(super) fn described_settings(
     settings.band = description.band;
     settings.block = description.block;
     settings.taps.keep_overload = description.keep_overload;
-    settings.taps.by_hand = TapsByHand {
-        accept: description.accept_taps.clone(),
-        reject: description.reject_taps.clone(),
-    };
+    settings.taps.by_hand = description.by_hand.clone();
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
     settings.poles = poles_of(test, description);
@@ -452,6 +449,14 @@ impl Wiring {
         let mut responses = self.responses.iter();
         let is_common = responses.all(|(_, other)| other.unit == first.unit);
         first.unit.clone().filter(|_| is_common)
+    }
+
+    /// Every channel with the name of its sensor, or "hammer".
+    pub(super) fn names(&self) -> Vec<(usize, String)> {
+        let responses = self.responses.iter();
+        let responses = responses.map(|(channel, response)| (*channel, response.name.clone()));
+        let hammer = self.hammer.map(|channel| (channel, "hammer".to_owned()));
+        hammer.into_iter().chain(responses).collect()
     }
 
     /// Every channel with its unit.

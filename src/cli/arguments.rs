@@ -12,12 +12,13 @@ use crate::recording::{
 };
 use crate::spectral::{FrfEstimator, LEAST_BLOCK, MOST_BLOCK};
 use crate::structure::{JointStiffness, MEASURED_LIMIT};
-use crate::taps::TapSettings;
-use anyhow::{Context, anyhow, bail};
+use crate::taps::{TapSettings, TapsByHand};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 /// Choice of how much is printed.
 #[derive(Debug, Args)]
@@ -146,6 +147,74 @@ pub(super) struct RecordingArguments {
     pub(super) overload: Option<bool>,
 }
 
+/// Taps of a bare recording that are chosen by hand.
+#[derive(Debug, Args)]
+pub(super) struct TapArguments {
+    /// Times of taps to use whatever their faults, as the table of taps shows them, such as 4.91,12.31 (s)
+    #[arg(long, value_name = "S,S", value_delimiter = ',', value_parser = tap_time)]
+    accept_taps: Vec<f64>,
+    /// Times of taps to leave out, as the table of taps shows them (s)
+    #[arg(long, value_name = "S,S", value_delimiter = ',', value_parser = tap_time)]
+    reject_taps: Vec<f64>,
+    /// Decisions by hand of `listen`, in place of both.
+    #[arg(skip)]
+    pub(super) decided: OnceLock<TapsByHand>,
+}
+
+impl TapArguments {
+    /// Returns the decisions by hand.
+    pub(super) fn by_hand(&self) -> TapsByHand {
+        let decided = self.decided.get().cloned();
+        decided.unwrap_or_else(|| TapsByHand {
+            accept: self.accept_taps.clone(),
+            reject: self.reject_taps.clone(),
+        })
+    }
+
+    /// Refuses decisions about more than one recording.
+    ///
+    /// # Errors
+    /// There are some, and so many files.
+    pub(super) fn check(&self, files: usize) -> anyhow::Result<()> {
+        ensure!(
+            files == 1 || self.by_hand() == TapsByHand::default(),
+            "--accept-taps and --reject-taps name taps of one recording, and there are {files}; write a description with \
+             `accept_taps` and `reject_taps` in each [[recording]]"
+        );
+        Ok(())
+    }
+}
+
+/// Parses a wanted accuracy (1).
+pub(super) fn accuracy(text: &str) -> Result<f64, String> {
+    share(text, 1.0, "a share such as \"5 %\" or 0.05")
+}
+
+/// Parses a share between 0 and a limit.
+pub(super) fn share(text: &str, limit: f64, example: &str) -> Result<f64, String> {
+    let value = parse_quantity(text, Dimension::Ratio).map_err(|error| error.to_string())?;
+    if value > 0.0 && value < limit {
+        return Ok(value);
+    }
+    Err(format!(
+        "{} % is outside 0 to {} %; give {example}",
+        100.0 * value,
+        100.0 * limit
+    ))
+}
+
+/// Parses the time of a tap (s).
+fn tap_time(text: &str) -> Result<f64, String> {
+    let seconds = parse_quantity(text, Dimension::Time).map_err(|error| error.to_string())?;
+    match (0.0..=MOST_SECONDS).contains(&seconds) {
+        true => Ok(seconds),
+        false => Err(format!("{seconds} s; give 0 to {MOST_SECONDS:e} s")),
+    }
+}
+
+/// Latest time of a tap (s), as in descriptions: four months.
+const MOST_SECONDS: f64 = 1e7;
+
 impl RecordingArguments {
     /// Returns the settings of the readers.
     pub(super) fn settings(&self) -> ReadSettings {
@@ -175,6 +244,7 @@ impl RecordingArguments {
             hammer: self.hammer.clone(),
             read: self.settings(),
             keep_overload: self.overload,
+            by_hand: TapsByHand::default(),
             block: spectrum.block,
             band: spectrum.zoom,
             window: spectrum.window,

@@ -2,7 +2,8 @@
 
 use super::Outcome;
 use super::arguments::{
-    RecordingArguments, SpectrumSettings, channel_scale, estimator, response_form, sensor_kind,
+    RecordingArguments, SpectrumSettings, TapArguments, channel_scale, estimator, response_form,
+    sensor_kind,
 };
 use super::input::{TestFile, check_file, read_test, stem};
 use super::output::OutputFile;
@@ -13,8 +14,8 @@ use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
 use crate::pipeline::{
-    Analysis, Frf, FrfSettings, IdentifySettings, MeasureSettings, Response, Stage, Watch, Wiring,
-    Work, channel_of, frfs_of, refuse_for_functions, run_wired, si_unit,
+    Analysis, BareSettings, Frf, FrfSettings, IdentifySettings, MeasureSettings, Response, Stage,
+    Watch, Wiring, Work, channel_of, frfs_of, refuse_for_functions, run_wired, si_unit,
 };
 use crate::recording::{Recording, UffFormat};
 use crate::report::{frf_document, render_frf_csv, render_frf_picture, render_frf_uff};
@@ -38,6 +39,8 @@ pub(super) struct FrfArguments {
     file: PathBuf,
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    taps: TapArguments,
     /// Channel of a sensor, by number or name; repeat it for more sensors; default: all channels but
     /// the hammer's
     #[arg(long, value_name = "CH")]
@@ -112,6 +115,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         ("--scale-sensor", !arguments.scale_sensor.is_empty()),
     ];
     if is_description(file) {
+        let by_hand = arguments.taps.by_hand();
         let described = [
             ("--hammer", bare.hammer.is_some()),
             ("--sample-rate", bare.sample_rate.is_some()),
@@ -119,6 +123,8 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
             ("--values", bare.values.is_some()),
             ("--variable", !bare.variable.is_empty()),
             ("--overload", bare.overload.is_some()),
+            ("--accept-taps", !by_hand.accept.is_empty()),
+            ("--reject-taps", !by_hand.reject.is_empty()),
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),
@@ -126,7 +132,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
         let given = described.iter().chain(&own_options);
         if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
             bail!(
-                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `overload`, `band`, `block`, `window`"
+                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `overload`, `accept_taps`, `reject_taps`, `band`, `block`, `window`"
             );
         }
         let file = read_test(file, terminal)?;
@@ -201,6 +207,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         .filter_map(|(path, format)| Some((path.as_deref()?, format)))
         .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
         .collect::<anyhow::Result<Vec<_>>>()?;
+    let bare = &arguments.recording;
     let analysis = match &subject {
         Subject::Test(file) => file.analyse(
             &IdentifySettings::unperturbed(),
@@ -209,9 +216,10 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         Subject::Recording(hammer) => analyse_recording(arguments, hammer, &terminal.measuring(1))?,
         Subject::Functions => analyse(
             &arguments.file,
-            &arguments.recording,
-            &arguments.spectrum,
-            ReadBy::default(),
+            &BareSettings {
+                by_hand: arguments.taps.by_hand(),
+                ..bare.bare(&arguments.spectrum, ReadBy::default())
+            },
             &terminal.measuring(1),
         )?,
     };
@@ -311,6 +319,7 @@ fn analyse_recording(
     let adjust = |measure: &mut MeasureSettings| {
         arguments.spectrum.apply(measure);
         measure.taps = arguments.recording.taps();
+        measure.taps.by_hand = arguments.taps.by_hand();
     };
     Ok(run_wired(recording, &wiring, adjust, watch)?)
 }

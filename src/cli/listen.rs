@@ -1,38 +1,47 @@
 //! `tapjoint listen`: a stream is recorded, and each tap is judged while it is recorded.
 
+mod arrival;
+mod bench;
+mod decisions;
+mod hearing;
 mod log;
 mod recorder;
+#[cfg(feature = "screen")]
+mod screen;
+#[cfg(feature = "serve")]
+mod server;
+#[cfg(feature = "sound")]
+mod sound;
 mod state;
 mod stream;
 mod target;
+mod views;
 
 use super::Outcome;
-use super::arguments::CommonArguments;
+use super::arguments::{CommonArguments, accuracy};
 use super::input::{TestFile, file_name, read_test};
 use super::overwrite::Files;
 use super::place::is_description;
 use super::run::RunArguments;
 use super::staging::ledger;
 use super::terminal::Terminal;
-use crate::listen::{ListenError, ListenSettings, Listener, News};
+use crate::listen::ListenSettings;
 use crate::pipeline::{BareSettings, RecordingPlan, described_reading};
 use crate::quantity::{Dimension, parse_quantity};
-use crate::recording::{
-    Format, GrowingRecording, MAX_CHANNELS, PcmLayout, ReadSettings, Recording, SampleForm,
-};
+use crate::recording::{Format, MAX_CHANNELS, PcmLayout, ReadSettings, Recording, SampleForm};
+use crate::taps::TapsByHand;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
+use hearing::{Heard, Hearing};
 use log::Log;
-use recorder::Destination;
-use state::{States, Subject};
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
-use stream::{End, Event, Source};
-use target::{Target, bare_target, described_target};
+use recorder::Names;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+use stream::{End, Running, Source};
+use target::{Target, asked_for, bare_target, described_target};
+use tempfile::TempDir;
+use views::Views;
 
 /// Record a stream of samples, and judge each tap while you go on tapping.
 ///
@@ -48,15 +57,19 @@ use target::{Target, bare_target, described_target};
 pub(super) struct ListenArguments {
     #[command(flatten)]
     pub(super) run: RunArguments,
-    /// Sample rate of raw samples, 100 to 1e8, such as 51200 or "51.2 kHz" (Hz)
-    #[arg(long, value_name = "HZ", requires_all = ["channels", "format"], value_parser = rate)]
+    /// Sample rate of raw samples or of the sound device, 100 to 1e8, such as 51200 or "51.2 kHz" (Hz)
+    #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<u32>,
-    /// Channels of raw samples
-    #[arg(long, value_name = "N", requires_all = ["rate", "format"], value_parser = RangedU64ValueParser::<u16>::new().range(1..=MOST_CHANNELS))]
+    /// Channels of raw samples or of the sound device
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u16>::new().range(1..=MOST_CHANNELS))]
     channels: Option<u16>,
     /// Form of raw samples, as sox and ffmpeg name it
-    #[arg(long, value_name = "F", requires_all = ["rate", "channels"], value_parser = sample_form())]
+    #[arg(long, value_name = "F", value_parser = sample_form())]
     format: Option<SampleForm>,
+    /// Record from a sound device instead of standard input: `default`, or a part of its name. For programs that were built
+    /// with the feature `sound`
+    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["replay", "format"])]
+    sound: Option<String>,
     /// Play a recording instead of a stream, or with --rate a file of raw samples. A recording of the test is played and not
     /// written again
     #[arg(long, value_name = "FILE")]
@@ -74,6 +87,17 @@ pub(super) struct ListenArguments {
     /// Time from a tap to its verdict (s). The next tap shortens it, and a described `block` may lengthen it
     #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
     record: f64,
+    /// Half width of the 95 % intervals that is wanted, as a share of the value, such as "5 %": of the joint, without a joint
+    /// of the frequencies. Default: the number of taps alone is wanted
+    #[arg(long, value_name = "P", value_parser = accuracy)]
+    accuracy: Option<f64>,
+    /// Print lines, and show no live screen. Lines are printed anyhow where standard output is no terminal
+    #[arg(long)]
+    plain: bool,
+    /// Serve a live page to this machine alone, on this port; 0 = any free one. Its address is printed, with a token that the
+    /// page needs
+    #[arg(long, value_name = "PORT")]
+    serve: Option<u16>,
 }
 
 /// As many as a recording may have.
@@ -120,11 +144,32 @@ fn record(text: &str) -> Result<f64, String> {
 impl ListenArguments {
     /// Returns where the samples come from. A recording that is played is read as `read` says.
     fn source(&self, read: &ReadSettings) -> anyhow::Result<Source> {
+        if let Some(name) = &self.sound {
+            #[cfg(feature = "sound")]
+            return Ok(Source::Sound(sound::SoundDevice {
+                name: name.clone(),
+                rate: self.rate,
+                channels: self.channels,
+            }));
+            #[cfg(not(feature = "sound"))]
+            bail!(
+                "--sound {name}: this program was built without sound devices; build it with `--features sound`, or pipe a \
+                 recorder into standard input"
+            );
+        }
         let layout = match (self.rate, self.channels, self.format) {
             (Some(rate), Some(channels), Some(form)) => Some(PcmLayout::new(rate, channels, form)?),
-            _ => None,
+            (None, None, None) => None,
+            _ => bail!(
+                "raw samples need all of --rate, --channels and --format; WAV needs none of them"
+            ),
         };
         let Some(path) = &self.replay else {
+            ensure!(
+                !io::stdin().is_terminal(),
+                "standard input is a terminal, and no samples come from it; start a recorder before it, such as \
+                 `arecord -f S16_LE -r 48000 -c 2 | tapjoint listen ...`, or play a recording by --replay"
+            );
             return Ok(Source::Standard(layout));
         };
         let recording = match &layout {
@@ -137,6 +182,33 @@ impl ListenArguments {
             layout,
             speed: self.speed,
         })
+    }
+}
+
+impl ListenArguments {
+    /// Returns the views that were asked for.
+    ///
+    /// # Errors
+    /// The page cannot be served.
+    fn views<'a>(&self, terminal: &'a Terminal) -> anyhow::Result<Views<'a>> {
+        let mut views = Views::new(terminal);
+        if let Some(port) = self.serve {
+            #[cfg(feature = "serve")]
+            views.add_page(server::Page::serve(port)?);
+            #[cfg(not(feature = "serve"))]
+            bail!(
+                "--serve {port}: this program was built without the page; build it with `--features serve`"
+            );
+        }
+        #[cfg(feature = "screen")]
+        if !self.plain
+            && terminal.may_be_filled()
+            && let Ok(screen) = screen::LiveScreen::begin()
+        {
+            ledger().restore = Some(screen::restore);
+            views.add(Box::new(screen));
+        }
+        Ok(views)
     }
 }
 
@@ -156,17 +228,54 @@ pub(super) fn run(
         "{}: is a folder; name a description, or the WAV file to be written",
         path.display()
     );
-    let described = match is_description(path) {
+    let mut described = match is_description(path) {
         true => Some(read_test(path, &terminal)?),
         false => None,
     };
     let replayed = arguments.replay.as_deref();
-    let target = match &described {
-        Some(file) => described_target(file, replayed, arguments.resume)?,
+    let mut target = match &described {
+        Some(file) => described_target(file, replayed, arguments.resume, None)?,
         None => bare_target(path, replayed, arguments.resume)?,
     };
-    let heard = listen(arguments, described.as_ref(), &target, &terminal)?;
-    let end = heard.ended?;
+    let begun = Begun::new(arguments, described.as_ref(), &target)?;
+    let mut views = arguments.views(&terminal)?;
+    views.say(&introduction(arguments, described.as_ref(), &target));
+    let stream = Running::begin(begun.source, begun.names);
+    ledger().stop = Some(stream.stopper());
+    let (mut headers, mut first, mut split) = (begun.headers, None, None);
+    let (heard, end) = loop {
+        let bare = arguments.run.bare();
+        let plan = plan_of(described.as_ref(), &target, &bare);
+        let settings = ListenSettings {
+            name: file_name(&target.file),
+            record: arguments.record,
+            headers: headers.take(),
+            earlier: opened(&target.earlier)?,
+        };
+        views.begin(title(described.as_ref(), &target));
+        let file = described.as_ref();
+        let mut hearing = Hearing::new(arguments, file, &target, plan, settings, &mut views);
+        if begun.aside.is_none() {
+            hearing.log = Some(Log::beside(&target.file));
+        }
+        if begun.has_states {
+            hearing.with_states();
+        }
+        let mut heard = hearing.listen(&stream, first.take());
+        split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
+        let Some((next, file)) = heard.turned.take() else {
+            let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
+            break (heard, ended);
+        };
+        // With the decisions by hand on the last recording.
+        described = Some(read_test(path, &terminal)?);
+        (target, first) = (next, Some(file));
+        views.say(&introduction(arguments, described.as_ref(), &target));
+    };
+    ledger().stop = None;
+    views.end_screen();
+    ledger().restore = None;
+    let end = end?;
     if end.rest > 0 {
         terminal.warn(&format!(
             "the stream ended within a frame; its last {} bytes are left out",
@@ -183,38 +292,121 @@ pub(super) fn run(
     if heard.files.len() == target.earlier.len() {
         bail!("{name}: nothing was recorded");
     }
-    let known = described.as_ref().map(described_files).unwrap_or_default();
-    let has_more = heard.files.iter().any(|file| !known.contains(file));
-    if heard.files.len() > 1 && has_more && !target.is_played {
-        let names = heard.files.iter();
-        let folder = described.as_ref().map(|file| file.folder.clone());
-        let folder = folder.unwrap_or_default();
-        let names = names.map(|file| {
-            let name = file.strip_prefix(&folder).unwrap_or(file);
-            format!("\"{}\"", name.display())
-        });
-        let names = names.collect::<Vec<_>>().join(", ");
-        let place = match &described {
-            Some(_) => "the description",
-            None => "a description (`tapjoint init` prints one)",
-        };
-        terminal.say(&format!(
-            "one recording in {} files, no report yet: write files = [{names}] in {place}, then run the test\n",
-            heard.files.len()
-        ))?;
+    if let Some(words) = split {
+        terminal.say(&words)?;
+        views.finish(&words);
         return Ok(Outcome::of(heard.accepted > 0));
     }
     if let Some(file) = &described
-        && let Ok(next) = described_target(file, None, false)
+        && let Ok(next) = described_target(file, None, false, None)
     {
-        terminal.say(&match heard.accepted {
+        let words = match heard.accepted {
             0 => format!("no tap of {name} counts: remove the file and record it again\n"),
             _ => format!("next: {}; start `listen` again\n", asked_for(file, &next)),
-        })?;
+        };
+        terminal.say(&words)?;
+        views.finish(&words);
         return Ok(Outcome::of(heard.accepted > 0));
     }
+    if let Some(by_hand) = heard.by_hand {
+        terminal.say(&by_hand_words(described.is_some(), &by_hand))?;
+        // `run` reads those of a description from its file.
+        if described.is_none() {
+            let _ = arguments.run.taps.decided.set(by_hand);
+        }
+    }
     terminal.say("")?;
-    once()
+    views.finish("The recording has ended, and the test is run.");
+    let outcome = once();
+    views.finish(match outcome {
+        Ok(_) => "The recording has ended. The report is written; the terminal names its folder.",
+        Err(_) => "The recording has ended. The run has failed; the terminal says why.",
+    });
+    outcome
+}
+
+/// What is known before the stream begins.
+struct Begun {
+    source: Source,
+    names: Names,
+    /// A recording with the names, units and scales of the one that is heard.
+    headers: Option<Recording>,
+    /// True where results are wanted between the taps.
+    has_states: bool,
+    /// Folder for the copy of a recording that is only played. It is removed in the end.
+    aside: Option<TempDir>,
+}
+
+impl Begun {
+    fn new(
+        arguments: &ListenArguments,
+        described: Option<&TestFile>,
+        target: &Target,
+    ) -> anyhow::Result<Self> {
+        let bare = arguments.run.bare();
+        let read = match plan_of(described, target, &bare) {
+            RecordingPlan::Described { recording, .. } if target.is_played => {
+                described_reading(recording)
+            }
+            _ => bare.read.clone(),
+        };
+        let source = arguments.source(&read)?;
+        // What is written anew has numbers of channels alone, as a stream has.
+        let headers = match &source {
+            Source::Replay { recording, .. } if target.is_played => recording.clone(),
+            _ => None,
+        };
+        // Results between the taps are worked out from the file, which may lack names and units.
+        let is_whole = headers
+            .as_ref()
+            .is_none_or(|recording| is_plain(recording.format()));
+        // A recording that is there already is played into a folder that is removed.
+        let aside = target.is_played.then(|| {
+            let folder = tempfile::Builder::new().prefix("tapjoint-").tempdir();
+            folder.context("no temporary folder can be made")
+        });
+        let aside = aside.transpose()?;
+        let first = match &aside {
+            Some(folder) => {
+                let file = folder.path().join(file_name(&target.file));
+                file.with_extension("wav")
+            }
+            None => target.file.clone(),
+        };
+        Ok(Self {
+            source,
+            names: Names {
+                first,
+                reserved: target.reserved.clone(),
+            },
+            headers,
+            has_states: arguments.speed.is_some() && is_whole,
+            aside,
+        })
+    }
+}
+
+/// Says what to do with a recording in several files that the description does not name; `None` where there is nothing to do.
+fn files_beside(described: Option<&TestFile>, target: &Target, heard: &Heard) -> Option<String> {
+    let known = described.map(described_files).unwrap_or_default();
+    let has_more = heard.files.iter().any(|file| !known.contains(file));
+    if heard.files.len() < 2 || !has_more || target.is_played {
+        return None;
+    }
+    let folder = described.map_or(Path::new(""), |file| &file.folder);
+    let names = heard.files.iter().map(|file| {
+        let name = file.strip_prefix(folder).unwrap_or(file);
+        format!("\"{}\"", name.display())
+    });
+    let names = names.collect::<Vec<_>>().join(", ");
+    let place = match described {
+        Some(_) => "the description",
+        None => "a description (`tapjoint init` prints one)",
+    };
+    Some(format!(
+        "one recording in {} files, no report yet: write files = [{names}] in {place}, then run the test\n",
+        heard.files.len()
+    ))
 }
 
 /// The files of all recordings of a description.
@@ -224,269 +416,27 @@ fn described_files(file: &TestFile) -> Vec<PathBuf> {
     files.map(|name| file.path_of(name)).collect()
 }
 
-/// What was heard.
-struct Heard {
-    /// Files of the recording.
-    files: Vec<PathBuf>,
-    /// Taps that count.
-    accepted: usize,
-    /// How the stream ended.
-    ended: anyhow::Result<End>,
+/// Says where decisions by hand stand.
+fn by_hand_words(is_described: bool, by_hand: &TapsByHand) -> String {
+    if is_described {
+        return "decided by hand: accept_taps and reject_taps of the description hold it\n"
+            .to_owned();
+    }
+    let list = |times: &[f64]| {
+        let times = times.iter().map(f64::to_string);
+        times.collect::<Vec<_>>().join(",")
+    };
+    let options = [
+        ("--accept-taps", &by_hand.accept),
+        ("--reject-taps", &by_hand.reject),
+    ];
+    let options = options.iter().filter(|(_, times)| !times.is_empty());
+    let options = options.map(|(option, times)| format!("{option} {}", list(times)));
+    format!(
+        "decided by hand: give {} to `run` for the same answer\n",
+        options.collect::<Vec<_>>().join(" ")
+    )
 }
-
-/// Records the stream and reports each tap.
-fn listen(
-    arguments: &ListenArguments,
-    described: Option<&TestFile>,
-    target: &Target,
-    terminal: &Terminal,
-) -> anyhow::Result<Heard> {
-    let bare = arguments.run.bare();
-    let plan = plan_of(described, target, &bare);
-    let read = match plan {
-        RecordingPlan::Described { recording, .. } if target.is_played => {
-            described_reading(recording)
-        }
-        _ => bare.read.clone(),
-    };
-    let source = arguments.source(&read)?;
-    // What is written anew has numbers of channels alone, as a stream has.
-    let headers = match &source {
-        Source::Replay { recording, .. } if target.is_played => recording.clone(),
-        _ => None,
-    };
-    // Results between the taps are worked out from the file, which may lack names and units.
-    let is_whole = headers
-        .as_ref()
-        .is_none_or(|recording| is_plain(recording.format()));
-    let states = (arguments.speed.is_some() && is_whole)
-        .then(|| States::begin(Subject::of(described, target, &bare)));
-    // A recording that is there already is played into a folder that is removed.
-    let aside = target.is_played.then(|| {
-        let folder = tempfile::Builder::new().prefix("tapjoint-").tempdir();
-        folder.context("no temporary folder can be made")
-    });
-    let aside = aside.transpose()?;
-    let first = match &aside {
-        Some(folder) => folder
-            .path()
-            .join(file_name(&target.file))
-            .with_extension("wav"),
-        None => target.file.clone(),
-    };
-    let mut hearing = Hearing {
-        plan,
-        settings: ListenSettings {
-            name: file_name(&target.file),
-            record: arguments.record,
-            headers,
-            earlier: opened(&target.earlier)?,
-        },
-        listener: None,
-        log: aside.is_none().then(|| Log::beside(&first)),
-        states,
-        wanted: arguments.taps,
-        files: target.earlier.clone(),
-        fault: None,
-        terminal,
-    };
-    terminal.say(&introduction(arguments, described, target))?;
-    let stop = Arc::new(AtomicBool::new(false));
-    ledger().stop = Some(stop.clone());
-    let destination = Destination {
-        first,
-        reserved: target.reserved.clone(),
-        stop: stop.clone(),
-    };
-    let events = stream::record(source, destination);
-    let mut ended = None;
-    while ended.is_none() && !stop.load(Ordering::Relaxed) {
-        match events.recv_timeout(PAUSE) {
-            Ok(Event::File(path)) => hearing.go_on_in(path),
-            Ok(Event::Ended(how)) => ended = Some(how),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(End::default())),
-        }
-        hearing.catch_up(&stop)?;
-        // A description that does not fit is to be corrected before the first tap.
-        if hearing.is_refused() {
-            stop.store(true, Ordering::Relaxed);
-        }
-    }
-    // A piece that is being written is waited for. One that comes after that is not written.
-    while ended.is_none()
-        && let Ok(event) = events.recv_timeout(LAST_PIECE)
-    {
-        match event {
-            Event::File(path) => hearing.go_on_in(path),
-            Event::Ended(how) => ended = Some(how),
-        }
-    }
-    ledger().stop = None;
-    hearing.end(ended.unwrap_or(Ok(End::default())))
-}
-
-/// Time for which the last piece of a stream is waited for, once it was stopped.
-const LAST_PIECE: Duration = Duration::from_secs(1);
-
-/// A recording that is listened to.
-struct Hearing<'a> {
-    plan: RecordingPlan<'a>,
-    settings: ListenSettings,
-    /// `None` before the first samples.
-    listener: Option<Listener<'a>>,
-    /// `None` of a recording that is only played, and once it could not be written.
-    log: Option<Log>,
-    /// `None` where no results are wanted between the taps.
-    states: Option<States>,
-    /// Taps that are wanted.
-    wanted: usize,
-    files: Vec<PathBuf>,
-    /// Why taps are no longer judged.
-    fault: Option<ListenError>,
-    terminal: &'a Terminal,
-}
-
-impl Hearing<'_> {
-    /// Listens to the next file of the recording.
-    fn go_on_in(&mut self, path: PathBuf) {
-        let opened = GrowingRecording::open(&path);
-        self.files.push(path);
-        if self.fault.is_some() {
-            return;
-        }
-        let news = match (opened, &mut self.listener) {
-            (Err(fault), _) => Err(fault.into()),
-            (Ok(growing), Some(listener)) => listener.go_on_in(growing),
-            (Ok(growing), None) => {
-                let settings = self.settings.clone();
-                self.listener = Some(Listener::new(growing, self.plan, settings));
-                return;
-            }
-        };
-        self.take(news);
-    }
-
-    /// Judges what the file holds by now.
-    fn catch_up(&mut self, stop: &AtomicBool) -> anyhow::Result<()> {
-        while let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none())
-            && !stop.load(Ordering::Relaxed)
-        {
-            let Some(news) = listener.step().transpose() else {
-                break;
-            };
-            self.take(news);
-        }
-        match &mut self.states {
-            Some(states) => states.report(self.terminal),
-            None => Ok(()),
-        }
-    }
-
-    /// Prints and logs what is new. A fault ends the judging, and not the recording.
-    fn take(&mut self, news: Result<Vec<News>, ListenError>) {
-        let news = match news {
-            Ok(news) => news,
-            Err(fault) => {
-                let words = "taps are not judged any more, and the recording goes on";
-                let warning = format!("{fault}; {words}");
-                self.fault = Some(fault);
-                if !self.is_refused() {
-                    self.terminal.warn(&warning);
-                }
-                return;
-            }
-        };
-        let Some(listener) = &self.listener else {
-            return;
-        };
-        if let Some(log) = &mut self.log
-            && let Err(cause) = log.note(listener.seconds(), &news)
-        {
-            self.terminal
-                .warn(&format!("{cause:#}; the recording goes on without a log"));
-            self.log = None;
-        }
-        let screen = self.terminal.screen();
-        let mut text = String::new();
-        for one in &news {
-            text.push_str(&screen.wrapped(&one.to_string(), 2));
-        }
-        if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
-            let (accepted, wanted) = (listener.accepted(), self.wanted);
-            let what = match wanted.saturating_sub(accepted) {
-                0 => "enough; Ctrl-C ends the recording".to_owned(),
-                1 => "1 more is wanted".to_owned(),
-                missing => format!("{missing} more are wanted"),
-            };
-            let reach = listener.reach().map_or(String::new(), |(reach, end)| {
-                format!("; take a harder tip: the taps excite up to {reach:.0} Hz of a band to {end:.0} Hz")
-            });
-            let count = match accepted {
-                1 => "1 tap counts".to_owned(),
-                count => format!("{count} taps count"),
-            };
-            text.push_str(&screen.wrapped(&format!("{count}; {what}{reach}"), 2));
-            if let Some(states) = &mut self.states {
-                states.ask(accepted, &self.files);
-            }
-        }
-        if !text.is_empty() {
-            // The recording goes on where standard output was closed.
-            let _ = self.terminal.say(&text);
-        }
-    }
-
-    /// Returns true where the recording does not fit its description or the options, which its first samples show.
-    fn is_refused(&self) -> bool {
-        let has_looked = self.listener.as_ref().is_none_or(Listener::has_looked);
-        // Files of another rate or with other channels do not follow one another.
-        let is_described = match self.fault {
-            Some(ListenError::Pipeline(_)) => true,
-            Some(ListenError::Recording(_)) => !self.settings.earlier.is_empty(),
-            None => false,
-        };
-        is_described && !has_looked
-    }
-
-    /// Judges all taps for good.
-    fn end(mut self, ended: anyhow::Result<End>) -> anyhow::Result<Heard> {
-        self.states = None;
-        if self.fault.is_none()
-            && let Some(listener) = &mut self.listener
-        {
-            let news = listener.finish();
-            self.take(news);
-        }
-        if self.is_refused() {
-            // The next call is to find the place as this one did.
-            for file in &self.files[self.settings.earlier.len()..] {
-                let _ = std::fs::remove_file(file);
-            }
-        }
-        let mut accepted = 0;
-        if let Some(listener) = self.listener.as_ref().filter(|_| !self.is_refused()) {
-            accepted = listener.accepted();
-            self.terminal.say(&format!(
-                "{}: {:.1} s, {accepted} of {} taps count\n",
-                self.settings.name,
-                listener.seconds(),
-                listener.taps(),
-            ))?;
-        }
-        Ok(Heard {
-            files: self.files,
-            accepted,
-            ended: match self.fault {
-                Some(fault) => Err(fault.into()),
-                None => ended,
-            },
-        })
-    }
-}
-
-/// Time between two looks at a file that does not grow: short beside the least time to a verdict.
-const PAUSE: Duration = Duration::from_millis(10);
 
 /// True of formats whose channels have no names and units.
 fn is_plain(format: Format) -> bool {
@@ -520,38 +470,8 @@ fn opened(earlier: &[PathBuf]) -> anyhow::Result<Vec<Recording>> {
     Ok(recordings)
 }
 
-/// "low.wav, tap at 0.04 m".
-fn asked_for(file: &TestFile, target: &Target) -> String {
-    let name = file_name(&target.file);
-    let recording = target.table.map(|table| &file.test.recordings[table]);
-    let Some(recording) = recording else {
-        return name;
-    };
-    let mut words = vec![name];
-    if let Some(tap) = recording.tap {
-        words.push(format!("tap at {tap} m"));
-    }
-    if let Some(level) = recording.level.filter(|level| *level != 1.0) {
-        words.push(format!("{level} times as hard as level 1"));
-    }
-    for (sensor, place) in &recording.at {
-        words.push(format!("sensor {sensor} at {place} m"));
-    }
-    if let Some(length) = recording.length {
-        words.push(format!("free length {length} m"));
-    }
-    if !recording.masses.is_empty() {
-        words.push(format!("with {} known masses", recording.masses.len()));
-    }
-    words.join(", ")
-}
-
-/// What is recorded, and how it ends.
-fn introduction(
-    arguments: &ListenArguments,
-    described: Option<&TestFile>,
-    target: &Target,
-) -> String {
+/// What is recorded: "recording low.wav, tap at 0.385 m".
+fn title(described: Option<&TestFile>, target: &Target) -> String {
     let what = match described {
         Some(file) => asked_for(file, target),
         None => file_name(&target.file),
@@ -561,8 +481,17 @@ fn introduction(
         (false, []) => "recording",
         (false, _) => "continuing",
     };
-    let wanted = arguments.taps;
-    format!("{verb} {what}; {wanted} taps are wanted; Ctrl-C ends\n")
+    format!("{verb} {what}")
+}
+
+/// What is recorded, and how it ends.
+fn introduction(
+    arguments: &ListenArguments,
+    described: Option<&TestFile>,
+    target: &Target,
+) -> String {
+    let (title, wanted) = (title(described, target), arguments.taps);
+    format!("{title}; {wanted} taps are wanted; Ctrl-C ends\n")
 }
 
 #[cfg(test)]

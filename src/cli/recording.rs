@@ -4,21 +4,22 @@
 //! and its peaks. `run` and `frf` analyse bare files from here, too.
 
 use super::Outcome;
-use super::arguments::{FullAnswer, RecordingArguments, SpectrumSettings, reading};
+use super::arguments::{FullAnswer, RecordingArguments, SpectrumSettings, TapArguments, reading};
 use super::input::{check_file, file_name};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::ReadBy;
 use crate::pipeline::{
-    Analysis, RecordingResult, Stage, Watch, Work, analysis_of_bare, inspect_bare,
-    is_no_time_series, measure_bare_file, together,
+    Analysis, BareSettings, Stage, Watch, Work, analysis_of_bare, inspect_bare, is_no_time_series,
+    measure_bare_file, together,
 };
 use crate::recording::{is_universal_file, list_datasets, open_frequency_responses};
 use crate::report::{
     datasets_of, document_of, functions_of, inspection_of, render_spectrum_csv,
     render_spectrum_picture,
 };
+use crate::taps::TapSettings;
 use anyhow::ensure;
 use clap::Args;
 use rayon::prelude::*;
@@ -27,52 +28,33 @@ use std::path::{Path, PathBuf};
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
 ///
 /// # Errors
-/// Those of [`measured`].
+/// Those of [`measure_bare_file`].
 pub(super) fn analyse(
     path: &Path,
-    recording: &RecordingArguments,
-    spectrum: &SpectrumSettings,
-    reading: ReadBy,
+    settings: &BareSettings,
     watch: &dyn Watch,
 ) -> anyhow::Result<Analysis> {
-    let result = measured(path, recording, spectrum, reading, watch)?;
+    let result = measure_bare_file(path, settings, watch)?;
     Ok(analysis_of_bare(result.file.clone(), vec![result]))
 }
 
 /// Analyses several files as one test of this name.
 ///
 /// # Errors
-/// Those of [`measured`], for the first file that has any.
+/// Those of [`measure_bare_file`], for the first file that has any.
 pub(super) fn analyse_together(
     name: String,
     files: &[PathBuf],
-    recording: &RecordingArguments,
-    spectrum: &SpectrumSettings,
-    reading: ReadBy,
+    settings: &BareSettings,
     watch: &dyn Watch,
 ) -> anyhow::Result<Analysis> {
     // In parallel, but collected in order, so that of several errors the first is reported.
     let results: Vec<anyhow::Result<_>> = files
         .par_iter()
-        .map(|file| measured(file, recording, spectrum, reading, watch))
+        .map(|file| Ok(measure_bare_file(file, settings, watch)?))
         .collect();
     let results = results.into_iter().collect::<anyhow::Result<_>>()?;
     Ok(analysis_of_bare(name, results))
-}
-
-/// Measures a recording, or the frequency response functions of a file without samples in time.
-///
-/// # Errors
-/// Those of [`measure_bare_file`].
-fn measured(
-    path: &Path,
-    recording: &RecordingArguments,
-    spectrum: &SpectrumSettings,
-    reading: ReadBy,
-    watch: &dyn Watch,
-) -> anyhow::Result<RecordingResult> {
-    let settings = recording.bare(spectrum, reading);
-    Ok(measure_bare_file(path, &settings, watch)?)
 }
 
 /// Returns true if a file holds frequency response functions and no samples in time.
@@ -107,10 +89,13 @@ pub(super) struct InspectArguments {
     #[command(flatten)]
     recording: RecordingArguments,
     #[command(flatten)]
+    taps: TapArguments,
+    #[command(flatten)]
     pub(super) timings: TimingsArguments,
 }
 
 pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    arguments.taps.check(arguments.files.len())?;
     for file in &arguments.files {
         check_file(file)?;
     }
@@ -165,7 +150,10 @@ pub(super) fn inspect(arguments: &InspectArguments, terminal: Terminal) -> anyho
         recordings.push(inspect_bare(
             recording,
             arguments.recording.hammer.as_ref(),
-            &arguments.recording.taps(),
+            &TapSettings {
+                by_hand: arguments.taps.by_hand(),
+                ..arguments.recording.taps()
+            },
             terminal.watch(),
         )?);
     }
@@ -210,6 +198,8 @@ pub(super) struct SpectrumArguments {
     #[command(flatten)]
     recording: RecordingArguments,
     #[command(flatten)]
+    taps: TapArguments,
+    #[command(flatten)]
     full: FullAnswer,
     #[command(flatten)]
     pub(super) timings: TimingsArguments,
@@ -222,13 +212,12 @@ pub(super) fn spectrum(
     check_file(&arguments.file)?;
     let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
     let csv = OutputFile::prepare_optional(arguments.csv.as_deref())?;
-    let analysis = analyse(
-        &arguments.file,
-        &arguments.recording,
-        &arguments.spectrum,
-        arguments.reading,
-        &terminal.measuring(1),
-    )?;
+    let bare = &arguments.recording;
+    let settings = BareSettings {
+        by_hand: arguments.taps.by_hand(),
+        ..bare.bare(&arguments.spectrum, arguments.reading)
+    };
+    let analysis = analyse(&arguments.file, &settings, &terminal.measuring(1))?;
     let document = document_of(&analysis);
     if let Some(file) = png {
         let recording = analysis.recordings.first();

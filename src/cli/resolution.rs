@@ -1,14 +1,13 @@
 //! `tapjoint resolution`: errors of frequencies and stiffness by block size, window and reading.
 
 use super::Outcome;
-use super::arguments::{StiffnessArguments, band, block_size, reading, window};
+use super::arguments::{StiffnessArguments, accuracy, band, block_size, reading, share, window};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::timings::TimingsArguments;
 use crate::description::{ReadBy, WindowKind};
 use crate::pipeline::{IdentifySettings, Stage, TestedStructure, Watch, Work, tested_structure};
-use crate::quantity::{Dimension, parse_quantity};
 use crate::report::{
     prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
 };
@@ -73,25 +72,8 @@ pub(super) struct ResolutionArguments {
     pub(super) timings: TimingsArguments,
 }
 
-fn accuracy(text: &str) -> Result<f64, String> {
-    share(text, 1.0, "a share such as \"5 %\" or 0.05")
-}
-
 fn damping(text: &str) -> Result<f64, String> {
     share(text, 0.2, "a damping ratio such as \"0.3 %\" or 0.003")
-}
-
-/// Parses a share between 0 and a limit.
-fn share(text: &str, limit: f64, example: &str) -> Result<f64, String> {
-    let value = parse_quantity(text, Dimension::Ratio).map_err(|error| error.to_string())?;
-    if value > 0.0 && value < limit {
-        return Ok(value);
-    }
-    Err(format!(
-        "{} % is outside 0 to {} %; give {example}",
-        100.0 * value,
-        100.0 * limit
-    ))
 }
 
 fn decibels(text: &str) -> Result<f64, String> {

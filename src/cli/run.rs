@@ -2,7 +2,8 @@
 
 use super::Outcome;
 use super::arguments::{
-    FullAnswer, RecordingArguments, SpectrumSettings, perturbed_by, perturbed_methods, reading,
+    FullAnswer, RecordingArguments, SpectrumSettings, TapArguments, perturbed_by,
+    perturbed_methods, reading,
 };
 use super::diagnose::{Reported, reported};
 use super::input::{TestFile, check_file, file_name, read_test, stem};
@@ -21,6 +22,7 @@ use crate::report::{
     EXCHANGED, MODEL_FILE, VERSION_FILE, draw_run, earlier_files, exchange_files, run_files,
     watched_files,
 };
+use crate::taps::TapsByHand;
 use anyhow::{Context, bail};
 use clap::Args;
 use std::fs;
@@ -59,7 +61,9 @@ pub(super) struct RunArguments {
     #[command(flatten)]
     spectrum: SpectrumSettings,
     #[command(flatten)]
-    pub(super) recording: RecordingArguments,
+    recording: RecordingArguments,
+    #[command(flatten)]
+    pub(super) taps: TapArguments,
     /// Also write sheet.html, one page to sign and file, with the checksums of all files read. Texts for it stand under
     /// [sheet] of the description. Print it for a PDF
     #[arg(long)]
@@ -73,8 +77,11 @@ pub(super) struct RunArguments {
 impl RunArguments {
     /// Returns the settings for a file without a description.
     pub(super) fn bare(&self) -> BareSettings {
-        self.recording
-            .bare(&self.spectrum, self.reading.unwrap_or_default())
+        let reading = self.reading.unwrap_or_default();
+        BareSettings {
+            by_hand: self.taps.by_hand(),
+            ..self.recording.bare(&self.spectrum, reading)
+        }
     }
 
     /// Returns what is to be run.
@@ -229,10 +236,11 @@ fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow
     let bare = &arguments.recording;
     if bare.hammer.is_some()
         || bare.overload.is_some()
+        || arguments.taps.by_hand() != TapsByHand::default()
         || bare.settings() != ReadSettings::default()
     {
         bail!(
-            "--hammer, --sample-rate, --time-unit, --values, --variable and --overload are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
+            "--hammer, --sample-rate, --time-unit, --values, --variable, --overload, --accept-taps and --reject-taps are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
         );
     }
     let spectrum = &arguments.spectrum;
@@ -346,7 +354,6 @@ pub(super) fn run(
         Some(file) => file.test.recordings.len(),
         None => subject.files().len(),
     });
-    let (bare, reading) = (&arguments.recording, arguments.reading.unwrap_or_default());
     let analysis = match (&described, &subject) {
         (Some(file), _) => file.analyse(
             &IdentifySettings {
@@ -356,11 +363,11 @@ pub(super) fn run(
             &measuring,
         )?,
         (None, Subject::Described(file) | Subject::Bare(file)) => {
-            analyse(file, bare, &arguments.spectrum, reading, &measuring)?
+            analyse(file, &arguments.bare(), &measuring)?
         }
         (None, Subject::Folder(_, files)) => {
-            let spectrum = &arguments.spectrum;
-            analyse_together(name, files, bare, spectrum, reading, &measuring)?
+            arguments.taps.check(files.len())?;
+            analyse_together(name, files, &arguments.bare(), &measuring)?
         }
     };
     // A file that a recorder still writes would have the checksum of other content than was analysed.

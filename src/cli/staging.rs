@@ -40,6 +40,8 @@ pub(super) struct Ledger {
     pub(super) written: Vec<PathBuf>,
     /// What the first signal sets, instead of ending the process.
     pub(super) stop: Option<Arc<AtomicBool>>,
+    /// Gives the terminal back before the process ends.
+    pub(super) restore: Option<fn()>,
 }
 
 impl Ledger {
@@ -55,6 +57,7 @@ static LEDGER: Mutex<Ledger> = Mutex::new(Ledger {
     temporary: BTreeSet::new(),
     written: Vec::new(),
     stop: None,
+    restore: None,
 });
 
 /// Returns the ledger. A signal ends the process only when nobody holds it.
@@ -90,6 +93,9 @@ pub(super) fn watch_signals() -> io::Result<()> {
             // A journal here is a dead process's, and still to be carried out.
             let own = temporary.filter(|path| !path.join(JOURNAL).exists());
             own.for_each(|path| remove(path));
+            if let Some(restore) = ledger.restore {
+                restore();
+            }
             std::process::exit(128 + signal);
         }
     });

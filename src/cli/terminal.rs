@@ -168,6 +168,14 @@ impl Terminal {
         let _ = write!(error, "\r\u{1b}[K{done} of {of} {doing}{left}{end}");
     }
 
+    /// Returns true where a live screen may fill the terminal.
+    pub(super) fn may_be_filled(&self) -> bool {
+        let is_silent = self.quiet || self.session.is_some();
+        let is_taken = matches!(self.json, Some(Json::StandardOutput));
+        let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        !is_silent && !is_taken && !is_dumb && io::stdout().is_terminal()
+    }
+
     /// Returns the screen that texts are laid out for.
     pub(super) fn screen(&self) -> Screen {
         match self.session {

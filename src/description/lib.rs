@@ -27,6 +27,7 @@ pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
 pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
 pub use tapjoint_signal::recording::{ResponseForm, ValueColumns, VariableRole, Variables};
+pub use tapjoint_signal::taps::TapsByHand;
 pub use template::{
     FoundChannel, FoundContent, FoundRecording, runnable_template, template, template_of,
 };
@@ -309,10 +310,9 @@ pub struct RecordingDescription {
     pub sensor: Option<String>,
     /// True if taps that drove a channel to its limit are used from where their decays are whole.
     pub keep_overload: bool,
-    /// Taps that are used whatever their faults: times of their triggers (s from the start of the recording), ascending.
-    pub accept_taps: Vec<f64>,
-    /// Taps that are left out: times as above. None of them is within 0.1 s of one of `accept_taps`.
-    pub reject_taps: Vec<f64>,
+    /// Taps that are used whatever their faults, and taps that are left out. Times are in order. None of one list is within
+    /// 0.1 s of one of the other.
+    pub by_hand: TapsByHand,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,
     /// Carried to the outputs: temperature (degrees Celsius).

@@ -19,7 +19,7 @@ use tapjoint_beam::MEASURED_LIMIT;
 use tapjoint_numerics::quantity::Dimension;
 use tapjoint_signal::recording::{MOST_FILES, TIME_UNITS};
 use tapjoint_signal::spectral::{LEAST_BLOCK, MOST_BLOCK};
-use tapjoint_signal::taps::REACH;
+use tapjoint_signal::taps::{REACH, TapsByHand};
 
 /// Words of `kind` in `[[sensor]]`.
 pub const SENSOR_KINDS: [(&str, SensorKind); 4] = [
@@ -336,14 +336,14 @@ pub(super) fn read_recording(
             )));
         }
     }
-    let accept_taps = table
-        .optional("accept_taps", read_taps)?
-        .unwrap_or_default();
-    let reject_taps = table
-        .optional("reject_taps", read_taps)?
-        .unwrap_or_default();
+    let accept = table.optional("accept_taps", read_taps)?;
+    let reject = table.optional("reject_taps", read_taps)?;
+    let by_hand = TapsByHand {
+        accept: accept.unwrap_or_default(),
+        reject: reject.unwrap_or_default(),
+    };
     if let Some(entry) = table.get("reject_taps") {
-        check_chosen_once(&entry, &accept_taps, &reject_taps)?;
+        check_chosen_once(&entry, &by_hand.accept, &by_hand.reject)?;
     }
     Ok(RecordingDescription {
         poles: table.optional("poles", read_poles)?,
@@ -370,8 +370,7 @@ pub(super) fn read_recording(
             .unwrap_or_default(),
         sensor,
         keep_overload: table.choice("overload", &OVERLOADS)?.unwrap_or(false),
-        accept_taps,
-        reject_taps,
+        by_hand,
         torque: table.within("torque", Dimension::Torque, &TORQUE)?,
         temperature: table.within("temperature", Dimension::Temperature, &TEMPERATURE)?,
         date: table.optional("date", Entry::date)?,

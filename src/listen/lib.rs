@@ -10,6 +10,9 @@
 mod alarm;
 mod listener;
 mod news;
+mod precision;
+mod silence;
 
 pub use listener::{ListenError, ListenSettings, Listener};
 pub use news::{JudgedTap, News};
+pub use precision::{LEAST_GAIN, Precision};

@@ -53,8 +53,8 @@ pub fn render_answer(
     }
 }
 
-/// Returns the answer so far, in a few lines: it is renewed while somebody taps.
-pub fn render_progress(document: &Document, screen: Screen) -> String {
+/// Returns the answer so far, in a few sentences: it is renewed while somebody taps.
+pub fn render_progress(document: &Document) -> Vec<String> {
     let answer = Answer::of(document);
     let mut lines = Vec::new();
     if let Some(state) = answer.state {
@@ -68,7 +68,11 @@ pub fn render_progress(document: &Document, screen: Screen) -> String {
     let strong = answer.strong_rows();
     let frequencies: Vec<&str> = strong.iter().map(|row| row[1].as_str()).collect();
     if !frequencies.is_empty() {
-        lines.push(format!("modes {} Hz", frequencies.join("; ")));
+        let lowest = lowest_coherence(document);
+        let coherence = lowest.map_or(String::new(), |(mode, coherence)| {
+            format!("; lowest coherence {coherence:.3} (mode {mode})")
+        });
+        lines.push(format!("modes {} Hz{coherence}", frequencies.join("; ")));
     }
     let mut values = Vec::new();
     for value in &answer.values {
@@ -79,11 +83,16 @@ pub fn render_progress(document: &Document, screen: Screen) -> String {
         let model = model.map_or(String::new(), |model| format!(", {model}"));
         lines.push(values.join("; ") + &model);
     }
-    let mut text = String::new();
-    for line in lines {
-        text.push_str(&screen.wrapped(&line, 2));
-    }
-    text
+    lines.extend(answer.findings);
+    lines.extend(answer.action.map(|action| format!("> {action}")));
+    lines
+}
+
+/// The numbered mode with the lowest coherence (1) on its line; `None` below two averages.
+fn lowest_coherence(document: &Document) -> Option<(usize, f64)> {
+    let modes = document.modes.iter().flatten();
+    let known = modes.filter_map(|mode| mode.mode.zip(mode.coherence));
+    known.min_by(|one, other| one.1.total_cmp(&other.1))
 }
 
 /// The findings in so many lines: the first ones where there is no room for all.

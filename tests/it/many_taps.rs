@@ -4,7 +4,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::{PI, TAU};
+use tapjoint::description::ChannelRef;
+use tapjoint::listen::Precision;
+use tapjoint::pipeline::run_recording;
 use tapjoint::recording::Channel;
+use tapjoint::report::document_of;
 use tapjoint::taps::TapSource;
 use tapjoint::{MeasureSettings, Measurement, Recording, measure};
 
@@ -127,4 +131,48 @@ fn recover_frequencies_of_many_taps_without_a_hammer() {
     }
     // Fewer than 5 of 8 have a probability of 4 in 10,000.
     assert!(inside >= 5, "{inside} of 8");
+}
+
+#[test]
+fn recover_what_the_next_tap_brings() {
+    /// Pairs of recordings. The intervals scatter by a tenth from one to the next.
+    const SEEDS: u64 = 24;
+    let hammer = ChannelRef::Number(1);
+    for taps in [3, 6] {
+        let (mut ratios, mut promised) = (Vec::new(), 0.0);
+        for seed in 0..SEEDS {
+            let [with, without] = [taps + 1, taps].map(|count| {
+                let recording = tapped(100 + seed, 1024.0, count, 2.0);
+                let analysis = run_recording(recording, Some(&hammer), |_| {}).unwrap();
+                document_of(&analysis)
+            });
+            promised = Precision::of(&without, taps).unwrap().gain;
+            let half = |document: &tapjoint::report::document::Document, frequency: f64| {
+                let modes = document.modes.iter().flatten();
+                let mode = modes
+                    .filter(|mode| (mode.frequency - frequency).abs() < 0.5)
+                    .next()?;
+                Some(mode.high? - mode.low?)
+            };
+            for (frequency, _, _) in MODES {
+                let halves = half(&with, frequency).zip(half(&without, frequency));
+                ratios.extend(halves.map(|(with, without)| (with / without).ln()));
+            }
+        }
+        let count = ratios.len() as f64;
+        assert!(count >= 1.5 * SEEDS as f64, "{count}");
+        let mean = ratios.iter().sum::<f64>() / count;
+        let square = ratios
+            .iter()
+            .map(|ratio| (ratio - mean).powi(2))
+            .sum::<f64>();
+        let error = (square / (count - 1.0) / count).sqrt();
+        let wanted = (1.0_f64 - promised).ln();
+        assert!(
+            (mean - wanted).abs() < 3.0 * error,
+            "{taps} taps: {mean:.3} \u{b1} {error:.3} for {wanted:.3}"
+        );
+        // The test can tell a gain from none.
+        assert!(3.0 * error < -wanted, "{error} for {wanted}");
+    }
 }

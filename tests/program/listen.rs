@@ -5,9 +5,10 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Lines, Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 
 const LOW: &str = "recordings/cantilever/low.wav";
 
@@ -438,4 +439,321 @@ fn regress_broken_streams_are_named_and_nothing_is_lost() {
         ),
         "{warning}"
     );
+}
+
+/// The page of `listen`, asked by plain requests.
+struct Page {
+    port: String,
+    token: String,
+}
+
+impl Page {
+    /// Reads its address from the line that names it.
+    fn of(line: &str) -> Self {
+        let address = line.strip_prefix("page: http://127.0.0.1:").unwrap();
+        let (port, token) = address.trim_end_matches('/').split_once('/').unwrap();
+        Self {
+            port: port.to_owned(),
+            token: token.to_owned(),
+        }
+    }
+
+    fn own_host(&self) -> String {
+        format!("Host: 127.0.0.1:{}", self.port)
+    }
+
+    /// Sends a request with these lines as its head, and returns the connection.
+    fn send(&self, first: &str, lines: &[&str], body: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port.parse().unwrap())).unwrap();
+        let lines = lines.join("\r\n");
+        let length = body.len();
+        let head = format!(
+            "{first} HTTP/1.1\r\n{lines}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        let _ = stream.write_all(body.as_bytes());
+        stream
+    }
+
+    /// Status and text of the answer to a request.
+    fn asked(&self, first: &str, lines: &[&str], body: &str) -> (u16, String) {
+        let mut stream = self.send(first, lines, body);
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let status = answer.split(' ').nth(1).unwrap().parse().unwrap();
+        (status, answer)
+    }
+
+    /// Asks for an action, as the page does.
+    fn act(&self, body: &str) -> u16 {
+        let (host, origin) = (
+            self.own_host(),
+            format!("Origin: http://127.0.0.1:{}", self.port),
+        );
+        let lines = [&host, "Content-Type: application/json", &origin];
+        let first = format!("POST /{}/act", self.token);
+        self.asked(&first, &lines, body).0
+    }
+
+    /// The states of the bench as the page gets them.
+    fn benches(&self) -> impl Iterator<Item = Value> + use<> {
+        let first = format!("GET /{}/events", self.token);
+        let stream = self.send(&first, &[&self.own_host()], "");
+        let lines = BufReader::new(stream).lines();
+        let told = lines.filter_map(|line| {
+            let line = line.unwrap();
+            let told = line.strip_prefix("data: ")?;
+            Some(serde_json::from_str(told).unwrap())
+        });
+        told.filter(|told: &Value| told.get("taps").is_some())
+    }
+}
+
+/// Starts `listen` with a page. Returns the lines that it prints, without those of the head.
+fn start_with_page(
+    folder: &Path,
+    arguments: &[&str],
+) -> (Child, Page, Lines<BufReader<ChildStdout>>) {
+    let mut listening = start(folder, &[arguments, &["--serve", "0"]].concat());
+    let mut lines = BufReader::new(listening.stdout.take().unwrap()).lines();
+    let page = Page::of(&lines.next().unwrap().unwrap());
+    (listening, page, lines)
+}
+
+#[test]
+fn prop_the_page_answers_its_own_requests_alone() {
+    let folder = samples();
+    let place = folder.path();
+    let (mut listening, page, _lines) = start_with_page(place, &["taps.wav", "--hammer", "1"]);
+    let input = listening.stdin.take().unwrap();
+    let (own, token) = (page.own_host(), page.token.clone());
+    let get = |path: &str, lines: &[&str]| page.asked(&format!("GET {path}"), lines, "").0;
+    for file in ["", "page.css", "page.js", "report"] {
+        let (status, answer) = page.asked(&format!("GET /{token}/{file}"), &[&own], "");
+        assert_eq!(status, 200, "{file}");
+        for header in [
+            "Referrer-Policy: no-referrer",
+            "Content-Security-Policy: default-src 'none'",
+        ] {
+            assert!(answer.contains(header), "{file}: {answer}");
+        }
+    }
+    let localhost = own.replace("127.0.0.1", "localhost");
+    assert_eq!(get(&format!("/{token}/"), &[&localhost]), 200);
+    // Without the token, or with another one.
+    let other = token.replace(|digit| digit == 'a', "b") + "0";
+    for path in [
+        "/",
+        "/page.js",
+        "/events",
+        &format!("/{other}/"),
+        &format!("/{}/", &token[1..]),
+    ] {
+        assert_eq!(get(path, &[&own]), 403, "{path}");
+    }
+    // From a page of another host, and by a name that leads here.
+    let root = format!("/{token}/");
+    assert_eq!(get(&root, &[&own, "Origin: http://example.com"]), 403);
+    assert_eq!(get(&root, &[&own, "Origin: null"]), 403);
+    assert_eq!(get(&root, &["Host: example.com"]), 403);
+    assert_eq!(
+        get(&root, &[&format!("Host: example.com:{}", page.port)]),
+        403
+    );
+    assert_eq!(get(&root, &[]), 403);
+    // Nothing but its own files.
+    let paths = [
+        "../taps.wav",
+        "taps.wav",
+        "..%2f..%2fetc/passwd",
+        "page/page.js",
+        "//etc/passwd",
+    ];
+    for path in paths {
+        assert_eq!(get(&format!("/{token}/{path}"), &[&own]), 404, "{path}");
+    }
+    // Actions: as JSON alone, and no others.
+    let post =
+        |lines: &[&str], body: &str| page.asked(&format!("POST /{token}/act"), lines, body).0;
+    let stop = "{\"action\": \"stop\"}";
+    assert_eq!(post(&[&own], stop), 403);
+    assert_eq!(post(&[&own, "Content-Type: text/plain"], stop), 403);
+    assert_eq!(
+        page.asked("POST /act", &[&own, "Content-Type: application/json"], stop)
+            .0,
+        403
+    );
+    assert_eq!(
+        page.asked(&format!("PUT /{token}/act"), &[&own], stop).0,
+        405
+    );
+    for body in [
+        "",
+        "{",
+        "[]",
+        "{\"action\": \"run\"}",
+        "{\"action\": \"accept\", \"time\": \"1\"}",
+    ] {
+        assert_eq!(page.act(body), 400, "{body}");
+    }
+    let long = format!(
+        "{{\"action\": \"stop\", \"more\": \"{}\"}}",
+        "x".repeat(2000)
+    );
+    assert_eq!(page.act(&long), 400);
+    // It still listens.
+    assert!(listening.try_wait().unwrap().is_none());
+    assert_eq!(page.act(stop), 204);
+    let ended = listening.wait_with_output().unwrap();
+    drop(input);
+    assert_eq!(ended.status.code(), Some(2));
+    let error = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(error, "error: taps.wav: nothing was recorded\n");
+    // A port that is taken.
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let error = refused(place, &["taps.wav", "--hammer", "1", "--serve", &port], b"");
+    assert!(
+        error.starts_with(&format!("error: --serve {port}: this port cannot be used")),
+        "{error}"
+    );
+    assert!(!place.join("taps.wav").exists());
+}
+
+#[test]
+fn recover_decisions_by_hand_and_the_answer_of_run() {
+    let folder = samples();
+    let place = folder.path();
+    let low = fs::read(place.join(LOW)).unwrap();
+    let given = [
+        "taps.wav", "--hammer", "1", "--out", "one", "--json", "one.json",
+    ];
+    let (mut listening, page, lines) = start_with_page(place, &given);
+    let mut input = listening.stdin.take().unwrap();
+    // The stream stays open for a last frame.
+    input.write_all(&low[..low.len() - 9]).unwrap();
+    let mut benches = page.benches();
+    let taps = |bench: &Value| bench["taps"].as_array().unwrap().clone();
+    let first = benches.find(|bench| taps(bench).len() == 5).unwrap();
+    let tap = taps(&first)[1].clone();
+    assert_eq!(tap["accepted"], true, "{tap}");
+    let time = tap["time"].as_f64().unwrap();
+    // Of the last tap, of one that is named, and back again.
+    for (action, place, accepted) in [
+        (
+            format!("{{\"action\": \"reject\", \"time\": {time}}}"),
+            1,
+            false,
+        ),
+        ("{\"action\": \"reject\"}".to_owned(), 4, false),
+        ("{\"action\": \"undo\"}".to_owned(), 4, true),
+    ] {
+        assert_eq!(page.act(&action), 204);
+        let done = benches.find(|bench| taps(bench)[place]["accepted"] == accepted);
+        assert!(done.is_some(), "{action}");
+    }
+    assert_eq!(page.act("{\"action\": \"stop\"}"), 204);
+    let ended = benches.filter(|bench| !bench["ended"].is_null()).last();
+    let words = "The recording has ended. The report is written; the terminal names its folder.";
+    assert_eq!(ended.unwrap()["ended"], words);
+    let printed = lines.map(Result::unwrap).collect::<Vec<_>>();
+    drop(input);
+    assert_eq!(listening.wait().unwrap().code(), Some(0), "{printed:?}");
+    let rounded = (time * 1e4).round() / 1e4;
+    let told =
+        format!("decided by hand: give --reject-taps {rounded} to `run` for the same answer");
+    assert!(printed.contains(&told), "{printed:?}");
+    // The same file through `run`, with the same decisions.
+    let again = [
+        "run",
+        "taps.wav",
+        "--hammer",
+        "1",
+        "--reject-taps",
+        &rounded.to_string(),
+        "--out",
+        "two",
+        "--json",
+        "two.json",
+    ];
+    tapjoint(place, &again, 0);
+    let read = |name: &str| fs::read_to_string(place.join(name)).unwrap();
+    assert_eq!(read("one.json"), read("two.json"));
+    let found: Value = serde_json::from_str(&read("one.json")).unwrap();
+    assert_eq!(
+        found["recordings"][0]["taps"][1]["reason"],
+        "rejected by hand"
+    );
+    let decisions: Vec<Value> = log(&place.join("taps.listen.jsonl"))
+        .into_iter()
+        .filter(|line| line["news"] == "by-hand")
+        .map(|line| line["decision"].clone())
+        .collect();
+    assert_eq!(decisions, ["reject", "reject", "undo"]);
+}
+
+#[test]
+fn recover_a_test_in_one_stream_by_next() {
+    let folder = samples();
+    let place = folder.path();
+    let test = place.join("recordings/cantilever");
+    let [low, high] = ["low.wav", "high.wav"].map(|name| fs::read(test.join(name)).unwrap());
+    for name in ["low.wav", "high.wav"] {
+        fs::remove_file(test.join(name)).unwrap();
+    }
+    let rate_of = |file: &[u8]| u32::from_le_bytes(file[24..28].try_into().unwrap());
+    let (rate, head) = (rate_of(&low).to_string(), head_of(&low));
+    let given = [
+        "recordings/cantilever/test.toml",
+        "--rate",
+        &rate,
+        "--channels",
+        "3",
+        "--format",
+        "s24le",
+        "--out",
+        "report",
+    ];
+    let (mut listening, page, lines) = start_with_page(place, &given);
+    let mut input = listening.stdin.take().unwrap();
+    let mut benches = page.benches();
+    input.write_all(&low[head..]).unwrap();
+    let taps = |bench: &Value| bench["taps"].as_array().unwrap().len();
+    let first = benches.find(|bench| taps(bench) == 5).unwrap();
+    assert_eq!(first["next"], "high.wav, tap at 0.385 m");
+    assert_eq!(page.act("{\"action\": \"reject\"}"), 204);
+    assert_eq!(page.act("{\"action\": \"next\"}"), 204);
+    // The stream turns with its next samples. They need not fit the other rate for this.
+    let mut sent = 0;
+    let samples = &high[head_of(&high)..];
+    while !test.join("high.wav").exists() {
+        assert!(sent + 9000 < samples.len());
+        input.write_all(&samples[sent..sent + 9000]).unwrap();
+        sent += 9000;
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    input.write_all(&samples[sent..]).unwrap();
+    let title = "recording high.wav, tap at 0.385 m";
+    let second = benches.find(|bench| bench["title"] == title).unwrap();
+    assert_eq!(second["next"], Value::Null);
+    drop(input);
+    let printed = lines.map(Result::unwrap).collect::<Vec<_>>().join("\n");
+    assert!(
+        listening
+            .wait()
+            .unwrap()
+            .code()
+            .is_some_and(|code| code < 2),
+        "{printed}"
+    );
+    assert!(printed.contains(title), "{printed}");
+    // No sample is lost between the two.
+    let [one, two] = ["low.wav", "high.wav"].map(|name| fs::read(test.join(name)).unwrap());
+    let own = |file: &[u8]| file[head_of(file)..].to_vec();
+    assert!([own(&one), own(&two)].concat() == [&low[head..], samples].concat());
+    let text = fs::read_to_string(test.join("test.toml")).unwrap();
+    assert_eq!(text.matches("reject_taps = [").count(), 1, "{text}");
+    let described = text.split("[[recording]]").nth(1).unwrap();
+    assert!(described.contains("reject_taps = ["), "{text}");
+    assert!(place.join("report/report.html").is_file());
 }

@@ -24,16 +24,13 @@ impl Log {
         }
     }
 
-    /// Notes what was reported once so many seconds were heard.
+    /// Notes a line.
     ///
     /// # Errors
     /// The disk refuses.
-    pub(super) fn note(&mut self, heard: f64, news: &[News]) -> anyhow::Result<()> {
-        for one in news {
-            let written = self.write(&format!("{}\n", line(heard, one)));
-            written.with_context(|| format!("{}: could not be written", self.path.display()))?;
-        }
-        Ok(())
+    pub(super) fn note(&mut self, line: &Value) -> anyhow::Result<()> {
+        let written = self.write(&format!("{line}\n"));
+        written.with_context(|| format!("{}: could not be written", self.path.display()))
     }
 
     fn write(&mut self, line: &str) -> io::Result<()> {
@@ -48,8 +45,9 @@ impl Log {
     }
 }
 
-/// Returns a line of the log: times in s, frequencies in Hz, the rest as the report has it.
-fn line(heard: f64, news: &News) -> Value {
+/// Returns the line of what was reported once so many seconds were heard: times in s, frequencies in Hz, the rest as the
+/// report has it.
+pub(super) fn line_of(heard: f64, news: &News) -> Value {
     match news {
         News::Tap(tap) => tap_line(heard, "tap", tap),
         News::Revised(tap) => tap_line(heard, "revised", tap),
@@ -73,4 +71,9 @@ fn tap_line(heard: f64, news: &str, tap: &JudgedTap) -> Value {
         "seconds": tap.seconds,
         "remaining": tap.remaining,
     })
+}
+
+/// Returns the line of a decision by hand on the tap at this time (s): `what` is "accept", "reject" or "undo".
+pub(super) fn line_by_hand(heard: f64, what: &str, time: Option<f64>) -> Value {
+    json!({ "heard": heard, "news": "by-hand", "decision": what, "time": time })
 }

@@ -5,31 +5,46 @@ use anyhow::{Context, bail};
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Largest number of bytes of samples in one file. 1 GB: any program reads such a file, and 4 channels of 16 bits at
 /// 51.2 kHz take 43 minutes for it.
 const LARGEST: u64 = 1 << 30;
 
-/// Where the samples go.
-pub(super) struct Destination {
+/// Names of the files of a recording.
+#[derive(Debug, Clone)]
+pub(super) struct Names {
     /// Name of the first file.
     pub(super) first: PathBuf,
     /// Names that belong to other recordings.
     pub(super) reserved: Vec<PathBuf>,
+}
+
+/// Where the samples go.
+#[derive(Clone)]
+pub(super) struct Destination {
+    /// The recording that begins the stream.
+    pub(super) names: Names,
     /// Nothing more is written once this is set.
     pub(super) stop: Arc<AtomicBool>,
+    /// The recording that follows, once it is asked for.
+    pub(super) next: Arc<Mutex<Option<Names>>>,
+}
+
+impl Destination {
+    /// Returns the recording that is to follow now, once.
+    pub(super) fn turned_to(&self) -> Option<Names> {
+        let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
+        next.take()
+    }
 }
 
 /// Writes samples as they come. The sizes in the header are those of what is written, after every call: a process that is
 /// killed leaves a file that can be read.
 #[derive(Debug)]
 pub(super) struct Recorder {
-    /// Name of the first file.
-    first: PathBuf,
-    /// Names that belong to other recordings.
-    reserved: Vec<PathBuf>,
+    names: Names,
     layout: PcmLayout,
     path: PathBuf,
     file: File,
@@ -46,14 +61,10 @@ impl Recorder {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub(super) fn begin(destination: &Destination, layout: PcmLayout) -> anyhow::Result<Self> {
-        let Destination {
-            first, reserved, ..
-        } = destination;
-        let (path, file) = next_file(first, reserved, &layout)?;
+    pub(super) fn begin(names: Names, layout: PcmLayout) -> anyhow::Result<Self> {
+        let (path, file) = next_file(&names, &layout)?;
         Ok(Self {
-            first: first.clone(),
-            reserved: reserved.clone(),
+            names,
             largest: LARGEST - LARGEST % layout.frame_bytes,
             layout,
             path,
@@ -61,6 +72,16 @@ impl Recorder {
             bytes: 0,
             begun: Vec::new(),
         })
+    }
+
+    /// Goes on in the first file of another recording.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub(super) fn turn_to(&mut self, names: Names) -> anyhow::Result<()> {
+        (self.path, self.file) = next_file(&names, &self.layout)?;
+        (self.names, self.bytes) = (names, 0);
+        Ok(())
     }
 
     /// The file that is written now.
@@ -90,7 +111,7 @@ impl Recorder {
         if fitting == whole {
             return Ok(false);
         }
-        (self.path, self.file) = next_file(&self.first, &self.reserved, &self.layout)?;
+        (self.path, self.file) = next_file(&self.names, &self.layout)?;
         self.bytes = 0;
         self.append(whole - fitting)?;
         Ok(true)
@@ -122,11 +143,8 @@ impl Recorder {
 }
 
 /// Makes the first file of a recording that is not there yet and no other recording's: taps.wav, taps-2.wav, taps-3.wav.
-fn next_file(
-    first: &Path,
-    reserved: &[PathBuf],
-    layout: &PcmLayout,
-) -> anyhow::Result<(PathBuf, File)> {
+fn next_file(names: &Names, layout: &PcmLayout) -> anyhow::Result<(PathBuf, File)> {
+    let Names { first, reserved } = names;
     for number in 1..=MOST_FILES {
         let path = part(first, number);
         if reserved.contains(&path) {
@@ -165,11 +183,10 @@ mod tests {
     use super::*;
     use crate::recording::{ReadSettings, Recording, SampleForm};
 
-    fn destination(first: &Path, reserved: Vec<PathBuf>) -> Destination {
-        Destination {
+    fn names(first: &Path, reserved: Vec<PathBuf>) -> Names {
+        Names {
             first: first.to_owned(),
             reserved,
-            stop: Arc::default(),
         }
     }
 
@@ -187,7 +204,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = folder.path().join("taps.wav");
         let layout = PcmLayout::new(1000, 2, SampleForm::S16).unwrap();
-        let mut recorder = Recorder::begin(&destination(&first, Vec::new()), layout).unwrap();
+        let mut recorder = Recorder::begin(names(&first, Vec::new()), layout).unwrap();
         let bytes: Vec<u8> = (0..402_u32).map(|n| (n * 7 % 251) as u8).collect();
         let mut written = 0;
         // Pieces that cut frames.
@@ -210,7 +227,7 @@ mod tests {
         std::fs::write(folder.path().join("taps-2.wav"), "another's").unwrap();
         let layout = PcmLayout::new(1000, 2, SampleForm::S16).unwrap();
         let reserved = vec![folder.path().join("taps-3.wav")];
-        let mut recorder = Recorder::begin(&destination(&first, reserved), layout).unwrap();
+        let mut recorder = Recorder::begin(names(&first, reserved), layout).unwrap();
         recorder.largest = 40;
         let bytes: Vec<u8> = (0..60).collect();
         assert!(!recorder.write(&bytes[..39]).unwrap());

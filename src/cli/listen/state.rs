@@ -1,14 +1,15 @@
 //! What all taps give so far, worked out beside the recording.
 
 use super::super::input::TestFile;
-use super::super::terminal::Terminal;
 use super::target::Target;
 use crate::description::TestDescription;
 use crate::gap::GapSettings;
+use crate::listen::Precision;
 use crate::pipeline::{
     BareSettings, IdentifySettings, analysis_of_bare, diagnose_test, measure_bare_file,
 };
-use crate::report::{Screen, document_of, gap_section, render_progress};
+use crate::report::{document_of, gap_section, render_first_screen, render_progress};
+use crate::taps::TapsByHand;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -59,62 +60,93 @@ impl Subject {
         }
     }
 
-    /// Analyses the recording in these files, with what else there is, and returns the answer in a few lines.
-    fn answer(&mut self, files: &[PathBuf], screen: Screen) -> anyhow::Result<String> {
-        let document = match self {
+    /// Analyses the recording that a question is about, with what else there is.
+    fn answer(&mut self, question: &Question) -> anyhow::Result<SoFar> {
+        let (document, recording) = match self {
             Self::Described { file, table } => {
                 let recording = &mut file.test.recordings[*table];
                 // Names in the description are seen from its folder; others are whole.
-                let mut files = files.iter().map(std::path::absolute);
+                let mut files = question.files.iter().map(std::path::absolute);
                 if let Some(first) = files.next() {
                     recording.file = first?;
                 }
                 recording.more_files = files.collect::<Result<_, _>>()?;
+                recording.by_hand = question.by_hand.clone();
                 let analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
                 let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
                 let mut document = document_of(&analysis);
                 document.add_gap(gap_section(diagnosis.as_ref()));
-                document
+                (document, analysis.recordings.into_iter().nth(*table))
             }
             Self::Bare(settings) => {
+                settings.by_hand = question.by_hand.clone();
                 let mut measured = Vec::new();
-                for file in files {
+                for file in &question.files {
                     measured.push(measure_bare_file(file, settings, &())?);
                 }
-                document_of(&analysis_of_bare(measured[0].file.clone(), measured))
+                let analysis = analysis_of_bare(measured[0].file.clone(), measured);
+                (
+                    document_of(&analysis),
+                    analysis.recordings.into_iter().next(),
+                )
             }
         };
-        Ok(render_progress(&document, screen))
+        // With the picture of the recording that goes on.
+        let recording = recording.filter(|_| question.wants_page);
+        let first_screen = recording.map(|own| render_first_screen(&document, &[own]));
+        Ok(SoFar {
+            lines: render_progress(&document),
+            precision: Precision::of(&document, question.accepted),
+            first_screen: first_screen.transpose()?,
+        })
     }
 }
 
+/// What all taps give so far.
+pub(super) struct SoFar {
+    /// In a few sentences.
+    pub(super) lines: Vec<String>,
+    /// How narrow the intervals are; `None` without any.
+    pub(super) precision: Option<Precision>,
+    /// The first screen of a report on it; `None` where no page is served.
+    pub(super) first_screen: Option<String>,
+}
+
 /// A question for the state.
-struct Question {
-    files: Vec<PathBuf>,
-    screen: Screen,
+#[derive(Clone)]
+pub(super) struct Question {
+    /// Files of the recording.
+    pub(super) files: Vec<PathBuf>,
+    /// Taps that count.
+    pub(super) accepted: usize,
+    /// Taps that are accepted or rejected by hand.
+    pub(super) by_hand: TapsByHand,
+    /// True where a page is served.
+    pub(super) wants_page: bool,
 }
 
 /// Works out states in a thread of its own. While one is worked out, only the newest question waits.
 pub(super) struct States {
     ask: Sender<Question>,
-    answers: Receiver<anyhow::Result<String>>,
+    answers: Receiver<anyhow::Result<SoFar>>,
     is_busy: bool,
-    waiting: Option<Vec<PathBuf>>,
-    /// Taps that counted at the last question.
-    accepted: usize,
+    waiting: Option<Question>,
+    /// Taps that counted at the last question, and what was decided by hand.
+    last: (usize, TapsByHand),
 }
 
 impl States {
-    pub(super) fn begin(mut subject: Subject) -> Self {
+    /// Begins with what was decided by hand before.
+    pub(super) fn begin(mut subject: Subject, by_hand: TapsByHand) -> Self {
         let (ask, questions) = channel::<Question>();
         let (reply, answers) = channel();
         thread::spawn(move || {
             // One thread: the other processors judge taps.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-            for Question { files, screen } in questions {
+            for question in questions {
                 let answer = match &pool {
-                    Ok(pool) => pool.install(|| subject.answer(&files, screen)),
-                    Err(_) => subject.answer(&files, screen),
+                    Ok(pool) => pool.install(|| subject.answer(&question)),
+                    Err(_) => subject.answer(&question),
                 };
                 if reply.send(answer).is_err() {
                     return;
@@ -126,40 +158,36 @@ impl States {
             answers,
             is_busy: false,
             waiting: None,
-            accepted: 0,
+            last: (0, by_hand),
         }
     }
 
-    /// Asks for the state of the recording in these files, if the number of taps that count has changed enough.
-    pub(super) fn ask(&mut self, accepted: usize, files: &[PathBuf]) {
+    /// Asks for the state, if the number of taps that count has changed enough, or what was decided by hand.
+    pub(super) fn ask(&mut self, question: Question) {
+        let (accepted, by_hand) = &self.last;
         // The scatter of a mean falls with the square root of their number: among many one more says little.
-        let change = accepted.abs_diff(self.accepted);
-        if change > 0 && change >= (accepted as f64 * CHANGE) as usize {
-            self.accepted = accepted;
-            self.waiting = Some(files.to_vec());
+        let change = question.accepted.abs_diff(*accepted);
+        let has_changed = change > 0 && change >= (question.accepted as f64 * CHANGE) as usize;
+        if has_changed || *by_hand != question.by_hand {
+            self.last = (question.accepted, question.by_hand.clone());
+            self.waiting = Some(question);
         }
     }
 
-    /// Prints a state that is ready, and begins with the next. A state that cannot be worked out is said, and the recording
-    /// goes on.
-    pub(super) fn report(&mut self, terminal: &Terminal) -> anyhow::Result<()> {
+    /// Returns a state that is ready, and begins with the next.
+    pub(super) fn ready(&mut self) -> Option<anyhow::Result<SoFar>> {
+        let mut ready = None;
         if self.is_busy
             && let Ok(answer) = self.answers.try_recv()
         {
             self.is_busy = false;
-            match answer {
-                Ok(text) => {
-                    let _ = terminal.say(&text);
-                }
-                Err(cause) => terminal.warn(&format!("no result so far: {cause:#}")),
-            }
+            ready = Some(answer);
         }
         if !self.is_busy
-            && let Some(files) = self.waiting.take()
+            && let Some(question) = self.waiting.take()
         {
-            let screen = terminal.screen();
-            self.is_busy = self.ask.send(Question { files, screen }).is_ok();
+            self.is_busy = self.ask.send(question).is_ok();
         }
-        Ok(())
+        ready
     }
 }

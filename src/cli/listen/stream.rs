@@ -1,13 +1,15 @@
 //! The stream of samples, from standard input or a file, and the thread that writes it.
 
-use super::recorder::{Destination, Recorder};
+use super::arrival::Arrival;
+use super::recorder::{Destination, Names, Recorder};
 use crate::recording::{Format, PcmLayout, Recording, SampleForm};
 use anyhow::{Context, bail};
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -22,6 +24,9 @@ const TACT: f64 = 0.02;
 pub(super) enum Source {
     /// Standard input: WAV, or raw samples of this layout.
     Standard(Option<PcmLayout>),
+    /// A sound device.
+    #[cfg(feature = "sound")]
+    Sound(super::sound::SoundDevice),
     /// A file that is played.
     Replay {
         /// The file.
@@ -39,6 +44,10 @@ pub(super) enum Source {
 pub(super) enum Event {
     /// A file is there, with its first samples.
     File(PathBuf),
+    /// The next recording has begun in this file, as it was asked for.
+    Turned(PathBuf),
+    /// Something is wrong with the stream, which goes on.
+    Doubt(String),
     /// The stream has ended, or it cannot be read or written.
     Ended(anyhow::Result<End>),
 }
@@ -52,29 +61,77 @@ pub(super) struct End {
     pub(super) missing: f64,
 }
 
-/// Writes the samples of a source in a thread of its own. It ends with the stream, or when it is stopped.
-pub(super) fn record(source: Source, destination: Destination) -> Receiver<Event> {
-    let (report, events) = channel();
-    thread::spawn(move || {
-        let stream = match source {
-            Source::Standard(layout) => Ok(Stream {
-                input: Box::new(io::stdin()),
-                layout,
-                speed: None,
-                frames: None,
-            }),
-            Source::Replay {
-                path,
-                recording,
-                layout,
-                speed,
-            } => open(&path, recording, layout, speed),
+/// A stream that is written in a thread of its own.
+pub(super) struct Running {
+    /// What the thread reports.
+    pub(super) events: Receiver<Event>,
+    destination: Destination,
+}
+
+impl Running {
+    /// Begins to write the samples of a source into the files of a recording. It ends with the stream, or when it is stopped.
+    pub(super) fn begin(source: Source, names: Names) -> Self {
+        let (report, events) = channel();
+        let destination = Destination {
+            names,
+            stop: Arc::default(),
+            next: Arc::default(),
         };
-        let ended = stream.and_then(|stream| stream.write(&destination, &report));
-        // The command may have ended.
-        let _ = report.send(Event::Ended(ended));
-    });
-    events
+        let own = destination.clone();
+        thread::spawn(move || {
+            let stream = match source {
+                Source::Standard(layout) => Ok(Stream {
+                    input: Box::new(io::stdin()),
+                    layout,
+                    speed: None,
+                    frames: None,
+                    is_live: true,
+                }),
+                #[cfg(feature = "sound")]
+                Source::Sound(device) => device.open(&report).map(|(layout, sound)| Stream {
+                    input: Box::new(sound),
+                    layout: Some(layout),
+                    speed: None,
+                    frames: None,
+                    is_live: true,
+                }),
+                Source::Replay {
+                    path,
+                    recording,
+                    layout,
+                    speed,
+                } => open(&path, recording, layout, speed),
+            };
+            let ended = stream.and_then(|stream| stream.write(&own, &report));
+            // The command may have ended.
+            let _ = report.send(Event::Ended(ended));
+        });
+        Self {
+            events,
+            destination,
+        }
+    }
+
+    /// Returns what stops the stream once it is set.
+    pub(super) fn stopper(&self) -> Arc<AtomicBool> {
+        self.destination.stop.clone()
+    }
+
+    /// Stops the stream. Nothing more is written.
+    pub(super) fn stop(&self) {
+        self.destination.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns true once it was stopped.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.destination.stop.load(Ordering::Relaxed)
+    }
+
+    /// Writes what follows into the files of another recording.
+    pub(super) fn turn_to(&self, names: Names) {
+        let next = self.destination.next.lock();
+        *next.unwrap_or_else(PoisonError::into_inner) = Some(names);
+    }
 }
 
 /// Samples as they come.
@@ -86,6 +143,8 @@ struct Stream {
     speed: Option<f64>,
     /// Number of frames where it is known better than by the header.
     frames: Option<u64>,
+    /// True of samples that come as they are taken.
+    is_live: bool,
 }
 
 /// Opens a file that is played. WAV is played byte by byte.
@@ -104,6 +163,7 @@ fn open(
                 layout,
                 speed,
                 frames: recording.map(|recording| recording.frames()),
+                is_live: false,
             });
         }
         Some(Format::Flac { bits: 16 }) => SampleForm::S16,
@@ -131,6 +191,7 @@ fn open(
         layout: Some(layout),
         speed,
         frames: None,
+        is_live: false,
     })
 }
 
@@ -188,6 +249,8 @@ impl Stream {
         let mut piece = vec![0; (most as usize).clamp(1, PIECE)];
         let mut recorder: Option<Recorder> = None;
         let (mut total, start) = (0_u64, Instant::now());
+        let mut arrival = Arrival::new(f64::from(layout.sample_rate));
+        let mut is_turning = false;
         loop {
             let is_there = bytes.len() as u64 >= left;
             let count = match is_there {
@@ -202,6 +265,12 @@ impl Stream {
             if destination.stop.load(Ordering::Relaxed) {
                 break;
             }
+            if self.is_live
+                && let frames = count as f64 / layout.frame_bytes as f64
+                && let Some(doubt) = arrival.takes(start.elapsed(), frames)
+            {
+                let _ = report.send(Event::Doubt(doubt));
+            }
             bytes.extend_from_slice(&piece[..count]);
             // Chunks behind the samples are no samples.
             bytes.truncate(left.min(bytes.len() as u64) as usize);
@@ -214,12 +283,19 @@ impl Stream {
                     enough
                 };
             if recorder.is_none() && is_enough {
-                recorder = Some(Recorder::begin(destination, layout.clone())?);
+                recorder = Some(Recorder::begin(destination.names.clone(), layout.clone())?);
             }
             if let Some(recorder) = &mut recorder {
+                if let Some(place) = destination.turned_to() {
+                    recorder.turn_to(place)?;
+                    is_turning = true;
+                }
                 let is_first = recorder.bytes() == 0;
                 let is_next = recorder.write(&bytes)?;
-                if is_first || is_next {
+                if is_turning && recorder.bytes() >= enough as u64 {
+                    is_turning = false;
+                    let _ = report.send(Event::Turned(recorder.path().to_owned()));
+                } else if !is_turning && (is_first || is_next) {
                     let _ = report.send(Event::File(recorder.path().to_owned()));
                 }
                 left -= bytes.len() as u64;
@@ -227,6 +303,14 @@ impl Stream {
             }
             if is_over {
                 break;
+            }
+        }
+        // A recording that has just begun: short, but not lost.
+        if let Some(recorder) = recorder.as_ref().filter(|_| is_turning) {
+            let path = recorder.path().to_owned();
+            match recorder.bytes() {
+                0 => fs::remove_file(path)?,
+                _ => drop(report.send(Event::Turned(path))),
             }
         }
         if destination.stop.load(Ordering::Relaxed) {

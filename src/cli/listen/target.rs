@@ -1,6 +1,6 @@
 //! The recording that is written next.
 
-use super::super::input::TestFile;
+use super::super::input::{TestFile, file_name};
 use super::super::place::{Place, is_description};
 use super::recorder::part;
 use crate::recording::MOST_FILES;
@@ -23,6 +23,7 @@ pub(super) struct Target {
 }
 
 /// Returns the recording that a description asks for next: the first whose file is missing, or the one that is played.
+/// The one at `without` (0-based) is passed over.
 ///
 /// # Errors
 /// None is missing; its name is not that of a WAV file; the file played is none of it.
@@ -30,10 +31,12 @@ pub(super) fn described_target(
     file: &TestFile,
     replayed: Option<&Path>,
     is_resumed: bool,
+    without: Option<usize>,
 ) -> anyhow::Result<Target> {
     let played = replayed.and_then(Place::of);
     let recordings = file.test.recordings.iter().enumerate();
-    let recordings = recordings.filter(|(_, recording)| recording.form.is_none());
+    let recordings =
+        recordings.filter(|(table, recording)| recording.form.is_none() && Some(*table) != without);
     let mut last = None;
     for (table, recording) in recordings {
         let others = file.test.recordings.iter().enumerate();
@@ -153,6 +156,32 @@ fn resumed(
         "{}: has {MOST_FILES} files already; record into another file",
         first.display()
     )
+}
+
+/// "low.wav, tap at 0.04 m".
+pub(super) fn asked_for(file: &TestFile, target: &Target) -> String {
+    let name = file_name(&target.file);
+    let recording = target.table.map(|table| &file.test.recordings[table]);
+    let Some(recording) = recording else {
+        return name;
+    };
+    let mut words = vec![name];
+    if let Some(tap) = recording.tap {
+        words.push(format!("tap at {tap} m"));
+    }
+    if let Some(level) = recording.level.filter(|level| *level != 1.0) {
+        words.push(format!("{level} times as hard as level 1"));
+    }
+    for (sensor, place) in &recording.at {
+        words.push(format!("sensor {sensor} at {place} m"));
+    }
+    if let Some(length) = recording.length {
+        words.push(format!("free length {length} m"));
+    }
+    if !recording.masses.is_empty() {
+        words.push(format!("with {} known masses", recording.masses.len()));
+    }
+    words.join(", ")
 }
 
 fn check_ending(path: &Path, line: Option<usize>, test: &str) -> anyhow::Result<()> {

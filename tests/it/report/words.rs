@@ -9,7 +9,8 @@ use tapjoint::report::document::{
 use tapjoint::report::tables::parameters;
 use tapjoint::report::words::findings as summary;
 use tapjoint::report::{
-    Screen, render_json, render_modes_csv, render_parameters_csv, render_taps_csv, render_text,
+    Screen, render_json, render_modes_csv, render_parameters_csv, render_progress, render_taps_csv,
+    render_text,
 };
 use tapjoint::structure::Assembly;
 use tapjoint::taps::Pulse;
@@ -34,6 +35,16 @@ fn prop_page_holds_every_section_and_picture() {
     assert!(
         place("id=\"answer\"") < place("id=\"warnings\""),
         "the answer comes first"
+    );
+}
+
+#[test]
+fn regress_words_of_a_result_so_far() {
+    let lines = render_progress(&fixture::document());
+    assert_snapshot("progress", &lines.join("\n"));
+    assert_eq!(
+        render_progress(&Document::default(), Screen::default()),
+        "so far good\n"
     );
 }
 

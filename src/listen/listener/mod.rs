@@ -1,15 +1,18 @@
 //! The listener: reads a growing file in steps, looks when a record has ended, and reports what is new.
 
+mod by_hand;
+mod doubts;
+
 use crate::alarm::Alarm;
 use crate::news::{JudgedTap, News};
-use std::mem::discriminant;
+use crate::silence::Silence;
 use std::ops::Range;
 use tapjoint_analysis::{PipelineError, RecordingPlan, TapsSoFar, taps_so_far};
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::quality::remedy_of;
 use tapjoint_signal::recording::{GrowingRecording, Recording, RecordingError};
 use tapjoint_signal::spectral::measure_decay;
-use tapjoint_signal::taps::{REACH, Rejection, Tap, TapMemo, TapRemark, TapSource};
+use tapjoint_signal::taps::{REACH, Rejection, Tap, TapMemo, TapRemark, TapSource, TapsByHand};
 
 /// Length of a step (s). A verdict waits for the end of its step.
 const STEP: f64 = 0.05;
@@ -53,6 +56,8 @@ struct Reported {
     time: f64,
     /// Why it does not count; `None` = it counts.
     rejection: Option<Rejection>,
+    /// True where it counts by hand alone.
+    is_overruled: bool,
 }
 
 impl From<&Tap> for Reported {
@@ -60,6 +65,7 @@ impl From<&Tap> for Reported {
         Self {
             time: tap.time,
             rejection: tap.rejection.clone(),
+            is_overruled: tap.overruled.is_some(),
         }
     }
 }
@@ -74,7 +80,16 @@ pub struct Listener<'a> {
     /// Channels on which taps are heard (0-based); not known before the first look.
     watched: Vec<usize>,
     alarm: Alarm,
+    /// Hears the responses where there is a hammer.
+    answers: Alarm,
+    silence: Silence,
     memo: TapMemo,
+    /// The taps that are accepted or rejected by hand.
+    by_hand: TapsByHand,
+    /// What was decided by hand before each of the last decisions, the newest last.
+    earlier_by_hand: Vec<TapsByHand>,
+    /// Swing of each channel in the last step.
+    swings: Vec<f64>,
     /// Frame at which the record of the last tap has ended, if no other tap comes first.
     due: Option<u64>,
     reported: Vec<Reported>,
@@ -99,8 +114,13 @@ impl<'a> Listener<'a> {
             settings,
             growing,
             step,
+            by_hand: plan.by_hand(),
+            earlier_by_hand: Vec::new(),
+            swings: Vec::new(),
             watched: Vec::new(),
             alarm: Alarm::default(),
+            answers: Alarm::default(),
+            silence: Silence::default(),
             memo: TapMemo::default(),
             due: None,
             reported: Vec::new(),
@@ -129,20 +149,23 @@ impl<'a> Listener<'a> {
             };
             return Ok(Some(news));
         }
+        let swings = swings.iter().map(|swing| swing.high - swing.low);
+        self.swings = swings.collect();
+        self.silence.takes(&self.swings);
         let watched = self.watched.iter();
-        let swings: Vec<f64> = watched
-            .map(|channel| swings[*channel].high - swings[*channel].low)
-            .collect();
+        let swings: Vec<f64> = watched.map(|channel| self.swings[*channel]).collect();
         let now = self.growing.frames();
         let hears = self.alarm.hears(&swings);
         let is_over = self.due.is_some_and(|due| due <= now);
-        let mut news = Vec::new();
+        let mut news = self.silent_hammer(now);
         // The next tap ends the record of the one before.
         if is_over || hears && self.due.is_some() {
             self.due = None;
-            news = self.look(true)?;
+            news.extend(self.look(true)?);
+            news.extend(self.still_responses());
         }
         if hears {
+            self.silence.begin();
             self.due = Some(now + self.record_frames());
         }
         Ok(Some(news))
@@ -177,6 +200,18 @@ impl<'a> Listener<'a> {
         // The record of a tap may end in the next file.
         self.due = self.due.map(|_| self.record_frames());
         Ok(news)
+    }
+
+    /// Name of each channel on which something is measured, the hammer first, and its swing (highest less lowest value, unit
+    /// of the file) in the last twentieth of a second. Empty before the first look.
+    pub fn levels(&self) -> Vec<(&str, f64)> {
+        let found = self.latest.iter();
+        let names = found.flat_map(|found| &found.names);
+        let levels = names.map(|(channel, name)| {
+            let swing = self.swings.get(*channel).copied();
+            (name.as_str(), swing.unwrap_or_default())
+        });
+        levels.collect()
     }
 
     /// Returns how far the taps excite the structure in the mean, and the end of the stated band (Hz), where they do not reach
@@ -233,7 +268,13 @@ impl<'a> Listener<'a> {
             // The last decisions are those of a first look.
             self.memo = TapMemo::default();
         }
-        let found = taps_so_far(recording, &self.plan, is_growing, &mut self.memo)?;
+        let found = taps_so_far(
+            recording,
+            &self.plan,
+            &self.by_hand,
+            is_growing,
+            &mut self.memo,
+        )?;
         let mut news = Vec::new();
         // Before the first tap a channel may rest, and nothing is strange about it.
         if self.latest.is_some() {
@@ -283,35 +324,6 @@ impl<'a> Listener<'a> {
         Ok(news)
     }
 
-    /// Returns the doubts about a recording and its taps of a kind that was not reported yet.
-    fn new_doubts(&mut self, found: &TapsSoFar, is_growing: bool) -> Vec<News> {
-        let mut news = Vec::new();
-        let recording = &found.recording;
-        let parts = recording.parts().map(|(_, part)| part.warnings());
-        for warning in recording.warnings().into_iter().chain(parts.flatten()) {
-            // Its numbers move from look to look.
-            let kind = (warning.code(), warning.channel());
-            if !self.doubts.contains(&kind) {
-                news.push(News::Doubt(warning.to_string()));
-                self.doubts.push(kind);
-            }
-        }
-        for remark in &found.taps.remarks {
-            // What is missing so far may still come.
-            let is_early = match remark {
-                TapRemark::NoTapThere { time, .. } => *time > found.recording.duration(),
-                TapRemark::FileWithoutTap { .. } | TapRemark::AllOverloaded { .. } => true,
-                _ => false,
-            };
-            let is_held_back = is_growing && is_early;
-            if !is_held_back && !self.remarks.iter().any(|other| is_same(remark, other)) {
-                news.push(News::Doubt(remark.to_string()));
-                self.remarks.push(remark.clone());
-            }
-        }
-        news
-    }
-
     /// Length of signal after which a tap is judged (s).
     fn record(&self, found: &TapsSoFar) -> f64 {
         self.settings.record.max(found.wanted.unwrap_or(0.0))
@@ -334,20 +346,6 @@ impl<'a> Listener<'a> {
         let record = self.record(found);
         // The alarm comes up to two steps after the trigger.
         found.recording.duration() - tap.time >= record - 2.0 * STEP
-    }
-}
-
-/// Returns true for two remarks about the same thing; their numbers move from look to look.
-fn is_same(one: &TapRemark, other: &TapRemark) -> bool {
-    match (one, other) {
-        (TapRemark::NoTapThere { time, .. }, TapRemark::NoTapThere { time: other, .. })
-        | (TapRemark::StillRejected { time, .. }, TapRemark::StillRejected { time: other, .. }) => {
-            time == other
-        }
-        (TapRemark::FileWithoutTap { file }, TapRemark::FileWithoutTap { file: other }) => {
-            file == other
-        }
-        _ => discriminant(one) == discriminant(other),
     }
 }
 
@@ -416,215 +414,4 @@ fn about_mean(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::{PI, TAU};
-    use std::path::Path;
-    use tapjoint_analysis::BareSettings;
-    use tapjoint_description::ChannelRef;
-    use tapjoint_signal::recording::{Channel, PcmLayout, ReadSettings, SampleForm};
-
-    const RATE: f64 = 5120.0;
-
-    fn bare(hammer: usize) -> BareSettings {
-        BareSettings {
-            hammer: Some(ChannelRef::Number(hammer)),
-            ..BareSettings::default()
-        }
-    }
-
-    fn settings() -> ListenSettings {
-        ListenSettings {
-            name: "taps.wav".to_owned(),
-            record: 1.0,
-            headers: None,
-            earlier: Vec::new(),
-        }
-    }
-
-    /// A hammer pulse at each time (s) with its peak, and the decay of 118 Hz that it wakes.
-    fn samples(seconds: f64, hits: &[(f64, f64)]) -> Vec<[f64; 2]> {
-        let mut state = 7_u32;
-        let mut noise = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            1e-4 * (f64::from(state) / f64::from(u32::MAX) - 0.5)
-        };
-        let mut samples = Vec::new();
-        for n in 0..(seconds * RATE) as usize {
-            let mut frame = [noise(), noise()];
-            for &(time, peak) in hits {
-                let since = n as f64 / RATE - time;
-                if (0.0..2e-3).contains(&since) {
-                    frame[0] += peak * (PI * since / 2e-3).sin().powi(2);
-                }
-                if since > 0.0 {
-                    frame[1] += peak * (-4.0 * since).exp() * (TAU * 118.0 * since).sin();
-                }
-            }
-            samples.push(frame);
-        }
-        samples
-    }
-
-    /// Writes a file in pieces of so many frames, and listens after each. Returns the news with the seconds at which they
-    /// came; those of the end come last.
-    #[expect(clippy::disallowed_methods, reason = "the test is the recorder")]
-    fn heard(samples: &[[f64; 2]], path: &Path, piece: usize) -> Vec<(f64, News)> {
-        let layout = PcmLayout::new(RATE as u32, 2, SampleForm::F64).unwrap();
-        let bare = bare(1);
-        let mut bytes = layout.wav_head(0);
-        let mut listener = None;
-        let mut all = Vec::new();
-        for some in samples.chunks(piece) {
-            for value in some.iter().flatten() {
-                SampleForm::F64.write(*value, &mut bytes);
-            }
-            std::fs::write(path, &bytes).unwrap();
-            let listener = listener.get_or_insert_with(|| {
-                let growing = GrowingRecording::open(path).unwrap();
-                Listener::new(growing, RecordingPlan::Bare(&bare), settings())
-            });
-            while let Some(news) = listener.step().unwrap() {
-                let now = listener.seconds();
-                all.extend(news.into_iter().map(|one| (now, one)));
-            }
-        }
-        let news = listener.as_mut().unwrap().finish().unwrap();
-        all.extend(news.into_iter().map(|one| (f64::INFINITY, one)));
-        let listener = listener.unwrap();
-        // The decisions after the last sample are those of the whole chain on the file.
-        let opened = Recording::open(path, &ReadSettings::default()).unwrap();
-        let whole = taps_so_far(
-            opened,
-            &RecordingPlan::Bare(&bare),
-            false,
-            &mut TapMemo::default(),
-        )
-        .unwrap();
-        let whole = whole.taps.taps.iter();
-        let whole: Vec<Reported> = whole.map(Reported::from).collect();
-        assert_eq!(listener.reported, whole);
-        all
-    }
-
-    fn rejection(news: &News) -> Option<&Rejection> {
-        match news {
-            News::Tap(tap) | News::Revised(tap) => tap.rejection.as_ref(),
-            _ => None,
-        }
-    }
-
-    #[test]
-    fn prop_a_verdict_comes_when_the_record_has_ended_whatever_the_pieces() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("taps.wav");
-        // The third comes before the record of the second has ended. The fourth is a double hit.
-        let hits = [(0.8, 1.0), (3.0, 1.1), (3.7, 0.9), (6.0, 1.0), (6.05, 0.4)];
-        let samples = samples(8.0, &hits);
-        let all = heard(&samples, &path, 137);
-        let reported: Vec<(f64, f64)> = all
-            .iter()
-            .map(|(now, news)| match news {
-                News::Tap(tap) => (*now, tap.time),
-                other => panic!("{other}"),
-            })
-            .collect();
-        for ((now, time), (hit, ended)) in
-            reported
-                .iter()
-                .zip([(0.8, 1.8), (3.0, 3.7), (3.7, 4.7), (6.0, 7.0)])
-        {
-            assert!((time - hit).abs() < 2e-3, "{time} for {hit}");
-            // A step for the alarm, and one for the look.
-            assert!(
-                (ended..ended + 2.0 * STEP + 1e-9).contains(now),
-                "{now} for {ended}"
-            );
-        }
-        assert_eq!(reported.len(), 4);
-        assert!(matches!(
-            rejection(&all[3].1),
-            Some(Rejection::DoubleHit { .. })
-        ));
-        // The same news, whatever came at once.
-        for piece in [1000, 41_000] {
-            assert_eq!(heard(&samples, &path, piece), all, "pieces of {piece}");
-        }
-    }
-
-    #[test]
-    fn val_a_long_record_is_read_to_its_end() {
-        let rate = 1000.0;
-        let samples: Vec<f64> = (0..30_000)
-            .map(|n| (-0.1 * f64::from(n) / rate).exp() * (TAU * 118.0 * f64::from(n) / rate).sin())
-            .collect();
-        let channel = Channel {
-            samples: [vec![0.0; 2000], samples].concat(),
-            ..Channel::default()
-        };
-        let recording = Recording::from_samples("taps", rate, vec![channel]).unwrap();
-        let plan = RecordingPlan::Bare(&BareSettings::default());
-        let mut memo = TapMemo::default();
-        let found = taps_so_far(recording, &plan, false, &mut memo).unwrap();
-        let decay = remaining(&found, &found.taps.taps[0])
-            .unwrap()
-            .expect("it rings");
-        // From the middle of the first to that of the last half second. 16 ms of the first lie before the trigger: 1.6 %.
-        let wanted = (-0.1_f64 * 29.5).exp();
-        assert!((decay / wanted - 1.0).abs() < 0.02, "{decay} for {wanted}");
-    }
-
-    #[test]
-    fn regress_a_small_event_just_before_a_tap_delays_no_verdict() {
-        let folder = tempfile::tempdir().unwrap();
-        // The hammer moves a little, and the alarm is silent when it strikes.
-        let hits = [(0.86, 0.01), (1.0, 1.0), (4.86, 0.01), (5.0, 1.1)];
-        let all = heard(&samples(8.0, &hits), &folder.path().join("taps.wav"), 300);
-        let words: Vec<String> = all.iter().map(|(_, news)| news.to_string()).collect();
-        for (time, ended) in [(1.0, 2.0), (5.0, 6.0)] {
-            let first = all.iter().find(|(_, news)| match news {
-                News::Tap(tap) => (tap.time - time).abs() < REACH,
-                _ => false,
-            });
-            let (now, _) = first.unwrap_or_else(|| panic!("{words:?}"));
-            assert!(
-                (ended - 2.0 * STEP..ended + 2.0 * STEP).contains(now),
-                "{now}: {words:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn prop_a_decision_that_later_taps_change_is_reported_again() {
-        let folder = tempfile::tempdir().unwrap();
-        // Two soft hits, and then the real ones.
-        let hits = [(0.8, 0.05), (3.0, 1.0), (5.0, 1.1), (7.0, 0.9)];
-        let all = heard(&samples(9.0, &hits), &folder.path().join("taps.wav"), 500);
-        let words: Vec<String> = all.iter().map(|(_, news)| news.to_string()).collect();
-        let revised = all
-            .iter()
-            .find(|(_, news)| matches!(news, News::Revised(_)));
-        let (now, news) = revised.unwrap_or_else(|| panic!("{words:?}"));
-        assert!(
-            matches!(rejection(news), Some(Rejection::TooWeak { .. })),
-            "{news}"
-        );
-        assert!(*now < 9.0, "{words:?}");
-        assert!(words[0].starts_with("tap at 0.80 s accepted"), "{words:?}");
-    }
-
-    #[test]
-    fn limit_silence_gives_no_news_and_a_wrong_channel_is_named_at_once() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("taps.wav");
-        assert_eq!(heard(&samples(3.0, &[]), &path, 400), []);
-        let bare = bare(3);
-        let growing = GrowingRecording::open(&path).unwrap();
-        let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings());
-        let problem = listener.step().unwrap_err().to_string();
-        assert_eq!(
-            problem,
-            "--hammer: taps.wav: no channel 3; there are: 1, 2; name one of these"
-        );
-    }
-}
+mod tests;

@@ -1,0 +1,165 @@
+//! Whether samples arrive as fast as the stated rate says.
+
+use std::time::Duration;
+
+/// The rate is judged after this time (s). 10 s: a tap or two, and a recorder's buffer of 0.1 s is then 1 %.
+const JUDGED_AFTER: f64 = 10.0;
+/// A rate that is off by less is that of the stated clock (1). 2 %: usual rates lie 8 % apart at least (44.1 and 48 kHz), and
+/// the clocks of two devices differ by far less.
+const RATE_TOLERANCE: f64 = 0.02;
+/// What arrives this much faster than stated is a file, and no clock drives it. 8: beyond any pair of usual rates by mistake.
+const FILE_SPEED: f64 = 8.0;
+/// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
+const LEAST_LOSS: f64 = 0.5;
+/// Share of the time by which clocks may drift apart (1). 0.1 %: ten times that of quartz clocks.
+const DRIFT: f64 = 1e-3;
+/// A loss has to last so long (s), or the samples are only late.
+const LATE: f64 = 5.0;
+
+/// Watches the arrival of a stream.
+#[derive(Debug, Clone)]
+pub(super) struct Arrival {
+    /// Samples a second in each channel, as stated.
+    rate: f64,
+    /// Time of the first piece, and of the last one (s).
+    times: Option<(f64, f64)>,
+    /// Longest time between two pieces (s).
+    longest_gap: f64,
+    /// Frames after the first piece.
+    frames: f64,
+    /// Least time by which samples are behind the clock (s).
+    least_behind: f64,
+    /// Time since which more of them are behind (s).
+    behind_since: Option<f64>,
+    is_judged: bool,
+    /// True of a stream that no clock drives, or whose rate is wrong: losses cannot be told.
+    is_off: bool,
+}
+
+impl Arrival {
+    pub(super) fn new(rate: f64) -> Self {
+        Self {
+            rate,
+            times: None,
+            longest_gap: 0.0,
+            frames: 0.0,
+            least_behind: 0.0,
+            behind_since: None,
+            is_judged: false,
+            is_off: false,
+        }
+    }
+
+    /// Takes the arrival of so many frames at this time. Returns what is wrong, once.
+    pub(super) fn takes(&mut self, now: Duration, frames: f64) -> Option<String> {
+        let now = now.as_secs_f64();
+        let Some((first, last)) = &mut self.times else {
+            self.times = Some((now, now));
+            return None;
+        };
+        self.frames += frames;
+        let (elapsed, gap) = (now - *first, now - *last);
+        *last = now;
+        // Before the samples of a pause count, they have to come.
+        self.longest_gap = self.longest_gap.max(gap);
+        if !self.is_judged && elapsed >= JUDGED_AFTER {
+            self.is_judged = true;
+            return self.judge_rate(elapsed);
+        }
+        if self.is_off {
+            return None;
+        }
+        self.judge_loss(elapsed)
+    }
+
+    fn judge_rate(&mut self, elapsed: f64) -> Option<String> {
+        let speed = self.frames / elapsed / self.rate;
+        let tolerance = RATE_TOLERANCE + self.longest_gap / elapsed;
+        self.is_off = (speed - 1.0).abs() > tolerance;
+        if !self.is_off || speed > FILE_SPEED {
+            return None;
+        }
+        let (found, stated) = (speed * self.rate, self.rate);
+        Some(format!(
+            "{found:.0} samples a second arrive, and {stated:.0} Hz is stated. Check the rate and the channels, or whether the \
+             recorder drops samples: frequencies may be wrong by this factor"
+        ))
+    }
+
+    fn judge_loss(&mut self, elapsed: f64) -> Option<String> {
+        let behind = elapsed - self.frames / self.rate;
+        self.least_behind = self.least_behind.min(behind);
+        let lost = behind - self.least_behind;
+        if lost <= LEAST_LOSS + DRIFT * elapsed {
+            self.behind_since = None;
+            return None;
+        }
+        let since = *self.behind_since.get_or_insert(elapsed);
+        if elapsed - since < LATE {
+            return None;
+        }
+        self.behind_since = None;
+        self.least_behind = behind;
+        Some(format!(
+            "{lost:.1} s of samples are missing since about {:.0} s: the recorder has dropped them. A tap there may be wrong",
+            (since - lost).max(0.0)
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of pieces of `piece` seconds of samples that come at `speed` of the stated rate. The pieces from
+    /// `lost` on, given in seconds, do not come.
+    fn said(speed: f64, piece: f64, seconds: f64, lost: std::ops::Range<f64>) -> Vec<String> {
+        let mut arrival = Arrival::new(1000.0);
+        let pieces = (seconds / piece) as usize;
+        let said = (1..=pieces).filter_map(|number| {
+            let now = number as f64 * piece;
+            let is_lost = lost.contains(&now);
+            let frames = 1000.0 * piece * speed;
+            (!is_lost).then(|| arrival.takes(Duration::from_secs_f64(now), frames))?
+        });
+        said.collect()
+    }
+
+    #[test]
+    fn limit_a_true_rate_is_not_doubted() {
+        for piece in [0.01, 0.1, 1.0, 2.5] {
+            assert_eq!(said(1.0, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
+            assert_eq!(said(1.0005, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
+        }
+        // A file that is piped.
+        assert_eq!(said(200.0, 0.01, 60.0, 0.0..0.0), [""; 0]);
+    }
+
+    #[test]
+    fn recover_a_wrong_rate_and_a_loss() {
+        let words = "samples a second arrive, and 1000 Hz is stated. Check the rate and the channels, or whether the recorder \
+                     drops samples: frequencies may be wrong by this factor";
+        assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [format!("919 {words}")]);
+        assert_eq!(said(2.0, 0.1, 60.0, 0.0..0.0), [format!("2000 {words}")]);
+        assert_eq!(
+            said(1.0, 0.1, 60.0, 29.95..31.45),
+            [
+                "1.5 s of samples are missing since about 30 s: the recorder has dropped them. A tap there may be wrong"
+            ]
+        );
+    }
+
+    #[test]
+    fn limit_samples_that_come_late_are_not_lost() {
+        let mut arrival = Arrival::new(1000.0);
+        let mut takes = |now: f64, frames| arrival.takes(Duration::from_secs_f64(now), frames);
+        for second in 0..30 {
+            assert_eq!(takes(f64::from(second), 1000.0), None);
+        }
+        // Two seconds without a piece, and then all at once.
+        assert_eq!(takes(32.0, 3000.0), None);
+        for second in 33..60 {
+            assert_eq!(takes(f64::from(second), 1000.0), None);
+        }
+    }
+}

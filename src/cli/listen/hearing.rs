@@ -1,0 +1,433 @@
+//! One recording that is listened to.
+
+use super::super::input::{TestFile, file_name};
+use super::ListenArguments;
+use super::bench::{Action, Progress, precision_words};
+use super::decisions::write_by_hand;
+use super::log::{Log, line_by_hand, line_of};
+use super::recorder::Names;
+use super::state::{Question, States, Subject};
+use super::stream::{End, Event, Running};
+use super::target::{Target, asked_for, described_target};
+use super::views::Views;
+use crate::listen::{ListenError, ListenSettings, Listener, News, Precision};
+use crate::pipeline::RecordingPlan;
+use crate::recording::GrowingRecording;
+use crate::taps::TapsByHand;
+use std::path::PathBuf;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+
+/// Time between two looks at a file that does not grow: short beside the least time to a verdict.
+const PAUSE: Duration = Duration::from_millis(10);
+/// Time for which the last piece of a stream is waited for, once it was stopped.
+const LAST_PIECE: Duration = Duration::from_secs(1);
+
+/// What was heard.
+pub(super) struct Heard {
+    /// Files of the recording.
+    pub(super) files: Vec<PathBuf>,
+    /// Taps that count.
+    pub(super) accepted: usize,
+    /// Taps that are accepted or rejected by hand; `None` where that is as before.
+    pub(super) by_hand: Option<TapsByHand>,
+    /// How the stream ended.
+    pub(super) ended: anyhow::Result<End>,
+    /// The recording that follows in the same stream, and its first file.
+    pub(super) turned: Option<(Target, PathBuf)>,
+}
+
+/// A recording that is listened to.
+pub(super) struct Hearing<'a, 'v> {
+    pub(super) arguments: &'a ListenArguments,
+    pub(super) described: Option<&'a TestFile>,
+    pub(super) target: &'a Target,
+    pub(super) plan: RecordingPlan<'a>,
+    pub(super) settings: ListenSettings,
+    /// `None` of a recording that is only played, and once it could not be written.
+    pub(super) log: Option<Log>,
+    /// `None` where no results are wanted between the taps.
+    pub(super) states: Option<States>,
+    pub(super) views: &'a mut Views<'v>,
+    /// `None` before the first samples.
+    listener: Option<Listener<'a>>,
+    /// How narrow the intervals are by the last state.
+    precision: Option<Precision>,
+    files: Vec<PathBuf>,
+    /// Why taps are no longer judged.
+    fault: Option<ListenError>,
+    /// The recording that is to follow.
+    turns_to: Option<Target>,
+}
+
+impl<'a, 'v> Hearing<'a, 'v> {
+    /// Begins with a recording of which no new sample is there yet.
+    pub(super) fn new(
+        arguments: &'a ListenArguments,
+        described: Option<&'a TestFile>,
+        target: &'a Target,
+        plan: RecordingPlan<'a>,
+        settings: ListenSettings,
+        views: &'a mut Views<'v>,
+    ) -> Self {
+        Self {
+            arguments,
+            described,
+            target,
+            plan,
+            settings,
+            log: None,
+            states: None,
+            views,
+            listener: None,
+            precision: None,
+            files: target.earlier.clone(),
+            fault: None,
+            turns_to: None,
+        }
+    }
+
+    /// Works out results between the taps.
+    pub(super) fn with_states(&mut self) {
+        let bare = self.arguments.run.bare();
+        let subject = Subject::of(self.described, self.target, &bare);
+        self.states = Some(States::begin(subject, self.plan.by_hand()));
+    }
+
+    /// Listens until the stream ends, is stopped, or turns to the next recording. `first` is the first file of a recording that
+    /// was turned to.
+    pub(super) fn listen(mut self, stream: &Running, first: Option<PathBuf>) -> Heard {
+        if let Some(first) = first {
+            self.go_on_in(first);
+        }
+        let next = self.described.zip(self.next());
+        self.views.bench.next = next.map(|(file, next)| asked_for(file, &next));
+        self.advise();
+        let mut ended = None;
+        while ended.is_none() && !stream.is_stopped() {
+            match stream.events.recv_timeout(PAUSE) {
+                Ok(Event::File(path)) => self.go_on_in(path),
+                Ok(Event::Turned(path)) => {
+                    let turned = self.turns_to.take().map(|target| (target, path));
+                    return self.end(Ok(End::default()), turned);
+                }
+                Ok(Event::Doubt(text)) => self.doubt(text),
+                Ok(Event::Ended(how)) => ended = Some(how),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(End::default())),
+            }
+            self.catch_up(stream);
+            for action in self.views.actions() {
+                self.act(action, stream);
+            }
+            self.views.show();
+            // A description that does not fit is to be corrected before the first tap.
+            if self.is_refused() {
+                stream.stop();
+            }
+        }
+        // A piece that is being written is waited for. One that comes after that is not written.
+        while ended.is_none()
+            && let Ok(event) = stream.events.recv_timeout(LAST_PIECE)
+        {
+            match event {
+                Event::File(path) => self.go_on_in(path),
+                Event::Turned(path) => {
+                    let turned = self.turns_to.take().map(|target| (target, path));
+                    return self.end(Ok(End::default()), turned);
+                }
+                Event::Doubt(text) => self.doubt(text),
+                Event::Ended(how) => ended = Some(how),
+            }
+        }
+        self.end(ended.unwrap_or(Ok(End::default())), None)
+    }
+
+    /// Listens to the next file of the recording.
+    fn go_on_in(&mut self, path: PathBuf) {
+        let opened = GrowingRecording::open(&path);
+        self.files.push(path);
+        if self.fault.is_some() {
+            return;
+        }
+        let news = match (opened, &mut self.listener) {
+            (Err(fault), _) => Err(fault.into()),
+            (Ok(growing), Some(listener)) => {
+                // Time and memory of a result grow with the recording.
+                if self.states.take().is_some() {
+                    self.views
+                        .say("the first file is full: results come at the end from here on\n");
+                }
+                listener.go_on_in(growing)
+            }
+            (Ok(growing), None) => {
+                let settings = self.settings.clone();
+                self.listener = Some(Listener::new(growing, self.plan, settings));
+                return;
+            }
+        };
+        self.take(news);
+    }
+
+    /// Judges what the file holds by now.
+    fn catch_up(&mut self, stream: &Running) {
+        while let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none())
+            && !stream.is_stopped()
+        {
+            let Some(news) = listener.step().transpose() else {
+                break;
+            };
+            self.take(news);
+        }
+        if let Some(listener) = &self.listener {
+            let (seconds, levels) = (listener.seconds(), listener.levels());
+            self.views.bench.hear(seconds, &levels);
+        }
+        let Some(ready) = self.states.as_mut().and_then(States::ready) else {
+            return;
+        };
+        let so_far = match ready {
+            Ok(so_far) => so_far,
+            Err(cause) => return self.views.warn(&format!("no result so far: {cause:#}")),
+        };
+        let before = self.views.bench.advice.clone();
+        let bench = &mut self.views.bench;
+        let precision = so_far.precision.as_ref().map(precision_words);
+        bench.precision = precision.unwrap_or_default();
+        bench.first_screen = so_far.first_screen;
+        bench.result.clone_from(&so_far.lines);
+        let mut lines = so_far.lines;
+        lines.extend(Some(bench.precision.clone()).filter(|words| !words.is_empty()));
+        self.precision = so_far.precision;
+        self.advise();
+        if before != self.views.bench.advice {
+            lines.push(self.views.bench.advice.clone());
+        }
+        let screen = self.views.terminal().screen();
+        let lines = lines.iter().map(|line| screen.wrapped(line, 2));
+        self.views.say(&lines.collect::<String>());
+    }
+
+    /// Says a doubt about the stream.
+    fn doubt(&mut self, text: String) {
+        self.take(Ok(vec![News::Doubt(text)]));
+    }
+
+    /// Shows, prints and logs what is new. A fault ends the judging, and not the recording.
+    fn take(&mut self, news: Result<Vec<News>, ListenError>) {
+        let news = match news {
+            Ok(news) => news,
+            Err(fault) => {
+                let words = "taps are not judged any more, and the recording goes on";
+                let warning = format!("{fault}; {words}");
+                self.fault = Some(fault);
+                if !self.is_refused() {
+                    self.views.warn(&warning);
+                }
+                return;
+            }
+        };
+        let heard = self.listener.as_ref().map_or(0.0, Listener::seconds);
+        let screen = self.views.terminal().screen();
+        let mut text = String::new();
+        for one in &news {
+            self.views.bench.take(one);
+            text.push_str(&screen.wrapped(&one.to_string(), 2));
+            self.note(&line_of(heard, one));
+        }
+        if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
+            self.advise();
+            text.push_str(&self.advice_in_lines());
+            self.ask();
+        }
+        if !text.is_empty() {
+            self.views.say(&text);
+        }
+    }
+
+    /// Notes a line in the log.
+    fn note(&mut self, line: &serde_json::Value) {
+        if let Some(log) = &mut self.log
+            && let Err(cause) = log.note(line)
+        {
+            self.views
+                .warn(&format!("{cause:#}; the recording goes on without a log"));
+            self.log = None;
+        }
+    }
+
+    /// Renews the advice by the taps so far.
+    fn advise(&mut self) {
+        let listener = self.listener.as_ref();
+        let progress = Progress {
+            accepted: listener.map_or(0, Listener::accepted),
+            wanted: self.arguments.taps,
+            accuracy: self.arguments.accuracy,
+            precision: self.precision.as_ref(),
+        };
+        let (is_enough, mut words) = progress.words();
+        // A live view shows the key for the next recording.
+        if is_enough && (self.views.bench.next.is_none() || !self.views.are_live()) {
+            words.push_str("; Ctrl-C ends the recording");
+        }
+        if let Some((reach, end)) = listener.and_then(Listener::reach) {
+            words.push_str(&format!(
+                "; take a harder tip: the taps excite up to {reach:.0} Hz of a band to {end:.0} Hz"
+            ));
+        }
+        self.views.bench.advice = words;
+        self.views.bench.is_enough = is_enough;
+    }
+
+    fn advice_in_lines(&self) -> String {
+        let screen = self.views.terminal().screen();
+        screen.wrapped(&self.views.bench.advice, 2)
+    }
+
+    /// Asks for the results so far.
+    fn ask(&mut self) {
+        if let (Some(states), Some(listener)) = (&mut self.states, &self.listener) {
+            states.ask(Question {
+                files: self.files.clone(),
+                accepted: listener.accepted(),
+                by_hand: listener.by_hand().clone(),
+                wants_page: self.views.shows_report(),
+            });
+        }
+    }
+
+    /// Does what was asked for.
+    fn act(&mut self, action: Action, stream: &Running) {
+        match action {
+            Action::Stop => stream.stop(),
+            Action::Next => self.turn(stream),
+            Action::Accept(time) => self.decide(time, true),
+            Action::Reject(time) => self.decide(time, false),
+            Action::Undo => {
+                let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none()) else {
+                    return;
+                };
+                match listener.undo().transpose() {
+                    Some(news) => self.decided("undo", None, news),
+                    None => self
+                        .views
+                        .bench
+                        .note("there is no decision by hand to take back"),
+                }
+            }
+        }
+    }
+
+    /// Accepts or rejects the tap at this time (s), or the last one.
+    fn decide(&mut self, time: Option<f64>, accept: bool) {
+        let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none()) else {
+            return;
+        };
+        let last = self.views.bench.taps.last().map(|tap| tap.time);
+        let Some(time) = time.or(last) else {
+            return self.views.bench.note("there is no tap yet");
+        };
+        match listener.decide(time, accept).transpose() {
+            Some(news) => {
+                let what = if accept { "accept" } else { "reject" };
+                self.decided(what, Some(time), news);
+            }
+            None => self
+                .views
+                .bench
+                .note(&format!("there is no tap at {time:.2} s")),
+        }
+    }
+
+    /// Notes a decision by hand, and what it changes.
+    fn decided(&mut self, what: &str, time: Option<f64>, news: Result<Vec<News>, ListenError>) {
+        let heard = self.listener.as_ref().map_or(0.0, Listener::seconds);
+        self.note(&line_by_hand(heard, what, time));
+        self.take(news);
+        let by_hand = self
+            .listener
+            .as_ref()
+            .map(|listener| listener.by_hand().clone());
+        let (Some(file), Some(table), Some(by_hand)) = (self.described, self.target.table, by_hand)
+        else {
+            return;
+        };
+        let own = file.test.recordings[table].file.display().to_string();
+        if let Err(cause) = write_by_hand(&self.arguments.run.file, &own, &by_hand) {
+            let words = format!("the decision is in the log alone: {cause:#}");
+            self.views.warn(&words);
+        }
+    }
+
+    /// Asks the stream for the next recording.
+    fn turn(&mut self, stream: &Running) {
+        if self.turns_to.is_some() || self.files.len() == self.target.earlier.len() {
+            return;
+        }
+        let Some(next) = self.next() else {
+            return self.views.bench.note("no other recording is missing");
+        };
+        stream.turn_to(Names {
+            first: next.file.clone(),
+            reserved: next.reserved.clone(),
+        });
+        self.turns_to = Some(next);
+    }
+
+    /// Returns the recording that may follow in the same stream.
+    fn next(&self) -> Option<Target> {
+        let file = self.described.filter(|_| !self.target.is_played)?;
+        described_target(file, None, false, self.target.table).ok()
+    }
+
+    /// Returns true where the recording does not fit its description or the options, which its first samples show.
+    fn is_refused(&self) -> bool {
+        let has_looked = self.listener.as_ref().is_none_or(Listener::has_looked);
+        // Files of another rate or with other channels do not follow one another.
+        let is_described = match self.fault {
+            Some(ListenError::Pipeline(_)) => true,
+            Some(ListenError::Recording(_)) => !self.settings.earlier.is_empty(),
+            None => false,
+        };
+        is_described && !has_looked
+    }
+
+    /// Judges all taps for good.
+    fn end(mut self, ended: anyhow::Result<End>, turned: Option<(Target, PathBuf)>) -> Heard {
+        self.states = None;
+        if self.fault.is_none()
+            && let Some(listener) = &mut self.listener
+        {
+            let news = listener.finish();
+            self.take(news);
+        }
+        let is_refused = self.is_refused();
+        if is_refused {
+            // The next call is to find the place as this one did.
+            for file in &self.files[self.settings.earlier.len()..] {
+                let _ = std::fs::remove_file(file);
+            }
+        }
+        let (mut accepted, mut by_hand) = (0, None);
+        if let Some(listener) = self.listener.as_ref().filter(|_| !is_refused) {
+            accepted = listener.accepted();
+            by_hand = Some(listener.by_hand().clone()).filter(|own| *own != self.plan.by_hand());
+            self.views.say(&format!(
+                "{}: {:.1} s, {accepted} of {} taps count\n",
+                file_name(&self.target.file),
+                listener.seconds(),
+                listener.taps(),
+            ));
+        }
+        Heard {
+            files: self.files,
+            accepted,
+            by_hand,
+            ended: match self.fault {
+                Some(fault) => Err(fault.into()),
+                None => ended,
+            },
+            turned,
+        }
+    }
+}

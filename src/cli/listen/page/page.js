@@ -1,0 +1,123 @@
+"use strict";
+// The page of `tapjoint listen`. The address holds the token; every path here is relative to it.
+(() => {
+  const byId = (id) => document.getElementById(id);
+  let chosen = null;
+  let bench = { taps: [] };
+
+  // A time of null stands for the last tap.
+  function act(action) {
+    const body = JSON.stringify({ action, time: chosen });
+    fetch("act", { method: "POST", headers: { "Content-Type": "application/json" }, body })
+      .then((answer) => { if (!answer.ok) lost(); })
+      .catch(lost);
+  }
+
+  function lost() {
+    if (bench.ended) return;
+    byId("advice").textContent = "The program does not answer any more.";
+    byId("advice").classList.remove("enough");
+    for (const button of document.querySelectorAll("#actions button")) button.disabled = true;
+  }
+
+  function items(list, texts) {
+    list.replaceChildren(...texts.map((text) => {
+      const item = document.createElement("li");
+      item.textContent = text;
+      return item;
+    }));
+  }
+
+  function choose(time) {
+    chosen = chosen === time ? null : time;
+    showTaps();
+  }
+
+  function showTaps() {
+    const taps = bench.taps;
+    if (!taps.some((tap) => tap.time === chosen)) chosen = null;
+    byId("taps").replaceChildren(...taps.map((tap) => {
+      const item = document.createElement("li");
+      item.className = tap.accepted ? (tap.overruled ? "overruled" : "") : "rejected";
+      const button = document.createElement("button");
+      const time = document.createElement("b");
+      time.textContent = tap.time.toFixed(2) + " s ";
+      button.append(time, tap.words);
+      button.setAttribute("aria-pressed", String(tap.time === chosen));
+      button.addEventListener("click", () => choose(tap.time));
+      item.append(button);
+      return item;
+    }));
+    byId("chosen").textContent = chosen === null ? "the last tap" : "the tap at " + chosen.toFixed(2) + " s";
+    byId("earlier").hidden = !bench.left_out;
+    byId("earlier").textContent = bench.left_out + " earlier taps are not shown";
+  }
+
+  function showBench(data) {
+    const report = bench.report;
+    bench = data;
+    byId("title").textContent = bench.title;
+    document.title = bench.title + " – tapjoint";
+    byId("advice").textContent = bench.ended || bench.advice;
+    byId("advice").classList.toggle("enough", bench.is_enough && !bench.ended);
+    byId("advice").classList.toggle("ended", Boolean(bench.ended));
+    byId("next").hidden = !bench.next;
+    byId("next").textContent = "Next: " + bench.next;
+    // The report says the same and more.
+    items(byId("result"), bench.result.length ? bench.result : ["no result yet"]);
+    byId("result").hidden = bench.report > 0;
+    byId("precision").textContent = bench.precision;
+    items(byId("notes"), bench.notes.slice().reverse());
+    byId("notes-head").hidden = bench.notes.length === 0;
+    showTaps();
+    if (bench.report !== report && bench.report > 0) {
+      byId("report").hidden = false;
+      byId("report").src = "report?" + bench.report;
+    }
+    for (const button of document.querySelectorAll("#actions button")) button.disabled = Boolean(bench.ended);
+  }
+
+  // Swings of a channel as steps, the newest on the right, over the largest of them.
+  function outline(swings) {
+    const largest = Math.max(...swings, Number.MIN_VALUE);
+    const first = 200 - swings.length;
+    let path = "M" + first + " 20";
+    swings.forEach((swing, place) => {
+      const height = (20 - 19 * swing / largest).toFixed(1);
+      path += "V" + height + "H" + (first + place + 1);
+    });
+    return path + "V20Z";
+  }
+
+  function showPulse(pulse) {
+    byId("time").textContent = pulse.seconds.toFixed(1) + " s";
+    const rows = byId("levels");
+    while (rows.children.length > pulse.levels.length) rows.lastChild.remove();
+    pulse.levels.forEach((level, place) => {
+      let row = rows.children[place];
+      if (!row) {
+        row = document.createElement("div");
+        row.className = "level";
+        row.innerHTML = "<span></span><svg viewBox='0 0 200 20' preserveAspectRatio='none'><path/></svg>";
+        rows.append(row);
+      }
+      row.querySelector("span").textContent = level.name;
+      row.querySelector("path").setAttribute("d", outline(level.recent));
+    });
+  }
+
+  for (const button of document.querySelectorAll("#actions button")) {
+    button.addEventListener("click", () => act(button.dataset.action));
+  }
+  const events = new EventSource("events");
+  events.addEventListener("bench", (event) => {
+    showBench(JSON.parse(event.data));
+  });
+  events.addEventListener("pulse", (event) => showPulse(JSON.parse(event.data)));
+  // The browser tries again by itself.
+  events.onerror = () => {
+    if (bench.ended) events.close();
+    lost();
+  };
+  showTaps();
+})();

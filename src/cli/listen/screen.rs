@@ -1,0 +1,429 @@
+//! The live screen: the bench in the whole terminal, and keys.
+
+use super::bench::{Action, Bench, Level};
+use super::views::View;
+use crate::listen::JudgedTap;
+use crate::report::Screen;
+use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style, Stylize};
+use ratatui::text::{Line, Span, Text};
+use ratatui::widgets::{Block, List, ListItem, ListState, Paragraph, Sparkline, Wrap};
+use ratatui::{DefaultTerminal, Frame};
+use std::io;
+use std::time::Duration;
+
+/// Channels whose movement is shown. More would leave no room for the taps.
+const MOST_LEVELS: usize = 4;
+/// Width of the names of channels (characters).
+const NAME: u16 = 12;
+/// Rows of a channel's movement.
+const LEVEL_ROWS: u16 = 2;
+/// Width from which results stand beside the taps (characters); below they stand under them.
+const WIDE: u16 = 110;
+
+/// Time for which keys are waited for. Not 0: the library then looks for none.
+const KEY_WAIT: Duration = Duration::from_millis(1);
+
+/// The live screen. The terminal is as before once it is dropped.
+pub(super) struct LiveScreen {
+    terminal: DefaultTerminal,
+    chosen: Chosen,
+}
+
+/// The tap that keys are for.
+#[derive(Debug, Default)]
+struct Chosen {
+    /// Its time (s); `None` = the last one.
+    time: Option<f64>,
+}
+
+impl LiveScreen {
+    /// Takes the terminal.
+    ///
+    /// # Errors
+    /// There is none that can be drawn on and that gives keys.
+    pub(super) fn begin() -> io::Result<Self> {
+        let terminal = ratatui::try_init()?;
+        // A terminal without keys fails here.
+        if let Err(cause) = poll(KEY_WAIT) {
+            restore();
+            return Err(cause);
+        }
+        Ok(Self {
+            terminal,
+            chosen: Chosen::default(),
+        })
+    }
+}
+
+impl Drop for LiveScreen {
+    fn drop(&mut self) {
+        restore();
+    }
+}
+
+/// Gives the terminal back.
+pub(super) fn restore() {
+    ratatui::restore();
+}
+
+impl View for LiveScreen {
+    fn show(&mut self, bench: &Bench) -> io::Result<()> {
+        let chosen = &self.chosen;
+        self.terminal.draw(|frame| draw(frame, bench, chosen))?;
+        Ok(())
+    }
+
+    fn actions(&mut self, bench: &Bench) -> Vec<Action> {
+        let mut actions = Vec::new();
+        while poll(KEY_WAIT).unwrap_or(false) {
+            if let Ok(Event::Key(key)) = read() {
+                actions.extend(self.chosen.action_of(key, bench));
+            }
+        }
+        actions
+    }
+
+    fn hides_lines(&self) -> bool {
+        true
+    }
+}
+
+impl Chosen {
+    /// Returns the place of the tap among all.
+    fn place(&self, bench: &Bench) -> Option<usize> {
+        let last = bench.taps.len().checked_sub(1)?;
+        let found = self.time.and_then(|time| {
+            let mut taps = bench.taps.iter();
+            taps.position(|tap| tap.time == time)
+        });
+        Some(found.unwrap_or(last))
+    }
+
+    /// Chooses the tap `by` places further. Beyond the last one the newest is chosen, whichever that will be.
+    fn move_by(&mut self, by: isize, bench: &Bench) {
+        let Some(place) = self.place(bench) else {
+            return;
+        };
+        let place = place.saturating_add_signed(by);
+        let tap = bench
+            .taps
+            .get(place)
+            .filter(|_| place + 1 < bench.taps.len());
+        self.time = tap.map(|tap| tap.time);
+    }
+
+    /// Returns what a key asks for.
+    fn action_of(&mut self, key: KeyEvent, bench: &Bench) -> Option<Action> {
+        if key.kind == KeyEventKind::Release {
+            return None;
+        }
+        let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
+        match key.code {
+            KeyCode::Char('c' | 'd') if is_control => Some(Action::Stop),
+            _ if is_control => None,
+            KeyCode::Char('a') => Some(Action::Accept(self.time)),
+            KeyCode::Char('r') => Some(Action::Reject(self.time)),
+            KeyCode::Char('u') => Some(Action::Undo),
+            KeyCode::Char('n') => Some(Action::Next),
+            KeyCode::Char('s') => Some(Action::Stop),
+            KeyCode::Up => {
+                self.move_by(-1, bench);
+                None
+            }
+            KeyCode::Down => {
+                self.move_by(1, bench);
+                None
+            }
+            KeyCode::Esc => {
+                self.time = None;
+                None
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Draws the bench.
+fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
+    let shown = bench.levels.len().min(MOST_LEVELS) as u16;
+    let [head, levels, middle, advice, keys] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Length(LEVEL_ROWS * shown),
+        Constraint::Min(6),
+        Constraint::Length(3),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
+    draw_head(frame, head, bench);
+    for (row, level) in bench.levels.iter().take(MOST_LEVELS).enumerate() {
+        let area = Rect {
+            y: levels.y + LEVEL_ROWS * row as u16,
+            height: LEVEL_ROWS,
+            ..levels
+        };
+        draw_level(frame, area.intersection(levels), level);
+    }
+    let beside = Constraint::Percentage(50);
+    let parts = match middle.width >= WIDE {
+        true => Layout::horizontal([beside, beside]),
+        false => Layout::vertical([beside, beside]),
+    };
+    let [taps, results] = parts.areas(middle);
+    draw_taps(frame, taps, bench, chosen);
+    draw_results(frame, results, bench);
+    let colour = if bench.is_enough {
+        Color::Green
+    } else {
+        Color::Yellow
+    };
+    let page = bench.address.as_ref();
+    let page = page.map_or(String::new(), |address| format!("page: {address}"));
+    let words = Text::from(vec![Line::from(bench.advice.as_str()), Line::from(page)]);
+    let words = Paragraph::new(words)
+        .style(Style::new().fg(colour).add_modifier(Modifier::BOLD))
+        .wrap(Wrap { trim: true });
+    frame.render_widget(words, advice);
+    frame.render_widget(key_line(bench), keys);
+}
+
+fn draw_head(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
+    let seconds = format!("{:.1} s", bench.seconds);
+    let [title, time] = Layout::horizontal([
+        Constraint::Min(10),
+        Constraint::Length(seconds.chars().count() as u16 + 1),
+    ])
+    .areas(area);
+    frame.render_widget(Line::from(bench.title.as_str()).bold(), title);
+    frame.render_widget(Line::from(seconds).right_aligned(), time);
+}
+
+fn draw_level(frame: &mut Frame<'_>, area: Rect, level: &Level) {
+    let [name, strip] =
+        Layout::horizontal([Constraint::Length(NAME), Constraint::Min(10)]).areas(area);
+    frame.render_widget(Line::from(level.name.as_str()).dim(), name);
+    let shown = level.recent.len().min(usize::from(strip.width));
+    let recent = level.recent.iter().skip(level.recent.len() - shown);
+    let largest = level
+        .recent
+        .iter()
+        .copied()
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let heights: Vec<u64> = recent
+        .map(|swing| (1000.0 * swing / largest) as u64)
+        .collect();
+    let strip_widget = Sparkline::default().data(heights).max(1000).cyan();
+    frame.render_widget(strip_widget, strip);
+}
+
+fn draw_taps(frame: &mut Frame<'_>, area: Rect, bench: &Bench, chosen: &Chosen) {
+    let block = Block::bordered().title(" taps ");
+    let columns = usize::from(block.inner(area).width).saturating_sub(2);
+    let items = bench
+        .taps
+        .iter()
+        .map(|tap| ListItem::new(tap_text(tap, columns)));
+    let list = List::new(items).block(block).highlight_symbol("> ");
+    let mut state = ListState::default().with_selected(chosen.place(bench));
+    frame.render_stateful_widget(list, area, &mut state);
+}
+
+/// A tap in lines of so many columns.
+fn tap_text(tap: &JudgedTap, columns: usize) -> Text<'static> {
+    let mut words = format!("{:.2} s {tap}", tap.time);
+    if let Some(remedy) = tap.remedy {
+        words.push_str(&format!(". {remedy}"));
+    }
+    let colour = match (&tap.rejection, &tap.overruled) {
+        (Some(_), _) => Color::Red,
+        (None, Some(_)) => Color::Yellow,
+        (None, None) => Color::Green,
+    };
+    let lines = Screen::of(columns).wrapped(&words, 2);
+    let lines = lines
+        .lines()
+        .map(|line| Line::from(line.to_owned()).fg(colour));
+    Text::from(lines.collect::<Vec<_>>())
+}
+
+fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
+    let block = Block::bordered().title(" so far ");
+    let screen = Screen::of(usize::from(block.inner(area).width));
+    let mut lines = Vec::new();
+    if bench.result.is_empty() {
+        lines.push(Line::from("no result yet").dim());
+    }
+    let precision = Some(&bench.precision).filter(|words| !words.is_empty());
+    for sentence in bench.result.iter().chain(precision) {
+        let wrapped = screen.wrapped(sentence, 2);
+        lines.extend(wrapped.lines().map(|line| Line::from(line.to_owned())));
+    }
+    // The newest doubt first: the area may be too small for all.
+    for note in bench.notes.iter().rev() {
+        let wrapped = screen.wrapped(&format!("! {note}"), 2);
+        lines.extend(
+            wrapped
+                .lines()
+                .map(|line| Line::from(line.to_owned()).yellow()),
+        );
+    }
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+fn key_line(bench: &Bench) -> Line<'static> {
+    let mut keys = vec![
+        ("up/down", "choose".to_owned()),
+        ("a", "accept".to_owned()),
+        ("r", "reject".to_owned()),
+        ("u", "undo".to_owned()),
+    ];
+    if let Some(next) = &bench.next {
+        keys.push(("n", format!("next: {next}")));
+    }
+    keys.push(("s", "stop".to_owned()));
+    let spans = keys.into_iter().flat_map(|(key, what)| {
+        [
+            Span::from(format!(" {key} ")).reversed(),
+            Span::from(format!(" {what}  ")),
+        ]
+    });
+    Line::from(spans.collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::listen::News;
+    use crate::taps::{Pulse, Rejection};
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+
+    fn tap(time: f64, rejection: Option<Rejection>) -> JudgedTap {
+        JudgedTap {
+            time,
+            peak: 18.24,
+            unit: Some("N".to_owned()),
+            pulse: Some(Pulse {
+                width: 1.21e-3,
+                fall_10_db: None,
+                fall_20_db: None,
+                usable_to: 832.0,
+            }),
+            seconds: 4.96,
+            has_ended: true,
+            remaining: Some(0.0042),
+            remedy: rejection.as_ref().map(|_| "Hit shorter."),
+            rejection,
+            overruled: None,
+        }
+    }
+
+    fn bench() -> Bench {
+        let double = Rejection::DoubleHit {
+            delay: 0.0312,
+            ratio: 0.341,
+            limit: 0.1,
+        };
+        let mut bench = Bench {
+            title: "recording low.wav, tap at 0.385 m".to_owned(),
+            advice: "1 tap counts; 4 more are wanted".to_owned(),
+            result: vec![
+                "so far good".to_owned(),
+                "modes 118.20 \u{b1} 0.04 Hz".to_owned(),
+            ],
+            next: Some("high.wav".to_owned()),
+            address: Some("http://127.0.0.1:8000/0f/".to_owned()),
+            ..Bench::default()
+        };
+        for step in 0..20 {
+            let swing = if step % 10 == 5 { 8.0 } else { 1.0 };
+            bench.hear(
+                f64::from(step) / 20.0,
+                &[("hammer", swing), ("tip", swing / 2.0)],
+            );
+        }
+        bench.take(&News::Tap(tap(4.905, None)));
+        bench.take(&News::Tap(tap(9.871, Some(double))));
+        bench.note("tip (channel 2): no sample has changed since the last tap.");
+        bench
+    }
+
+    fn drawn(columns: u16, rows: u16, bench: &Bench) -> String {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap();
+        terminal
+            .draw(|frame| draw(frame, bench, &Chosen::default()))
+            .unwrap();
+        let buffer = terminal.backend().buffer();
+        let lines = buffer.content().chunks(usize::from(columns)).map(|row| {
+            let row: String = row.iter().map(|cell| cell.symbol()).collect();
+            row.trim_end().to_owned() + "\n"
+        });
+        lines.collect()
+    }
+
+    #[test]
+    fn regress_the_screen_has_all_that_is_needed() {
+        let wanted = "\
+recording low.wav, tap at 0.385 m                                          0.9 s
+hammer          █         █
+            ▂▂▂▂█▂▂▂▂▂▂▂▂▂█▂▂▂▂
+tip             █         █
+            ▂▂▂▂█▂▂▂▂▂▂▂▂▂█▂▂▂▂
+┌ taps ────────────────────────────────────────────────────────────────────────┐
+│  4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to│
+│    0.42 % in 5.0 s                                                           │
+│> 9.87 s REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit│
+│    10 %). Hit shorter.                                                       │
+│                                                                              │
+│                                                                              │
+└──────────────────────────────────────────────────────────────────────────────┘
+┌ so far ──────────────────────────────────────────────────────────────────────┐
+│so far good                                                                   │
+│modes 118.20 ± 0.04 Hz                                                        │
+│! tip (channel 2): no sample has changed since the last tap.                  │
+│                                                                              │
+│                                                                              │
+└──────────────────────────────────────────────────────────────────────────────┘
+1 tap counts; 4 more are wanted
+page: http://127.0.0.1:8000/0f/
+
+ up/down  choose   a  accept   r  reject   u  undo   n  next: high.wav   s  stop
+";
+        assert_eq!(drawn(80, 24, &bench()), wanted);
+    }
+
+    #[test]
+    fn limit_a_small_terminal_loses_parts_and_not_the_program() {
+        for (columns, rows) in [(1, 1), (10, 3), (20, 8), (300, 100)] {
+            drawn(columns, rows, &bench());
+        }
+        drawn(80, 24, &Bench::default());
+    }
+
+    #[test]
+    fn prop_keys_ask_for_what_the_last_line_says() {
+        let bench = bench();
+        let mut chosen = Chosen::default();
+        let mut press = |code| chosen.action_of(KeyEvent::new(code, KeyModifiers::NONE), &bench);
+        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(None)));
+        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(None)));
+        assert_eq!(press(KeyCode::Char('u')), Some(Action::Undo));
+        assert_eq!(press(KeyCode::Char('n')), Some(Action::Next));
+        assert_eq!(press(KeyCode::Char('s')), Some(Action::Stop));
+        assert_eq!(press(KeyCode::Char('x')), None);
+        // One up is the first tap; beyond it is none.
+        for _ in 0..3 {
+            assert_eq!(press(KeyCode::Up), None);
+        }
+        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(Some(4.905))));
+        // Down to the last one, which the next tap takes over.
+        assert_eq!(press(KeyCode::Down), None);
+        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(None)));
+        assert_eq!(press(KeyCode::Up), None);
+        assert_eq!(press(KeyCode::Esc), None);
+        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(None)));
+        let stop = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+        assert_eq!(chosen.action_of(stop, &bench), Some(Action::Stop));
+    }
+}

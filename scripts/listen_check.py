@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Compares the decisions of `tapjoint listen` with those of `run` on the same recording.
 
-usage: scripts/listen_check.py PROGRAM [--tests N] [--recordings FILE[:HAMMER] ...]
+usage: scripts/listen_check.py PROGRAM [--tests N] [--recordings FILE[:HAMMER] ...] [--folder DIR]
 
 Makes N recordings without tapjoint: a hammer and two accelerometers on a structure of five modes. Among the taps are double
 hits, weak taps, overloads, taps without an answer and records that are too short; some recordings have hum, a knocked table
 (the sensors move without a tap), or a hammer of the other sign. Plays each to `listen`, as it plays the given recordings.
-FILE:1 has its hammer in channel 1. Prints how many decisions after the last sample are those of `run`, how many were reported
+FILE:1 has its hammer in channel 1. Of DIR every file is played, with a hammer in channel 1 and without one; those that hold no
+samples in time are refused. Prints how many decisions after the last sample are those of `run`, how many were reported
 while the recording went on, how many of these were revised later, and how many of the double hits that `run` rejects were
 rejected while it went on. Needs numpy.
 """
@@ -97,12 +98,14 @@ def played(program, source, hammer):
         if not (folder / "run.json").exists():
             return ended.stderr.strip()
         run = json.loads((folder / "run.json").read_text())["recordings"][0]
-        lines = [json.loads(line) for line in (folder / "copy.listen.jsonl").read_text().splitlines()]
+        log = folder / "copy.listen.jsonl"
+        # Without news there is none.
+        lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     length = run["seconds"]
     # A tap is named by its time, to 50 ms: its trigger moves a little as the threshold does.
     reported, live, revised = [], [], 0
     for line in lines:
-        if line["news"] == "doubt":
+        if line["news"] not in ("tap", "revised", "gone"):
             continue
         is_live = line["heard"] < length - 1e-6
         revised += is_live and line["news"] != "tap"
@@ -132,6 +135,7 @@ def main():
     parser.add_argument("--tests", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--recordings", nargs="*", default=[])
+    parser.add_argument("--folder", type=Path, help="a folder of recordings, subfolders included")
     arguments = parser.parse_args()
     program = str(Path(arguments.program).resolve())
 
@@ -147,7 +151,8 @@ def main():
     total = {}
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(one, range(arguments.tests)))
-    for given in arguments.recordings:
+    files = sorted(path for path in arguments.folder.rglob("*") if path.is_file()) if arguments.folder else []
+    for given in arguments.recordings + [f"{file}{hammer}" for file in files for hammer in ("", ":1")]:
         path, _, hammer = given.partition(":")
         counts = played(program, path, hammer)
         print(f"{path}: {counts}")

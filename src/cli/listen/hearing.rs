@@ -221,6 +221,8 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 let words = "taps are not judged any more, and the recording goes on";
                 let warning = format!("{fault}; {words}");
                 self.fault = Some(fault);
+                // The results would meet the same fault.
+                self.states = None;
                 if !self.is_refused() {
                     self.views.warn(&warning);
                 }

@@ -25,6 +25,8 @@ pub(super) enum Subject {
         file: Box<TestFile>,
         /// Place of the recording that goes on.
         table: usize,
+        /// Its name.
+        name: String,
     },
     /// A recording about which nothing is described.
     Bare(BareSettings),
@@ -43,6 +45,7 @@ impl Subject {
         });
         let there: Vec<_> = there.collect();
         let own = there.iter().position(|(place, _)| *place == table);
+        let name = file.test.recordings[table].name();
         let test = TestDescription {
             recordings: there
                 .iter()
@@ -57,13 +60,14 @@ impl Subject {
                 folder: file.folder.clone(),
             }),
             table: own.unwrap_or(0),
+            name,
         }
     }
 
     /// Analyses the recording that a question is about, with what else there is.
     fn answer(&mut self, question: &Question) -> anyhow::Result<SoFar> {
         let (document, recording) = match self {
-            Self::Described { file, table } => {
+            Self::Described { file, table, name } => {
                 let recording = &mut file.test.recordings[*table];
                 // Names in the description are seen from its folder; others are whole.
                 let mut files = question.files.iter().map(std::path::absolute);
@@ -72,7 +76,11 @@ impl Subject {
                 }
                 recording.more_files = files.collect::<Result<_, _>>()?;
                 recording.by_hand = question.by_hand.clone();
-                let analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
+                let mut analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
+                // By the name that the description gives it.
+                if let Some(own) = analysis.recordings.get_mut(*table) {
+                    own.file.clone_from(name);
+                }
                 let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
                 let mut document = document_of(&analysis);
                 document.add_gap(gap_section(diagnosis.as_ref()));

@@ -6,7 +6,7 @@ use super::recording_result::RecordingResult;
 use super::stages::{Stage, Watch, Work};
 use super::wiring::{PipelineError, measure_bare_watched};
 use std::path::Path;
-use tapjoint_description::{ChannelRef, ReadBy, WindowKind};
+use tapjoint_description::{ChannelRef, ReadBy, TapSelection, WindowKind};
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
@@ -28,6 +28,8 @@ pub struct BareSettings {
     pub window: Option<WindowKind>,
     /// Way of reading the frequencies.
     pub reading: ReadBy,
+    /// Choice among the taps that count; `None` = not stated, all of them.
+    pub select: Option<TapSelection>,
 }
 
 /// Reasons for which a file without a description cannot be analysed.
@@ -70,6 +72,7 @@ impl BareSettings {
         measure.window = self.window;
         measure.taps.keep_overload = self.keep_overload.unwrap_or(false);
         measure.reading = self.reading;
+        measure.select = self.select.unwrap_or_default();
     }
 
     /// Refuses settings that do not apply to functions.
@@ -81,6 +84,7 @@ impl BareSettings {
             ("--overload", self.keep_overload.is_some()),
             ("--block", self.block.is_some()),
             ("--window", self.window.is_some()),
+            ("--select", self.select.is_some()),
         ];
         refuse_for_functions(path, &time_options)
     }

@@ -165,6 +165,7 @@ pub(super) fn described_settings(
     };
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
+    settings.select = test.analysis.select;
     settings.poles = poles_of(test, description);
     let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
     settings.kinds = kinds.collect();

@@ -38,17 +38,6 @@ pub struct Hit {
     pub sensor: f64,
 }
 
-impl Hit {
-    pub fn at(place: f64, level: f64) -> Self {
-        Hit {
-            place,
-            level,
-            length: 2e-3,
-            sensor: 1.0,
-        }
-    }
-}
-
 /// Distribution of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Noise {
@@ -109,15 +98,26 @@ impl Trial {
     pub fn drawn(taps: usize, scatter: f64, seed: u64) -> Self {
         let mut trial = Self::by_hand(taps, scatter, seed);
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
-        let mut between = |low: f64, high: f64| low * (high / low).powf(random.random_range(0.0..1.0));
+        let mut between =
+            |low: f64, high: f64| low * (high / low).powf(random.random_range(0.0..1.0));
         trial.damping = between(0.001, 0.01);
         trial.quiet = between(30.0, 75.0);
         trial.interval = between(1.0, 3.0);
         let place = between(0.1, 0.42);
-        trial.hits.iter_mut().for_each(|hit| hit.place += place - 0.36);
-        trial.sensors = vec![between(0.1, 0.42), between(0.1, 0.42)];
-        trial.noise = [Noise::White, Noise::Red, Noise::HeavyTailed, Noise::Hum][(seed % 4) as usize];
         trial
+            .hits
+            .iter_mut()
+            .for_each(|hit| hit.place += place - 0.36);
+        trial.sensors = vec![between(0.1, 0.42), between(0.1, 0.42)];
+        trial.noise =
+            [Noise::White, Noise::Red, Noise::HeavyTailed, Noise::Hum][(seed % 4) as usize];
+        trial
+    }
+
+    /// Natural frequencies of the modes that move (Hz).
+    pub fn frequencies(&self) -> Vec<f64> {
+        let modes = self.structure().0.modes;
+        modes.iter().map(|mode| mode.frequency).collect()
     }
 
     fn structure(&self) -> (ReducedStructure, impl Fn(f64) -> StruckPlace, f64) {
@@ -136,7 +136,9 @@ impl Trial {
         let h = 1e-4 * LENGTH;
         let mut rotations = Vec::new();
         for shape in &shapes {
-            let w: Vec<f64> = (0..5).map(|n| shape.displacement(f64::from(n) * h)).collect();
+            let w: Vec<f64> = (0..5)
+                .map(|n| shape.displacement(f64::from(n) * h))
+                .collect();
             rotations.push(
                 (-25.0 * w[0] + 48.0 * w[1] - 36.0 * w[2] + 16.0 * w[3] - 3.0 * w[4]) / (12.0 * h),
             );
@@ -166,9 +168,8 @@ impl Trial {
                 omega * omega
             };
             let beyond = |f: &dyn Fn(usize) -> f64| (MODES..ALL).map(|n| f(n) / square(n)).sum();
-            let both = |x: &f64| {
-                beyond(&|n| shapes[n].displacement(tap) * shapes[n].displacement(*x))
-            };
+            let both =
+                |x: &f64| beyond(&|n| shapes[n].displacement(tap) * shapes[n].displacement(*x));
             StruckPlace {
                 at_modes: (0..MODES).map(|n| shapes[n].displacement(tap)).collect(),
                 to_sensors: sensors.iter().map(both).collect(),
@@ -216,7 +217,11 @@ impl Trial {
             let hit = (hit.max(0.0) as usize).min(self.hits.len() - 1);
             channels[0].push(motion.force());
             for (sensor, (channel, value)) in channels[1..].iter_mut().zip(&now).enumerate() {
-                let factor = if sensor == 0 { self.hits[hit].sensor } else { 1.0 };
+                let factor = if sensor == 0 {
+                    self.hits[hit].sensor
+                } else {
+                    1.0
+                };
                 channel.push(factor * value);
             }
             (0..STEPS).for_each(|_| motion.advance());
@@ -256,10 +261,15 @@ impl Trial {
                 _ => largest * 10f64.powf(-self.quiet / 20.0),
             };
             let noise = match number {
-                0 => (0..channel.len()).map(|_| StandardNormal.sample(&mut random)).collect(),
+                0 => (0..channel.len())
+                    .map(|_| StandardNormal.sample(&mut random))
+                    .collect(),
                 _ => self.noise(channel.len(), &mut random),
             };
-            channel.iter_mut().zip(noise).for_each(|(x, noise): (_, f64)| *x += scale * noise);
+            channel
+                .iter_mut()
+                .zip(noise)
+                .for_each(|(x, noise): (_, f64)| *x += scale * noise);
         }
         let channels = channels.into_iter().map(|samples| Channel {
             samples,
@@ -276,6 +286,29 @@ impl Trial {
         })
         .expect("a recording that can be analysed")
     }
+}
+
+/// For each of these frequencies (Hz), true where the 95 % interval of the mode that was read there holds it; modes that
+/// were not read are left out.
+pub fn held(analysis: &Analysis, truths: &[f64]) -> Vec<bool> {
+    let mut held = Vec::new();
+    for truth in truths {
+        let readings = analysis
+            .modes
+            .iter()
+            .filter_map(|mode| mode.reading.as_ref());
+        let near = readings.filter(|reading| (reading.frequency / truth - 1.0).abs() < 0.02);
+        let nearest = near.min_by(|a, b| {
+            (a.frequency - truth)
+                .abs()
+                .total_cmp(&(b.frequency - truth).abs())
+        });
+        held.extend(nearest.map(|reading| {
+            let (low, high) = reading.interval;
+            (low..=high).contains(truth)
+        }));
+    }
+    held
 }
 
 /// The taps of an analysis.

@@ -45,7 +45,11 @@ impl Octave {
         let mut high = band.1;
         while high > lowest && octaves.len() < MOST_OCTAVES {
             // A rest below a third of an octave goes with the octave above.
-            let low = if high / 2.0 < 1.26 * lowest { lowest } else { high / 2.0 };
+            let low = if high / 2.0 < 1.26 * lowest {
+                lowest
+            } else {
+                high / 2.0
+            };
             octaves.extend(Self::between(low, high, sample_rate, frames));
             high = low;
         }

@@ -2,8 +2,8 @@
 
 use crate::compare::REPEATABILITY_LIMITS;
 use crate::description::{
-    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
-    SELECTIONS, SENSOR_KINDS, SensorKind, TapSelection, WINDOWS, WindowKind,
+    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm, SELECTIONS,
+    SENSOR_KINDS, SensorKind, TapSelection, WINDOWS, WindowKind,
 };
 use crate::pipeline::{BareSettings, EstimateMethod, IdentifySettings, MeasureSettings};
 use crate::quantity::{Dimension, parse_quantity};

@@ -13,8 +13,8 @@ use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
 use super::{
     AnalysisDescription, Assembly, BeamDescription, ChannelRef, FitParameter, JointDescription,
-    JointModel, ModeFile, RecordingDescription, SensorDescription, SheetDescription,
-    TapSelection, TestDescription, Weights, WindowKind, keys,
+    JointModel, ModeFile, RecordingDescription, SensorDescription, SheetDescription, TapSelection,
+    TestDescription, Weights, WindowKind, keys,
 };
 use std::fmt;
 use std::path::{Path, PathBuf};

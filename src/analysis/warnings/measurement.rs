@@ -65,7 +65,8 @@ impl Warning {
 
     /// Doubts about the choice among `taps` taps.
     pub(crate) fn of_selection(file: &str, choice: &Choice, taps: usize) -> Vec<Self> {
-        let advice = "look at the taps, leave the wrong ones out by `reject_taps`, or measure again";
+        let advice =
+            "look at the taps, leave the wrong ones out by `reject_taps`, or measure again";
         let mut warnings = Vec::new();
         match choice.disagreement {
             Some(Disagreement::TooMany { departing }) => {

@@ -107,7 +107,10 @@ pub const WARNING_CODES: [(&str, &str); 79] = [
     ("taps", "the search for taps has a remark"),
     ("rejected-taps", "taps were rejected"),
     ("single-tap", "only one tap was averaged"),
-    ("not-selected", "taps could not be chosen by their responses"),
+    (
+        "not-selected",
+        "taps could not be chosen by their responses",
+    ),
     (
         "taps-disagree",
         "responses to the taps differ, and it is open which are right",

@@ -13,8 +13,8 @@ pub(super) const LEAST_TAPS: usize = 4;
 const LEAST_KEPT: usize = 3;
 /// Most taps that are taken out, as a share of all. Where more depart, no group of taps has the right on its side.
 const MOST_REJECTED: f64 = 1.0 / 3.0;
-/// A departure up to this (1) rejects no tap. 12 %: a tap that is 2 % of the length off departs by about as much, and
-/// spoils nothing.
+/// A departure up to this (1) rejects no tap. 12 %: on a clamped bar a tap that is 3 % of the length off departs by about as
+/// much. Nearer hits spoil little.
 const FLOOR: f64 = 0.12;
 /// A tap departs by so many times as much as the others, at least, where there are many of them. 5: of places that
 /// scatter as normal values do, 4 in 1000 are that far off.

@@ -19,18 +19,6 @@ fn report(name: &str, trials: u64, wrong: &[usize], make: impl Fn(u64) -> Trial 
             let out = inconsistent(&analysis);
             let hit = out.iter().filter(|tap| wrong.contains(tap)).count();
             let used = taps(&analysis).iter().filter(|tap| tap.accepted()).count();
-            if std::env::var("SHOW").is_ok() {
-                for tap in taps(&analysis).iter().filter(|tap| tap.rejection.is_some()) {
-                    eprintln!("{name} {seed}: {}", tap.rejection.as_ref().unwrap());
-                }
-                for warning in analysis
-                    .warnings
-                    .iter()
-                    .filter(|w| w.code == "taps-disagree")
-                {
-                    eprintln!("{name} {seed}: {warning}");
-                }
-            }
             (
                 used + out.len(),
                 hit,

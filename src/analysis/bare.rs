@@ -6,7 +6,7 @@ use super::recording_result::RecordingResult;
 use super::stages::{Stage, Watch, Work};
 use super::wiring::{PipelineError, measure_bare_watched};
 use std::path::Path;
-use tapjoint_description::{ChannelRef, ReadBy, WindowKind};
+use tapjoint_description::{ChannelRef, ReadBy, TapSelection, WindowKind};
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
@@ -31,6 +31,8 @@ pub struct BareSettings {
     pub window: Option<WindowKind>,
     /// Way of reading the frequencies.
     pub reading: ReadBy,
+    /// Choice among the taps that count; `None` = not stated, all of them.
+    pub select: Option<TapSelection>,
 }
 
 /// Reasons for which a file without a description cannot be analysed.
@@ -74,6 +76,7 @@ impl BareSettings {
         measure.taps.keep_overload = self.keep_overload.unwrap_or(false);
         measure.taps.by_hand = self.by_hand.clone();
         measure.reading = self.reading;
+        measure.select = self.select.unwrap_or_default();
     }
 
     /// Refuses settings that do not apply to functions.
@@ -87,6 +90,7 @@ impl BareSettings {
             ("--reject-taps", !self.by_hand.reject.is_empty()),
             ("--block", self.block.is_some()),
             ("--window", self.window.is_some()),
+            ("--select", self.select.is_some()),
         ];
         refuse_for_functions(path, &time_options)
     }

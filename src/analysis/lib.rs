@@ -36,8 +36,10 @@ mod pulse_window;
 mod quiet;
 mod recording_result;
 mod results;
+mod selection;
 mod stages;
 mod structure;
+mod tap_responses;
 mod warnings;
 mod wiring;
 

@@ -6,11 +6,13 @@ use super::explained::{FittedCurves, UnlistedPeak, unlisted_peaks};
 use super::fits::{FreeDecays, Stabilisation, keep_chosen};
 use super::pulse_window::PulseWindow;
 use super::quiet::PreTriggerNoise;
+use super::selection::{Choice, LEAST_TAPS, choose};
 use super::stages::{Stage, Work};
+use super::tap_responses::{Octave, TapResponse, TapSamples};
 use super::warnings::{Warning, of_recording};
 use num_complex::Complex64;
 use std::ops::Range;
-use tapjoint_description::WindowKind;
+use tapjoint_description::{TapSelection, WindowKind};
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::modal::{
     CompositeLevel, GRIDS, GridFrequency, MainsSettings, ModeReading, PeakLabel, PeakSettings,
@@ -22,7 +24,7 @@ use tapjoint_signal::spectral::{
     RUNG_DOWN, SpectralError, Window, choose_window, exponential_to, largest_smooth_block,
     measure_decay,
 };
-use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{Rejection, Tap, TapSettings, TapSource, Taps, find_taps};
 
 /// Settings of the measurement of one recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +39,8 @@ pub struct MeasureSettings {
     pub window: Option<WindowKind>,
     /// Way in which natural frequencies are read.
     pub reading: ReadBy,
+    /// Choice among the taps that count.
+    pub select: TapSelection,
     /// Form of each response, for modal constants; `None` where it is not known, or no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
@@ -59,6 +63,7 @@ impl MeasureSettings {
             block: None,
             window: None,
             reading: ReadBy::default(),
+            select: TapSelection::default(),
             kinds: Vec::new(),
             poles: Vec::new(),
             taps: TapSettings::default(),
@@ -173,8 +178,13 @@ pub(super) fn measure_watched(
     // The band is judged before anything is read: it is the user's typing, not the data.
     let trial = lines_for(settings, recording.sample_rate(), recording.duration());
     let trial = trial.map_err(|problem| MeasureError::of(recording, problem))?;
-    let taps = find_taps(recording, &settings.source, &settings.tap_settings(&trial))?;
+    let mut taps = find_taps(recording, &settings.source, &settings.tap_settings(&trial))?;
+    let doubts = match settings.select {
+        TapSelection::All => Vec::new(),
+        TapSelection::Consistent => select_taps(recording, settings, &mut taps)?,
+    };
     let mut warnings = of_recording(recording, &settings.source, &taps);
+    warnings.extend(doubts);
     let mut spectra = None;
     if let Some(shortest) = taps.shortest() {
         let available = shortest as f64 / recording.sample_rate();
@@ -215,6 +225,58 @@ pub(super) fn measure_watched(
     })
 }
 
+/// Rejects the accepted taps that do not agree with the others. Returns the doubts about that.
+fn select_taps(
+    recording: &Recording,
+    settings: &MeasureSettings,
+    taps: &mut Taps,
+) -> Result<Vec<Warning>, MeasureError> {
+    let file = recording.name();
+    if !matches!(settings.source, TapSource::Hammer { .. }) {
+        return Ok(vec![Warning::select_without_force(file)]);
+    }
+    let compared: Vec<usize> = (0..taps.taps.len())
+        .filter(|place| taps.taps[*place].accepted() && taps.taps[*place].is_whole())
+        .collect();
+    if compared.len() < LEAST_TAPS {
+        return Ok(vec![Warning::select_of_few(file, compared.len())]);
+    }
+    let shortest = taps.shortest().unwrap_or(0) as f64 / recording.sample_rate();
+    let Ok(lines) = lines_for(settings, recording.sample_rate(), shortest) else {
+        // The same is said of the spectra.
+        return Ok(Vec::new());
+    };
+    // Of many taps, parts that follow one another are compared by themselves.
+    let parts = compared.len().div_ceil(MOST_COMPARED);
+    let mut doubts = Vec::new();
+    let mut rejections = Vec::new();
+    for part in 0..parts {
+        let own = compared.len() * part / parts..compared.len() * (part + 1) / parts;
+        let own = &compared[own];
+        let inputs = Inputs::new(recording, settings, taps, lines);
+        let choice = inputs.choice(own)?;
+        doubts.extend(Warning::of_selection(file, &choice, own.len()));
+        for one in choice.departing {
+            rejections.push((
+                own[one.tap],
+                Rejection::Inconsistent {
+                    departure: one.departure,
+                    others: one.others,
+                    limit: one.limit,
+                },
+            ));
+        }
+    }
+    for (place, rejection) in rejections {
+        let tap = &mut taps.taps[place];
+        match settings.taps.by_hand.accepts(tap) {
+            true => tap.overruled = tap.overruled.take().or(Some(rejection)),
+            false => tap.rejection = Some(rejection),
+        }
+    }
+    Ok(doubts)
+}
+
 /// The axis: block and band as wanted, or the longest block that fits `available` seconds.
 pub(super) fn lines_for(
     settings: &MeasureSettings,
@@ -235,6 +297,9 @@ pub(super) fn lines_for(
 
 /// Most taps from which the decay in the records is taken, evenly spread: more would hardly find a slower one.
 const MOST_LOOKED_AT: usize = 32;
+
+/// Most taps that are compared with each other: a bound on memory, and more make the median no better.
+const MOST_COMPARED: usize = 200;
 
 /// Data that every step of one recording's measurement needs.
 struct Inputs<'a> {
@@ -290,6 +355,55 @@ impl<'a> Inputs<'a> {
     /// Reads a tap's record from its start to the end of a block.
     fn read_record(&self, tap: &Tap, into: &mut [Vec<f64>]) -> Result<(), RecordingError> {
         self.read(tap.record.start..tap.usable_from() + self.gate, into)
+    }
+
+    /// Compares the taps at these places, and chooses among them.
+    fn choice(&self, places: &[usize]) -> Result<Choice, RecordingError> {
+        let rate = self.recording.sample_rate();
+        let band = (self.lines.low, self.lines.high);
+        let octaves = Octave::all(band, rate, self.gate as usize);
+        let mut responses = Vec::with_capacity(places.len());
+        let mut record = vec![Vec::new(); self.channels.len()];
+        let mut before = vec![Vec::new(); self.channels.len()];
+        for &place in places {
+            let tap = &self.taps.taps[place];
+            self.read_record(tap, &mut record)?;
+            self.read(self.stretch_before(place), &mut before)?;
+            let samples = TapSamples {
+                responses: record.split_off(1),
+                force: record.pop().unwrap_or_default(),
+                before: before.split_off(1),
+            };
+            responses.extend(TapResponse::of(tap, &octaves, samples, rate));
+            record.resize_with(self.channels.len(), Vec::new);
+            before.resize_with(self.channels.len(), Vec::new);
+        }
+        // Every tap of a hammer has a pulse.
+        if responses.len() < places.len() || self.responses() == 0 {
+            return Ok(Choice::default());
+        }
+        let taps = places.iter().map(|place| &self.taps.taps[*place]);
+        let by_hand = &self.settings.taps.by_hand;
+        let protected: Vec<bool> = taps.clone().map(|tap| by_hand.accepts(tap)).collect();
+        let peaks: Vec<f64> = taps.map(|tap| tap.peak).collect();
+        Ok(choose(&octaves, &responses, &protected, &peaks))
+    }
+
+    /// Frames before the record of a tap that show how the structure rested: at most a block, and half of the time since
+    /// the last tap.
+    fn stretch_before(&self, place: usize) -> Range<u64> {
+        let tap = &self.taps.taps[place];
+        let mut first = 0;
+        for (start, part) in self.recording.parts() {
+            if (start..start + part.frames()).contains(&tap.record.start) {
+                first = start;
+            }
+        }
+        if let Some(last) = place.checked_sub(1).map(|last| &self.taps.taps[last]) {
+            first = first.max(u64::midpoint(last.record.start, tap.record.start));
+        }
+        let first = first.max(tap.record.start.saturating_sub(self.gate));
+        first.min(tap.record.start)..tap.record.start
     }
 
     /// The taps whose records are averaged: with a force those that are whole.

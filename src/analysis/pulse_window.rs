@@ -39,6 +39,11 @@ impl PulseWindow {
         apply_force_window(&mut force[start..], self.length, self.taper);
     }
 
+    /// First sample of the record that the window keeps.
+    pub fn start(self) -> usize {
+        self.start
+    }
+
     /// Length of the window (samples), half of its taper included.
     pub fn length(self) -> f64 {
         self.length as f64 + 0.5 * self.taper as f64

@@ -162,6 +162,7 @@ pub(super) fn described_settings(
     settings.taps.by_hand = description.by_hand.clone();
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
+    settings.select = test.analysis.select;
     settings.poles = poles_of(test, description);
     let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
     settings.kinds = kinds.collect();

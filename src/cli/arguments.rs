@@ -2,8 +2,8 @@
 
 use crate::compare::REPEATABILITY_LIMITS;
 use crate::description::{
-    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm,
-    SENSOR_KINDS, SensorKind, WINDOWS, WindowKind,
+    ASSEMBLIES, Assembly, ChannelRef, FORMS, OVERLOADS, READINGS, ReadBy, ResponseForm, SELECTIONS,
+    SENSOR_KINDS, SensorKind, TapSelection, WINDOWS, WindowKind,
 };
 use crate::pipeline::{BareSettings, EstimateMethod, IdentifySettings, MeasureSettings};
 use crate::quantity::{Dimension, parse_quantity};
@@ -249,6 +249,7 @@ impl RecordingArguments {
             band: spectrum.zoom,
             window: spectrum.window,
             reading,
+            select: spectrum.select,
         }
     }
 
@@ -284,7 +285,7 @@ fn sample_rate(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Block, band and window of a spectrum.
+/// Block, band and window of a spectrum, and the choice of its taps.
 #[derive(Debug, Default, Args)]
 pub(super) struct SpectrumSettings {
     /// Block size (samples); default: the longest that fits the shortest tap
@@ -296,6 +297,10 @@ pub(super) struct SpectrumSettings {
     /// Window; default: rectangular if the taps decay to 1 % within the block, else exponential
     #[arg(long, value_name = "W", value_parser = window())]
     pub(super) window: Option<WindowKind>,
+    /// Taps that count: all that are in order, or of those the ones whose responses agree. The latter needs a hammer
+    /// and four taps; default: all
+    #[arg(long, value_name = "WHICH", value_parser = selection())]
+    pub(super) select: Option<TapSelection>,
 }
 
 impl SpectrumSettings {
@@ -304,6 +309,7 @@ impl SpectrumSettings {
         measure.block = self.block;
         measure.band = self.zoom;
         measure.window = self.window;
+        measure.select = self.select.unwrap_or_default();
     }
 }
 
@@ -556,6 +562,14 @@ pub(super) fn reading() -> impl TypedValueParser<Value = ReadBy> {
 fn time_unit() -> impl TypedValueParser<Value = f64> {
     let help = ["Seconds", "Milliseconds", "Microseconds", "Nanoseconds"];
     words(TIME_UNITS, help)
+}
+
+fn selection() -> impl TypedValueParser<Value = TapSelection> {
+    let help = [
+        "All that are in order",
+        "Those whose responses agree with each other",
+    ];
+    words(SELECTIONS, help)
 }
 
 fn overload() -> impl TypedValueParser<Value = bool> {

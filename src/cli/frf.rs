@@ -128,11 +128,12 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subj
             ("--block", arguments.spectrum.block.is_some()),
             ("--zoom", arguments.spectrum.zoom.is_some()),
             ("--window", arguments.spectrum.window.is_some()),
+            ("--select", arguments.spectrum.select.is_some()),
         ];
         let given = described.iter().chain(&own_options);
         if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
             bail!(
-                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `overload`, `accept_taps`, `reject_taps`, `band`, `block`, `window`"
+                "{name} is for bare recordings; a test description states this with its own keys: `channel`, `scale`, `sample_rate`, `time_unit`, `values`, `variables`, `overload`, `accept_taps`, `reject_taps`, `band`, `block`, `window`, `select`"
             );
         }
         let file = read_test(file, terminal)?;

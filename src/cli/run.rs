@@ -244,9 +244,13 @@ fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow
         );
     }
     let spectrum = &arguments.spectrum;
-    if spectrum.zoom.is_some() || spectrum.block.is_some() || spectrum.window.is_some() {
+    if spectrum.zoom.is_some()
+        || spectrum.block.is_some()
+        || spectrum.window.is_some()
+        || spectrum.select.is_some()
+    {
         bail!(
-            "--zoom, --block and --window are for bare recordings; a test description says `band` and `block` in [[recording]], and `window` in [analysis]"
+            "--zoom, --block, --window and --select are for bare recordings; a test description says `band` and `block` in [[recording]], and `window` and `select` in [analysis]"
         );
     }
     let mut file = read_test(file, terminal)?;

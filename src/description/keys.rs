@@ -66,7 +66,7 @@ pub(super) const MEASURED: KnownTable = KnownTable::new(
 pub(super) const FIRST_NODE: KnownTable = KnownTable::new("measured.first_node", "number position");
 pub(super) const ANALYSIS: KnownTable = KnownTable::new(
     "[analysis]",
-    "window reading fit_modes weights sensor_mass fit poles",
+    "window reading select fit_modes weights sensor_mass fit poles",
 );
 
 pub(super) const SHEET: KnownTable = KnownTable::new(

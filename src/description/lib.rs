@@ -16,7 +16,7 @@ mod template;
 mod tolerance;
 
 pub use free_test::FreeTestFile;
-pub use parse::{ChannelRefError, READINGS, WINDOWS};
+pub use parse::{ChannelRefError, READINGS, SELECTIONS, WINDOWS};
 pub use reader::DescriptionError;
 pub use recordings::{FORMS, OVERLOADS, SENSOR_KINDS};
 use schemars::JsonSchema;
@@ -395,6 +395,16 @@ pub enum FitParameter {
     Density,
 }
 
+/// Choice among the taps that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TapSelection {
+    /// All of them.
+    #[default]
+    All,
+    /// Those whose responses agree with each other.
+    Consistent,
+}
+
 /// Settings of the analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnalysisDescription {
@@ -402,6 +412,8 @@ pub struct AnalysisDescription {
     pub window: Option<WindowKind>,
     /// Way of reading natural frequencies.
     pub reading: ReadBy,
+    /// Choice among the taps that count.
+    pub select: TapSelection,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
     /// Frequencies (Hz) of the modes that were chosen by hand, ascending; empty where the program chooses.

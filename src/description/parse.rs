@@ -13,7 +13,7 @@ use super::structure::{read_effect, read_joint};
 use super::tolerance::{BeamTolerance, Described, read_free, read_weighed};
 use super::{
     AnalysisDescription, Assembly, BeamDescription, ChannelRef, FitParameter, JointDescription,
-    JointModel, ModeFile, RecordingDescription, SensorDescription, SheetDescription,
+    JointModel, ModeFile, RecordingDescription, SensorDescription, SheetDescription, TapSelection,
     TestDescription, Weights, WindowKind, keys,
 };
 use std::fmt;
@@ -250,6 +250,11 @@ pub const READINGS: [(&str, ReadBy); 3] = [
     ("interpolated", ReadBy::Interpolated),
     ("line", ReadBy::Line),
 ];
+/// Words of `select` in `[analysis]`.
+pub const SELECTIONS: [(&str, TapSelection); 2] = [
+    ("all", TapSelection::All),
+    ("consistent", TapSelection::Consistent),
+];
 const WEIGHTS: [(&str, Weights); 2] = [
     ("measured", Weights::Measured),
     ("relative", Weights::Relative),
@@ -271,6 +276,7 @@ fn read_analysis(
     let mut analysis = AnalysisDescription {
         window: None,
         reading: ReadBy::default(),
+        select: TapSelection::default(),
         fit_modes: None,
         poles: Vec::new(),
         weights: None,
@@ -280,6 +286,7 @@ fn read_analysis(
     if let Some(table) = table {
         analysis.window = table.choice("window", &WINDOWS)?;
         analysis.reading = table.choice("reading", &READINGS)?.unwrap_or_default();
+        analysis.select = table.choice("select", &SELECTIONS)?.unwrap_or_default();
         analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
         let poles = table.optional("poles", read_poles)?;
         analysis.poles = poles.unwrap_or_default();

@@ -114,6 +114,7 @@ file = "taps.wav"              # WAV, FLAC, CSV, UFF58, LabVIEW .lvm or MATLAB .
 [analysis]
 # window = "exponential"       # "rectangular" | "hann" | "exponential"; default: rectangular where the tap rings down to 1 % in the block, else exponential
 # reading = "fit"              # how frequencies are read: "fit" (default) | "interpolated" | "line", the paper's way
+# select = "consistent"        # taps whose response departs from that of the others are rejected; default: "all"; needs [hammer] and four taps
 # fit_modes = 4                # number of modes that enter the estimate, from the first, default: all
 # poles = [16.55, 116.8]       # Hz, the modes chosen by hand, default: found by the program; the stabilisation diagram of report.html writes this line
 # weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights

@@ -60,5 +60,6 @@ mod simulate_seen;
 mod simulate_test;
 mod strengths;
 mod structure;
+mod tap_selection;
 mod taps_double_hit;
 mod updated_model;

@@ -4,9 +4,11 @@
 use super::Warning;
 use crate::amplitude::{AmplitudeChanges, Way};
 use crate::explained::UnlistedPeak;
+use crate::selection::{Choice, Disagreement, LEAST_TAPS, OTHER_LEVEL};
 use std::fmt;
 use tapjoint_description::DescriptionError;
 use tapjoint_identify::pairing::{MeasuredPeak, MissingCause, MissingMode, Pairing};
+use tapjoint_numerics::stats::times;
 use tapjoint_signal::modal::{ModeReading, PeakLabel};
 use tapjoint_signal::quality::{Check, Outcome, QualityVerdict, Subject, limits};
 use tapjoint_signal::recording::{Recording, RecordingWarning};
@@ -43,6 +45,67 @@ impl Warning {
         let text = "only one tap was averaged, so nothing shows how well it repeats and a \
                     coherence would mean nothing; record three to five taps";
         Warning::about(file, "single-tap", text)
+    }
+
+    /// Taps were to be chosen by their responses, and no force was measured.
+    pub(crate) fn select_without_force(file: &str) -> Self {
+        let text = "select = \"consistent\" needs the force, because without it a weak tap looks like one at another \
+                    place; all taps are kept; describe the hammer's channel, or leave `select` out";
+        Warning::about(file, "not-selected", text)
+    }
+
+    /// Taps were to be chosen by their responses, and there are too few.
+    pub(crate) fn select_of_few(file: &str, taps: usize) -> Self {
+        let text = format!(
+            "select = \"consistent\" needs at least {LEAST_TAPS} taps in order, and there are {taps}; all are kept; \
+             record more taps"
+        );
+        Warning::about(file, "not-selected", text)
+    }
+
+    /// Doubts about the choice among `taps` taps.
+    pub(crate) fn of_selection(file: &str, choice: &Choice, taps: usize) -> Vec<Self> {
+        let advice =
+            "look at the taps, leave the wrong ones out by `reject_taps`, or measure again";
+        let mut warnings = Vec::new();
+        match choice.disagreement {
+            Some(Disagreement::TooMany { departing }) => {
+                let text = format!(
+                    "the taps do not agree: at least {departing} of {taps} depart from the others, more than a third; \
+                     all are kept; {advice}"
+                );
+                warnings.push(Warning::about(file, "taps-disagree", text));
+            }
+            Some(Disagreement::Groups {
+                sizes: [larger, smaller],
+                apart,
+                level,
+            }) => {
+                let percent = 100.0 * apart;
+                let cause = match level > OTHER_LEVEL {
+                    true => format!(
+                        "one group is {} times stronger than the other, and a joint may respond to that",
+                        times(level)
+                    ),
+                    false => "the place of the hits or a sensor has probably moved".to_owned(),
+                };
+                let text = format!(
+                    "the taps fall into groups of {larger} and {smaller}, whose responses differ by {percent:.0} %; \
+                     {cause}; no group is preferred; {advice}"
+                );
+                warnings.push(Warning::about(file, "taps-disagree", text));
+            }
+            None => {}
+        }
+        if choice.of_other_level > 0 {
+            let count = choice.of_other_level;
+            let text = format!(
+                "{count} of {taps} taps depart from the others and are kept, because they differ in level, and a joint may \
+                 respond to that; tap at one level, or leave them out by `reject_taps`"
+            );
+            warnings.push(Warning::about(file, "taps-disagree", text));
+        }
+        warnings
     }
 
     /// The taps follow one another too soon for the band.

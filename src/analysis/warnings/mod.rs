@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/reference.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 77] = [
+pub const WARNING_CODES: [(&str, &str); 79] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -107,6 +107,14 @@ pub const WARNING_CODES: [(&str, &str); 77] = [
     ("taps", "the search for taps has a remark"),
     ("rejected-taps", "taps were rejected"),
     ("single-tap", "only one tap was averaged"),
+    (
+        "not-selected",
+        "taps could not be chosen by their responses",
+    ),
+    (
+        "taps-disagree",
+        "responses to the taps differ, and it is open which are right",
+    ),
     ("taps-too-short", "the taps leave no spectrum"),
     ("hann-on-taps", "a Hann window was chosen for taps"),
     (

@@ -110,7 +110,7 @@ impl Tests {
         let options = &tests.settings.bare;
         ensure!(
             tests.template.is_none() || *options == Default::default(),
-            "--hammer, --sample-rate, --time-unit, --values, --variable, --overload, --zoom, --block and --window are for \
+            "--hammer, --sample-rate, --time-unit, --values, --variable, --overload, --zoom, --block, --window and --select are for \
              recordings without a description, and --test describes them all; say it there, or leave --test out"
         );
         ensure!(

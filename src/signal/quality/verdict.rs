@@ -219,6 +219,9 @@ pub fn remedy_of(rejection: &Rejection) -> Option<&'static str> {
         Rejection::CutOff { .. } => {
             Some("Let the recording go on until the structure has come to rest.")
         }
+        Rejection::Inconsistent { .. } => {
+            Some("Hit the same place, straight on, and touch neither the sensors nor their cables.")
+        }
         Rejection::ByHand => None,
     }
 }

@@ -78,11 +78,15 @@ impl TapsByHand {
         remarks
     }
 
+    /// Returns `true` where a tap is accepted by hand.
+    pub fn accepts(&self, tap: &Tap) -> bool {
+        self.accept.iter().any(|time| is_at(tap.time, *time))
+    }
+
     /// Returns a remark for each tap that was accepted by hand, and is rejected all the same: its record is too short.
     pub(super) fn still_rejected(&self, taps: &[Tap]) -> Vec<TapRemark> {
-        let is_named = |tap: &&Tap| self.accept.iter().any(|time| is_at(tap.time, *time));
         let mut remarks = Vec::new();
-        for tap in taps.iter().filter(is_named) {
+        for tap in taps.iter().filter(|tap| self.accepts(tap)) {
             if let Some(rejection) = tap.rejection.clone()
                 && rejection != Rejection::ByHand
             {

@@ -233,6 +233,15 @@ pub enum Rejection {
         /// Length of the others (s).
         needed: f64,
     },
+    /// Its response departs from that of the other taps.
+    Inconsistent {
+        /// Departure from the median of the others, relative to the response (1).
+        departure: f64,
+        /// Median departure of the others (1).
+        others: f64,
+        /// Limit of the departure (1).
+        limit: f64,
+    },
     /// It was rejected by hand.
     ByHand,
 }
@@ -271,6 +280,18 @@ impl fmt::Display for Rejection {
                     "the next tap comes after {available:.2} s, {needed:.2} s are needed"
                 )
             }
+            Rejection::Inconsistent {
+                departure,
+                others,
+                limit,
+            } => write!(
+                f,
+                "inconsistent: its response differs by {:.0} % from that of the other taps, which differ by {:.0} % \
+                 (limit {:.0} %)",
+                100.0 * departure,
+                100.0 * others,
+                100.0 * limit
+            ),
             Rejection::ByHand => f.write_str("rejected by hand"),
         }
     }

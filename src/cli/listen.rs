@@ -232,6 +232,13 @@ pub(super) fn run(
         true => Some(read_test(path, &terminal)?),
         false => None,
     };
+    if described.is_some() {
+        arguments.run.check_for_description()?;
+    }
+    ensure!(
+        arguments.accuracy.is_none() || arguments.speed.is_some(),
+        "--accuracy needs the results between the taps, and --speed max works none out; give a number"
+    );
     let replayed = arguments.replay.as_deref();
     let mut target = match &described {
         Some(file) => described_target(file, replayed, arguments.resume, None)?,
@@ -243,6 +250,7 @@ pub(super) fn run(
     let stream = Running::begin(begun.source, begun.names);
     ledger().stop = Some(stream.stopper());
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
+    let mut failed = None;
     let (heard, end) = loop {
         let bare = arguments.run.bare();
         let plan = plan_of(described.as_ref(), &target, &bare);
@@ -263,19 +271,23 @@ pub(super) fn run(
         }
         let mut heard = hearing.listen(&stream, first.take());
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
+        let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
-            let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
             break (heard, ended);
         };
-        // With the decisions by hand on the last recording.
-        described = Some(read_test(path, &terminal)?);
+        failed = failed.or(ended.err());
+        // The description is read again by the run alone: it may be half written now.
+        if let Some((described, table)) = described.as_mut().zip(target.table)
+            && let Some(by_hand) = heard.by_hand
+        {
+            described.test.recordings[table].by_hand = by_hand;
+        }
         (target, first) = (next, Some(file));
         views.say(&introduction(arguments, described.as_ref(), &target));
     };
-    ledger().stop = None;
     views.end_screen();
     ledger().restore = None;
-    let end = end?;
+    let end = failed.map_or(end, Err)?;
     if end.rest > 0 {
         terminal.warn(&format!(
             "the stream ended within a frame; its last {} bytes are left out",
@@ -403,8 +415,14 @@ fn files_beside(described: Option<&TestFile>, target: &Target, heard: &Heard) ->
         Some(_) => "the description",
         None => "a description (`tapjoint init` prints one)",
     };
+    let by_hand = match (described, &heard.by_hand) {
+        (None, Some(by_hand)) => by_hand_lists(by_hand)
+            .map(|(name, times)| format!(" and {name}_taps = [{times}]"))
+            .collect(),
+        _ => String::new(),
+    };
     Some(format!(
-        "one recording in {} files, no report yet: write files = [{names}] in {place}, then run the test\n",
+        "one recording in {} files, no report yet: write files = [{names}]{by_hand} in {place}, then run the test\n",
         heard.files.len()
     ))
 }
@@ -422,20 +440,27 @@ fn by_hand_words(is_described: bool, by_hand: &TapsByHand) -> String {
         return "decided by hand: accept_taps and reject_taps of the description hold it\n"
             .to_owned();
     }
-    let list = |times: &[f64]| {
-        let times = times.iter().map(f64::to_string);
-        times.collect::<Vec<_>>().join(",")
-    };
-    let options = [
-        ("--accept-taps", &by_hand.accept),
-        ("--reject-taps", &by_hand.reject),
-    ];
-    let options = options.iter().filter(|(_, times)| !times.is_empty());
-    let options = options.map(|(option, times)| format!("{option} {}", list(times)));
-    format!(
-        "decided by hand: give {} to `run` for the same answer\n",
-        options.collect::<Vec<_>>().join(" ")
-    )
+    let options: Vec<String> = by_hand_lists(by_hand)
+        .map(|(name, times)| format!("--{name}-taps {times}"))
+        .collect();
+    match options.is_empty() {
+        true => "decided by hand: no tap; leave --accept-taps and --reject-taps out of a `run`\n"
+            .to_owned(),
+        false => format!(
+            "decided by hand: give {} to `run` for the same answer\n",
+            options.join(" ")
+        ),
+    }
+}
+
+/// "accept" and "reject" with the times of their taps (s), where there are any.
+fn by_hand_lists(by_hand: &TapsByHand) -> impl Iterator<Item = (&'static str, String)> {
+    let lists = [("accept", &by_hand.accept), ("reject", &by_hand.reject)];
+    let lists = lists.into_iter().filter(|(_, times)| !times.is_empty());
+    lists.map(|(name, times)| {
+        let times: Vec<String> = times.iter().map(f64::to_string).collect();
+        (name, times.join(","))
+    })
 }
 
 /// True of formats whose channels have no names and units.

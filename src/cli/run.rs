@@ -84,6 +84,34 @@ impl RunArguments {
         }
     }
 
+    /// Refuses options that a description has keys for.
+    ///
+    /// # Errors
+    /// One of them was given.
+    pub(super) fn check_for_description(&self) -> anyhow::Result<()> {
+        let bare = &self.recording;
+        if bare.hammer.is_some()
+            || bare.overload.is_some()
+            || self.taps.by_hand() != TapsByHand::default()
+            || bare.settings() != ReadSettings::default()
+        {
+            bail!(
+                "--hammer, --sample-rate, --time-unit, --values, --variable, --overload, --accept-taps and --reject-taps are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
+            );
+        }
+        let spectrum = &self.spectrum;
+        if spectrum.zoom.is_some()
+            || spectrum.block.is_some()
+            || spectrum.window.is_some()
+            || spectrum.select.is_some()
+        {
+            bail!(
+                "--zoom, --block, --window and --select are for bare recordings; a test description says `band` and `block` in [[recording]], and `window` and `select` in [analysis]"
+            );
+        }
+        Ok(())
+    }
+
     /// Returns what is to be run.
     ///
     /// # Errors
@@ -233,26 +261,7 @@ pub(super) const SAMPLES: usize = 1000;
 
 /// Reads the description, and checks that options and recordings go with it.
 fn resolve(arguments: &RunArguments, file: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
-    let bare = &arguments.recording;
-    if bare.hammer.is_some()
-        || bare.overload.is_some()
-        || arguments.taps.by_hand() != TapsByHand::default()
-        || bare.settings() != ReadSettings::default()
-    {
-        bail!(
-            "--hammer, --sample-rate, --time-unit, --values, --variable, --overload, --accept-taps and --reject-taps are for bare recordings; a test description says all of them: `channel` in [hammer], the others in [[recording]]"
-        );
-    }
-    let spectrum = &arguments.spectrum;
-    if spectrum.zoom.is_some()
-        || spectrum.block.is_some()
-        || spectrum.window.is_some()
-        || spectrum.select.is_some()
-    {
-        bail!(
-            "--zoom, --block, --window and --select are for bare recordings; a test description says `band` and `block` in [[recording]], and `window` and `select` in [analysis]"
-        );
-    }
+    arguments.check_for_description()?;
     let mut file = read_test(file, terminal)?;
     if let Some(reading) = arguments.reading {
         file.test.analysis.reading = reading;

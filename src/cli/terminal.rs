@@ -173,7 +173,7 @@ impl Terminal {
         let is_silent = self.quiet || self.session.is_some();
         let is_taken = matches!(self.json, Some(Json::StandardOutput));
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        !is_silent && !is_taken && !is_dumb && io::stdout().is_terminal()
+        !is_silent && !is_taken && !is_dumb && io::stdout().is_terminal() && is_in_foreground()
     }
 
     /// Returns the screen that texts are laid out for.
@@ -280,6 +280,18 @@ pub(super) fn screen() -> Screen {
     let own = terminal_size::terminal_size_of(io::stdout());
     let own = own.map(|(width, _)| usize::from(width.0));
     stated.or(own).map_or_else(Screen::default, Screen::of)
+}
+
+/// Returns true of a process that its terminal lets change its screen.
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+fn is_in_foreground() -> bool {
+    let owner = rustix::termios::tcgetpgrp(io::stdout());
+    owner.is_ok_and(|owner| owner == rustix::process::getpgrp())
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+fn is_in_foreground() -> bool {
+    true
 }
 
 /// Returns the text with bold headings and yellow warnings.

@@ -15,4 +15,4 @@ mod silence;
 
 pub use listener::{ListenError, ListenSettings, Listener};
 pub use news::{JudgedTap, News};
-pub use precision::{LEAST_GAIN, Precision};
+pub use precision::Precision;

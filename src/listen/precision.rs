@@ -4,7 +4,9 @@ use tapjoint_report::document::{Document, EstimatedValue};
 
 /// A tap that makes no interval narrower than by this share brings nothing. 1 %: far below what the width of an interval is
 /// known to.
-pub const LEAST_GAIN: f64 = 0.01;
+const LEAST_GAIN: f64 = 0.01;
+/// Fewest taps whose scatter is known well enough to say what one more brings. 4: of three, it is known to a factor of two.
+const LEAST_TAPS: usize = 4;
 /// "readings" of a budget: the only input that taps make smaller.
 const READINGS: &str = "readings";
 /// Half the width of a 95 % interval over its standard deviation.
@@ -17,8 +19,13 @@ pub struct Precision {
     pub widest: String,
     /// Half of that interval over the value (1); `None` where it has no end.
     pub half_width: Option<f64>,
-    /// Largest share (1) by which one more tap makes an interval narrower, at best.
-    pub gain: f64,
+    /// The same after very many taps; `None` where it has no end.
+    pub floor: Option<f64>,
+    /// Share (1) by which one more tap makes that interval narrower in the mean; `None` of few taps, whose scatter is hardly
+    /// known.
+    pub gain: Option<f64>,
+    /// The largest such share of all intervals (1).
+    largest_gain: Option<f64>,
 }
 
 /// One interval.
@@ -35,7 +42,7 @@ impl Precision {
     /// `None` without any.
     ///
     /// The scatter of a mean over n taps falls as 1/sqrt(n). A further tap takes the variance from `random + rest` to
-    /// `random n/(n + 1) + rest`. All of a frequency's uncertainty counts as random, so the gain is an upper bound.
+    /// `random n/(n + 1) + rest`. All of a frequency's uncertainty counts as random.
     pub fn of(document: &Document, taps: usize) -> Option<Self> {
         let mut widths = of_joint(document);
         if widths.is_empty() {
@@ -44,15 +51,18 @@ impl Precision {
         let widest = widths
             .iter()
             .max_by(|one, other| one.half.total_cmp(&other.half))?;
-        let count = taps.max(1) as f64;
-        let gains = widths.iter().map(|width| {
-            let left = 1.0 - width.random / (count + 1.0);
-            1.0 - left.sqrt()
-        });
+        let gain = |width: &Width| {
+            let left = 1.0 - width.random / (taps as f64 + 1.0);
+            (taps >= LEAST_TAPS).then(|| 1.0 - left.sqrt())
+        };
+        let finite = |half: f64| Some(half).filter(|half| half.is_finite());
+        let gains = widths.iter().map(gain).collect::<Option<Vec<f64>>>();
         Some(Self {
             widest: widest.name.clone(),
-            half_width: Some(widest.half).filter(|half| half.is_finite()),
-            gain: gains.fold(0.0, f64::max),
+            half_width: finite(widest.half),
+            floor: finite(widest.half * (1.0 - widest.random).sqrt()),
+            gain: gain(widest),
+            largest_gain: gains.map(|gains| gains.into_iter().fold(0.0, f64::max)),
         })
     }
 
@@ -61,9 +71,14 @@ impl Precision {
         self.half_width.is_some_and(|half| half <= accuracy)
     }
 
+    /// Returns true where taps alone can make every interval as narrow as this share (1) of its value.
+    pub fn can_reach(&self, accuracy: f64) -> bool {
+        self.floor.is_some_and(|floor| floor < accuracy)
+    }
+
     /// Returns true where the next tap makes no interval narrower by a hundredth.
     pub fn is_exhausted(&self) -> bool {
-        self.half_width.is_some() && self.gain < LEAST_GAIN
+        self.largest_gain.is_some_and(|gain| gain < LEAST_GAIN)
     }
 }
 
@@ -188,38 +203,42 @@ mod tests {
     #[test]
     fn val_the_gain_of_a_tap_where_all_is_scatter() {
         // 1 - sqrt(n/(n + 1)).
-        for (taps, wanted) in [(1, 0.292_893), (4, 0.105_573), (24, 0.020_204)] {
+        for (taps, wanted) in [(4, 0.105_573), (24, 0.020_204)] {
             let found = Precision::of(&frequencies(&[0.001, 0.003]), taps).unwrap();
-            assert!((found.gain - wanted).abs() < 1e-6, "{taps}: {found:?}");
+            assert!(
+                (found.gain.unwrap() - wanted).abs() < 1e-6,
+                "{taps}: {found:?}"
+            );
             assert_eq!(found.widest, "mode 2");
             assert!((found.half_width.unwrap() - 0.003).abs() < 1e-12);
+            assert!(found.can_reach(1e-6));
         }
-        let is_exhausted = |taps| {
-            Precision::of(&frequencies(&[0.001]), taps)
-                .unwrap()
-                .is_exhausted()
-        };
-        assert!(!is_exhausted(48));
-        assert!(is_exhausted(50));
+        let of = |taps| Precision::of(&frequencies(&[0.001]), taps).unwrap();
+        assert!(!of(48).is_exhausted());
+        assert!(of(50).is_exhausted());
+        // Of few taps nothing is said.
+        assert_eq!(of(3).gain, None);
+        assert!(!of(3).is_exhausted());
     }
 
     #[test]
     fn limit_a_certain_reading_gains_nothing_and_joints_come_before_frequencies() {
-        let found = Precision::of(&joint(0.0, 3.0), 3).unwrap();
-        assert_eq!((found.widest.as_str(), found.gain), ("Kt", 0.0));
+        let found = Precision::of(&joint(0.0, 3.0), 5).unwrap();
+        assert_eq!((found.widest.as_str(), found.gain), ("Kt", Some(0.0)));
         assert!(
             (found.half_width.unwrap() - 0.0588).abs() < 1e-5,
             "{found:?}"
         );
         assert!(found.is_exhausted() && found.reaches(0.06) && !found.reaches(0.05));
-        // One tap of readings as large as the rest: half of the variance halves.
-        let found = Precision::of(&joint(2.0, 2.0), 1).unwrap();
+        assert!(!found.can_reach(0.05));
+        // Readings as large as the rest: taps alone take the variance to its half.
+        let found = Precision::of(&joint(2.0, 2.0), 4).unwrap();
+        let wanted = 1.0 - 0.9_f64.sqrt();
         // 1.96 has three digits.
-        assert!(
-            (found.gain - (1.0 - 0.75_f64.sqrt())).abs() < 1e-4,
-            "{found:?}"
-        );
-        // An interval without an end is never narrow enough, and never given up.
+        assert!((found.gain.unwrap() - wanted).abs() < 1e-4, "{found:?}");
+        let floor = found.floor.unwrap() / found.half_width.unwrap();
+        assert!((floor - 0.5_f64.sqrt()).abs() < 1e-4, "{found:?}");
+        // An interval without an end is never narrow enough.
         let mut open = joint(0.0, 3.0);
         let kt = open
             .estimate
@@ -228,7 +247,7 @@ mod tests {
             .flat_map(|one| &mut one.kt);
         kt.for_each(|kt| kt.uncertain.high = None);
         let found = Precision::of(&open, 100).unwrap();
-        assert!(!found.reaches(1.0) && !found.is_exhausted());
+        assert!(!found.reaches(1.0) && !found.can_reach(1.0));
         assert_eq!(Precision::of(&Document::default(), 5), None);
     }
 }

@@ -1,7 +1,8 @@
 //! Channels from which nothing comes while the structure rings.
 
-/// Rises of the responses without any force after which the hammer is doubted. 2: one is a knock on the table.
-const RISES: usize = 2;
+/// Rises of the responses before the first tap after which a hammer that shows nothing is doubted. 3: the first ones may be
+/// knocks while the sensors are moved.
+const RISES: usize = 3;
 
 /// Watches for channels whose samples no longer change. It counts only samples that are all equal: noise is a sign of life.
 #[derive(Debug, Clone, Default)]

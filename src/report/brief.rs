@@ -64,6 +64,7 @@ pub fn render_progress(document: &Document) -> Vec<String> {
         };
         lines.push(format!("so far {}{reason}", state.name()));
     }
+    lines.extend(answer.measured.first().cloned());
     // The second column is the frequency.
     let strong = answer.strong_rows();
     let frequencies: Vec<&str> = strong.iter().map(|row| row[1].as_str()).collect();

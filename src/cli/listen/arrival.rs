@@ -1,5 +1,6 @@
 //! Whether samples arrive as fast as the stated rate says.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// The rate is judged after this time (s). 10 s: a tap or two, and a recorder's buffer of 0.1 s is then 1 %.
@@ -11,8 +12,8 @@ const RATE_TOLERANCE: f64 = 0.02;
 const FILE_SPEED: f64 = 8.0;
 /// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
 const LEAST_LOSS: f64 = 0.5;
-/// Share of the time by which clocks may drift apart (1). 0.1 %: ten times that of quartz clocks.
-const DRIFT: f64 = 1e-3;
+/// Samples are missing that were there so long before (s). 60 s: a clock that is off by less than 0.8 % is then no loss.
+const WITHIN: usize = 60;
 /// A loss has to last so long (s), or the samples are only late.
 const LATE: f64 = 5.0;
 
@@ -27,8 +28,10 @@ pub(super) struct Arrival {
     longest_gap: f64,
     /// Frames after the first piece.
     frames: f64,
-    /// Least time by which samples are behind the clock (s).
-    least_behind: f64,
+    /// Time by which samples are behind the clock at the end of each of the last seconds (s), the newest last.
+    behind: VecDeque<f64>,
+    /// Time at which the next entry is due (s).
+    next_second: f64,
     /// Time since which more of them are behind (s).
     behind_since: Option<f64>,
     is_judged: bool,
@@ -43,7 +46,8 @@ impl Arrival {
             times: None,
             longest_gap: 0.0,
             frames: 0.0,
-            least_behind: 0.0,
+            behind: VecDeque::new(),
+            next_second: 0.0,
             behind_since: None,
             is_judged: false,
             is_off: false,
@@ -88,9 +92,17 @@ impl Arrival {
 
     fn judge_loss(&mut self, elapsed: f64) -> Option<String> {
         let behind = elapsed - self.frames / self.rate;
-        self.least_behind = self.least_behind.min(behind);
-        let lost = behind - self.least_behind;
-        if lost <= LEAST_LOSS + DRIFT * elapsed {
+        let least = self.behind.iter().copied().fold(behind, f64::min);
+        // Of a pause the seconds in it are left out.
+        if elapsed >= self.next_second {
+            self.next_second = elapsed.floor() + 1.0;
+            self.behind.push_back(behind);
+            if self.behind.len() > WITHIN {
+                self.behind.pop_front();
+            }
+        }
+        let lost = behind - least;
+        if lost <= LEAST_LOSS {
             self.behind_since = None;
             return None;
         }
@@ -99,10 +111,10 @@ impl Arrival {
             return None;
         }
         self.behind_since = None;
-        self.least_behind = behind;
+        self.behind.clear();
         Some(format!(
-            "{lost:.1} s of samples are missing since about {:.0} s: the recorder has dropped them. A tap there may be wrong",
-            (since - lost).max(0.0)
+            "{lost:.1} s of samples are missing within the last minute: the recorder drops them. The taps of this minute may be \
+             wrong"
         ))
     }
 }
@@ -129,7 +141,8 @@ mod tests {
     fn limit_a_true_rate_is_not_doubted() {
         for piece in [0.01, 0.1, 1.0, 2.5] {
             assert_eq!(said(1.0, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
-            assert_eq!(said(1.0005, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
+            assert_eq!(said(1.005, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
+            assert_eq!(said(0.995, piece, 3600.0, 0.0..0.0), [""; 0], "{piece}");
         }
         // A file that is piped.
         assert_eq!(said(200.0, 0.01, 60.0, 0.0..0.0), [""; 0]);

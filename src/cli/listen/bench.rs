@@ -12,9 +12,9 @@ const MOST_SWINGS: usize = 200;
 /// What is asked for by a key, or on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Action {
-    /// The tap at this time (s) is to count; `None` = the last one.
+    /// The tap at this time (s) is to count; `None` where none is there to be meant.
     Accept(Option<f64>),
-    /// The tap at this time (s) is not to count; `None` = the last one.
+    /// The tap at this time (s) is not to count, likewise.
     Reject(Option<f64>),
     /// Take the last decision back.
     Undo,
@@ -136,11 +136,11 @@ impl Progress<'_> {
 
     /// The same where no tap is missing.
     fn why(&self) -> (bool, String) {
-        let brings_nothing = self.precision.filter(|precision| precision.is_exhausted());
         let Some(accuracy) = self.accuracy else {
-            let why = match brings_nothing {
-                Some(_) => "enough, and the next tap would bring nothing",
-                None => "enough",
+            let is_exhausted = self.precision.is_some_and(Precision::is_exhausted);
+            let why = match is_exhausted {
+                true => "enough, and the next tap would bring nothing",
+                false => "enough",
             };
             return (true, why.to_owned());
         };
@@ -155,35 +155,29 @@ impl Progress<'_> {
             return (true, format!("enough: every interval is within {wanted}"));
         }
         let name = &precision.widest;
-        match (precision.half_width.map(percent), brings_nothing) {
-            (Some(half), Some(_)) => (
+        let now = match precision.half_width {
+            Some(half) => format!("{name} is known within {}", percent(half)),
+            None => format!("the interval of {name} has no end"),
+        };
+        match precision.can_reach(accuracy) {
+            true => (false, format!("go on: {now}, and {wanted} is wanted")),
+            false => (
                 true,
                 format!(
-                    "enough: the next tap would bring nothing. {name} stays within {half} and not {wanted}; the report says what \
-                     makes it narrower"
+                    "enough: {now}, and no number of taps brings {wanted}; the report says what helps"
                 ),
-            ),
-            (Some(half), None) => (
-                false,
-                format!("go on: {name} is known within {half}, and {wanted} is wanted"),
-            ),
-            (None, _) => (
-                false,
-                format!("go on: the interval of {name} has no end yet, and {wanted} is wanted"),
             ),
         }
     }
 }
 
-/// Says how narrow the intervals are.
+/// Says how narrow the intervals are, and what the next tap brings.
 pub(super) fn precision_words(precision: &Precision) -> String {
     let name = &precision.widest;
-    let gain = match precision.is_exhausted() {
-        true => "; the next tap would bring nothing".to_owned(),
-        false => format!(
-            "; the next tap makes it at most {} narrower",
-            percent(precision.gain)
-        ),
+    let gain = match precision.gain {
+        _ if precision.is_exhausted() => "; the next tap would bring nothing".to_owned(),
+        Some(gain) => format!("; the next tap makes it about {} narrower", percent(gain)),
+        None => String::new(),
     };
     match precision.half_width {
         Some(half) => format!("least certain: {name}, within {}{gain}", percent(half)),
@@ -199,13 +193,31 @@ fn percent(share: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::document::{
+        BudgetRow, Document, EstimateSection, EstimatedValue, Uncertain,
+    };
 
-    fn precision(half_width: Option<f64>, gain: f64) -> Precision {
-        Precision {
-            widest: "Kr".to_owned(),
-            half_width,
-            gain,
-        }
+    /// Kt of a test with so many readings and so much else (%), by ten taps.
+    fn precision(readings: f64, rest: f64, has_end: bool) -> Precision {
+        let std = f64::hypot(readings, rest) / 100.0;
+        let row = |input: &str, std_percent| BudgetRow {
+            input: input.to_owned(),
+            std_percent,
+        };
+        let mut uncertain = Uncertain::symmetric(1e6, Some(1e6 * std));
+        uncertain.high = uncertain.high.filter(|_| has_end);
+        let document = Document {
+            estimate: Some(Some(EstimateSection {
+                kt: Some(EstimatedValue {
+                    uncertain,
+                    budget: vec![row("readings", readings), row("modulus", rest)],
+                    ..EstimatedValue::default()
+                }),
+                ..EstimateSection::default()
+            })),
+            ..Document::default()
+        };
+        Precision::of(&document, 10).unwrap()
     }
 
     #[test]
@@ -220,23 +232,24 @@ mod tests {
             let (is_enough, words) = progress.words();
             format!("{is_enough}: {words}")
         };
-        let wide = || Some(precision(Some(0.0312), 0.06));
-        let stuck = || Some(precision(Some(0.0312), 0.002));
+        let scattered = || precision(1.6, 0.1, true);
+        let stuck = || precision(0.1, 1.6, true);
+        let open = || precision(0.1, 1.6, false);
         let all = [
             words(0, None, None),
-            words(1, None, wide()),
-            words(2, Some(0.05), wide()),
+            words(1, None, Some(scattered())),
+            words(2, Some(0.05), Some(scattered())),
             words(3, None, None),
-            words(3, None, wide()),
-            words(4, None, stuck()),
+            words(3, None, Some(scattered())),
+            words(4, None, Some(stuck())),
             words(4, Some(0.05), None),
-            words(4, Some(0.05), wide()),
-            words(4, Some(0.01), wide()),
-            words(4, Some(0.01), stuck()),
-            words(4, Some(0.01), Some(precision(None, 0.1))),
-            precision_words(&precision(Some(0.0312), 0.06)),
-            precision_words(&precision(Some(0.0312), 0.002)),
-            precision_words(&precision(None, 0.06)),
+            words(4, Some(0.05), Some(scattered())),
+            words(4, Some(0.01), Some(scattered())),
+            words(4, Some(0.01), Some(stuck())),
+            words(4, Some(0.01), Some(open())),
+            precision_words(&scattered()),
+            precision_words(&stuck()),
+            precision_words(&open()),
         ];
         assert_eq!(
             all.join("\n"),
@@ -248,13 +261,14 @@ mod tests {
              true: 4 taps count; enough, and the next tap would bring nothing\n\
              false: 4 taps count; go on: no interval is known yet, and 5.0 % is wanted\n\
              true: 4 taps count; enough: every interval is within 5.0 %\n\
-             false: 4 taps count; go on: Kr is known within 3.1 %, and 1.0 % is wanted\n\
-             true: 4 taps count; enough: the next tap would bring nothing. Kr stays within 3.1 % and not 1.0 %; the report \
-             says what makes it narrower\n\
-             false: 4 taps count; go on: the interval of Kr has no end yet, and 1.0 % is wanted\n\
-             least certain: Kr, within 3.1 %; the next tap makes it at most 6.0 % narrower\n\
-             least certain: Kr, within 3.1 %; the next tap would bring nothing\n\
-             least certain: Kr, whose interval has no end"
+             false: 4 taps count; go on: Kt is known within 3.1 %, and 1.0 % is wanted\n\
+             true: 4 taps count; enough: Kt is known within 3.1 %, and no number of taps brings 1.0 %; the report says what \
+             helps\n\
+             true: 4 taps count; enough: the interval of Kt has no end, and no number of taps brings 1.0 %; the report says \
+             what helps\n\
+             least certain: Kt, within 3.1 %; the next tap makes it about 4.6 % narrower\n\
+             least certain: Kt, within 3.1 %; the next tap would bring nothing\n\
+             least certain: Kt, whose interval has no end"
         );
     }
 }

@@ -1,6 +1,7 @@
 //! One recording that is listened to.
 
 use super::super::input::{TestFile, file_name};
+use super::super::staging::ledger;
 use super::ListenArguments;
 use super::bench::{Action, Progress, precision_words};
 use super::decisions::write_by_hand;
@@ -16,10 +17,12 @@ use crate::recording::GrowingRecording;
 use crate::taps::TapsByHand;
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between two looks at a file that does not grow: short beside the least time to a verdict.
 const PAUSE: Duration = Duration::from_millis(10);
+/// Time after which keys are read and the bench is shown, while a long stream is judged.
+const SLICE: Duration = Duration::from_millis(50);
 /// Time for which the last piece of a stream is waited for, once it was stopped.
 const LAST_PIECE: Duration = Duration::from_secs(1);
 
@@ -103,20 +106,25 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let next = self.described.zip(self.next());
         self.views.bench.next = next.map(|(file, next)| asked_for(file, &next));
         self.advise();
-        let mut ended = None;
-        while ended.is_none() && !stream.is_stopped() {
-            match stream.events.recv_timeout(PAUSE) {
-                Ok(Event::File(path)) => self.go_on_in(path),
-                Ok(Event::Turned(path)) => {
-                    let turned = self.turns_to.take().map(|target| (target, path));
-                    return self.end(Ok(End::default()), turned);
+        let (mut ended, mut is_behind) = (None, false);
+        while (ended.is_none() || is_behind) && !stream.is_stopped() {
+            let pause = if is_behind { Duration::ZERO } else { PAUSE };
+            match stream.events.recv_timeout(pause) {
+                Ok(event) => {
+                    if let Some(path) = self.heed(event, &mut ended) {
+                        return self.turned(path);
+                    }
                 }
-                Ok(Event::Doubt(text)) => self.doubt(text),
-                Ok(Event::Ended(how)) => ended = Some(how),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => ended = Some(Ok(End::default())),
+                Err(RecvTimeoutError::Disconnected) => {
+                    ended.get_or_insert(Ok(End::default()));
+                }
             }
-            self.catch_up(stream);
+            is_behind = self.catch_up(stream);
+            // Results meet no fault of the file before the taps do.
+            if !is_behind {
+                self.report();
+            }
             for action in self.views.actions() {
                 self.act(action, stream);
             }
@@ -130,17 +138,36 @@ impl<'a, 'v> Hearing<'a, 'v> {
         while ended.is_none()
             && let Ok(event) = stream.events.recv_timeout(LAST_PIECE)
         {
-            match event {
-                Event::File(path) => self.go_on_in(path),
-                Event::Turned(path) => {
-                    let turned = self.turns_to.take().map(|target| (target, path));
-                    return self.end(Ok(End::default()), turned);
-                }
-                Event::Doubt(text) => self.doubt(text),
-                Event::Ended(how) => ended = Some(how),
+            if let Some(path) = self.heed(event, &mut ended) {
+                return self.turned(path);
             }
         }
+        // The keys of the terminal work again while all taps are judged for good.
+        self.views.end_screen();
+        ledger().stop = None;
         self.end(ended.unwrap_or(Ok(End::default())), None)
+    }
+
+    /// Takes what the stream reports. Returns the first file of the recording that it has turned to.
+    fn heed(&mut self, event: Event, ended: &mut Option<anyhow::Result<End>>) -> Option<PathBuf> {
+        match event {
+            Event::File(path) => self.go_on_in(path),
+            Event::Turned(path) => return Some(path),
+            Event::NotTurned(words) => {
+                self.turns_to = None;
+                self.views.warn(&words);
+            }
+            Event::Doubt(text) => self.take(Ok(vec![News::Doubt(text)])),
+            Event::Ended(how) => *ended = Some(how),
+        }
+        None
+    }
+
+    /// Ends with this recording, and names the next one.
+    fn turned(mut self, path: PathBuf) -> Heard {
+        // Samples of this one that were not judged yet are judged in the end.
+        let turned = self.turns_to.take().map(|target| (target, path));
+        self.end(Ok(End::default()), turned)
     }
 
     /// Listens to the next file of the recording.
@@ -155,6 +182,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             (Ok(growing), Some(listener)) => {
                 // Time and memory of a result grow with the recording.
                 if self.states.take().is_some() {
+                    self.precision = None;
                     self.views
                         .say("the first file is full: results come at the end from here on\n");
                 }
@@ -169,20 +197,27 @@ impl<'a, 'v> Hearing<'a, 'v> {
         self.take(news);
     }
 
-    /// Judges what the file holds by now.
-    fn catch_up(&mut self, stream: &Running) {
+    /// Judges what the file holds by now, for a short time at most. Returns true where there is more.
+    fn catch_up(&mut self, stream: &Running) -> bool {
+        let begin = Instant::now();
         while let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none())
             && !stream.is_stopped()
         {
             let Some(news) = listener.step().transpose() else {
                 break;
             };
-            self.take(news);
-        }
-        if let Some(listener) = &self.listener {
             let (seconds, levels) = (listener.seconds(), listener.levels());
             self.views.bench.hear(seconds, &levels);
+            self.take(news);
+            if begin.elapsed() > SLICE {
+                return true;
+            }
         }
+        false
+    }
+
+    /// Shows and prints what all taps give so far, where that is ready.
+    fn report(&mut self) {
         let Some(ready) = self.states.as_mut().and_then(States::ready) else {
             return;
         };
@@ -206,11 +241,6 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let screen = self.views.terminal().screen();
         let lines = lines.iter().map(|line| screen.wrapped(line, 2));
         self.views.say(&lines.collect::<String>());
-    }
-
-    /// Says a doubt about the stream.
-    fn doubt(&mut self, text: String) {
-        self.take(Ok(vec![News::Doubt(text)]));
     }
 
     /// Shows, prints and logs what is new. A fault ends the judging, and not the recording.
@@ -303,59 +333,39 @@ impl<'a, 'v> Hearing<'a, 'v> {
         match action {
             Action::Stop => stream.stop(),
             Action::Next => self.turn(stream),
-            Action::Accept(time) => self.decide(time, true),
-            Action::Reject(time) => self.decide(time, false),
-            Action::Undo => {
-                let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none()) else {
-                    return;
-                };
-                match listener.undo().transpose() {
-                    Some(news) => self.decided("undo", None, news),
-                    None => self
-                        .views
-                        .bench
-                        .note("there is no decision by hand to take back"),
-                }
-            }
+            Action::Accept(time) => self.decide("accept", time),
+            Action::Reject(time) => self.decide("reject", time),
+            Action::Undo => self.decide("undo", None),
         }
     }
 
-    /// Accepts or rejects the tap at this time (s), or the last one.
-    fn decide(&mut self, time: Option<f64>, accept: bool) {
+    /// Accepts or rejects the tap at this time (s) by hand, or takes the last decision back.
+    fn decide(&mut self, what: &str, time: Option<f64>) {
         let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none()) else {
             return;
         };
-        let last = self.views.bench.taps.last().map(|tap| tap.time);
-        let Some(time) = time.or(last) else {
-            return self.views.bench.note("there is no tap yet");
+        let before = listener.by_hand().clone();
+        let news = match (what, time) {
+            ("undo", _) => listener.undo(),
+            (_, Some(time)) => listener.decide(time, what == "accept"),
+            (_, None) => Ok(None),
         };
-        match listener.decide(time, accept).transpose() {
-            Some(news) => {
-                let what = if accept { "accept" } else { "reject" };
-                self.decided(what, Some(time), news);
-            }
-            None => self
-                .views
-                .bench
-                .note(&format!("there is no tap at {time:.2} s")),
-        }
-    }
-
-    /// Notes a decision by hand, and what it changes.
-    fn decided(&mut self, what: &str, time: Option<f64>, news: Result<Vec<News>, ListenError>) {
-        let heard = self.listener.as_ref().map_or(0.0, Listener::seconds);
+        let (after, heard) = (listener.by_hand().clone(), listener.seconds());
+        let Some(news) = news.transpose() else {
+            let words = match (what, time) {
+                ("undo", _) => "there is no decision by hand to take back".to_owned(),
+                (_, Some(time)) => format!("there is no tap at {time:.2} s any more"),
+                (_, None) => "there is no tap yet".to_owned(),
+            };
+            return self.views.bench.note(&words);
+        };
         self.note(&line_by_hand(heard, what, time));
         self.take(news);
-        let by_hand = self
-            .listener
-            .as_ref()
-            .map(|listener| listener.by_hand().clone());
-        let (Some(file), Some(table), Some(by_hand)) = (self.described, self.target.table, by_hand)
-        else {
+        let (Some(file), Some(table)) = (self.described, self.target.table) else {
             return;
         };
         let own = file.test.recordings[table].file.display().to_string();
-        if let Err(cause) = write_by_hand(&self.arguments.run.file, &own, &by_hand) {
+        if let Err(cause) = write_by_hand(&self.arguments.run.file, &own, &before, &after) {
             let words = format!("the decision is in the log alone: {cause:#}");
             self.views.warn(&words);
         }

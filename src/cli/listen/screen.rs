@@ -101,6 +101,11 @@ impl Chosen {
         Some(found.unwrap_or(last))
     }
 
+    /// Returns the time of the tap (s).
+    fn shown_time(&self, bench: &Bench) -> Option<f64> {
+        self.place(bench).map(|place| bench.taps[place].time)
+    }
+
     /// Chooses the tap `by` places further. Beyond the last one the newest is chosen, whichever that will be.
     fn move_by(&mut self, by: isize, bench: &Bench) {
         let Some(place) = self.place(bench) else {
@@ -123,8 +128,9 @@ impl Chosen {
         match key.code {
             KeyCode::Char('c' | 'd') if is_control => Some(Action::Stop),
             _ if is_control => None,
-            KeyCode::Char('a') => Some(Action::Accept(self.time)),
-            KeyCode::Char('r') => Some(Action::Reject(self.time)),
+            // The tap that is shown as chosen, whichever comes meanwhile.
+            KeyCode::Char('a') => Some(Action::Accept(self.shown_time(bench))),
+            KeyCode::Char('r') => Some(Action::Reject(self.shown_time(bench))),
             KeyCode::Char('u') => Some(Action::Undo),
             KeyCode::Char('n') => Some(Action::Next),
             KeyCode::Char('s') => Some(Action::Stop),
@@ -220,12 +226,18 @@ fn draw_level(frame: &mut Frame<'_>, area: Rect, level: &Level) {
 fn draw_taps(frame: &mut Frame<'_>, area: Rect, bench: &Bench, chosen: &Chosen) {
     let block = Block::bordered().title(" taps ");
     let columns = usize::from(block.inner(area).width).saturating_sub(2);
-    let items = bench
+    // Of many taps those about the chosen one: laying out all of them takes long.
+    let place = chosen.place(bench).unwrap_or_default();
+    let first = place.saturating_sub(usize::from(area.height));
+    let shown = bench
         .taps
         .iter()
-        .map(|tap| ListItem::new(tap_text(tap, columns)));
+        .skip(first)
+        .take(2 * usize::from(area.height));
+    let items = shown.map(|tap| ListItem::new(tap_text(tap, columns)));
     let list = List::new(items).block(block).highlight_symbol("> ");
-    let mut state = ListState::default().with_selected(chosen.place(bench));
+    let mut state =
+        ListState::default().with_selected(chosen.place(bench).map(|place| place - first));
     frame.render_stateful_widget(list, area, &mut state);
 }
 
@@ -406,8 +418,8 @@ page: http://127.0.0.1:8000/0f/
         let bench = bench();
         let mut chosen = Chosen::default();
         let mut press = |code| chosen.action_of(KeyEvent::new(code, KeyModifiers::NONE), &bench);
-        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(None)));
-        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(None)));
+        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(Some(9.871))));
+        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(Some(9.871))));
         assert_eq!(press(KeyCode::Char('u')), Some(Action::Undo));
         assert_eq!(press(KeyCode::Char('n')), Some(Action::Next));
         assert_eq!(press(KeyCode::Char('s')), Some(Action::Stop));
@@ -419,10 +431,10 @@ page: http://127.0.0.1:8000/0f/
         assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(Some(4.905))));
         // Down to the last one, which the next tap takes over.
         assert_eq!(press(KeyCode::Down), None);
-        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(None)));
+        assert_eq!(press(KeyCode::Char('r')), Some(Action::Reject(Some(9.871))));
         assert_eq!(press(KeyCode::Up), None);
         assert_eq!(press(KeyCode::Esc), None);
-        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(None)));
+        assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(Some(9.871))));
         let stop = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(chosen.action_of(stop, &bench), Some(Action::Stop));
     }

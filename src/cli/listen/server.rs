@@ -19,6 +19,8 @@ const SCRIPT: &str = include_str!("page/page.js");
 
 /// Pages that are kept up to date at once. More wait: each takes a thread.
 const MOST_PAGES: usize = 8;
+/// Requests that are answered at once. One that does not come to its end takes a thread.
+const MOST_REQUESTS: usize = 64;
 /// Longest body of a request (bytes). Those of the page take less than 100.
 const LONGEST_BODY: u64 = 1000;
 /// Taps that the page shows. Older ones are counted.
@@ -49,6 +51,7 @@ struct Shared {
     news: Mutex<News>,
     has_news: Condvar,
     pages: AtomicUsize,
+    requests: AtomicUsize,
     actions: Sender<Action>,
 }
 
@@ -94,12 +97,21 @@ impl Page {
             news: Mutex::default(),
             has_news: Condvar::new(),
             pages: AtomicUsize::new(0),
+            requests: AtomicUsize::new(0),
             actions: sender,
         });
         let own = shared.clone();
         thread::spawn(move || {
             for request in server.incoming_requests() {
-                answer(request, &own);
+                while own.requests.load(Ordering::Relaxed) >= MOST_REQUESTS {
+                    thread::sleep(Duration::from_millis(10));
+                }
+                own.requests.fetch_add(1, Ordering::Relaxed);
+                let own = own.clone();
+                thread::spawn(move || {
+                    answer(request, &own);
+                    own.requests.fetch_sub(1, Ordering::Relaxed);
+                });
             }
         });
         Ok(Self {
@@ -259,7 +271,9 @@ fn permitted(request: &Request, shared: &Shared) -> Option<String> {
     };
     let names = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", shared.port));
     let host = header("Host")?;
-    if !names.contains(&host) {
+    // The usual port of a page is left out.
+    let is_usual = shared.port == 80 && ["127.0.0.1", "localhost"].contains(&host.as_str());
+    if !is_usual && !names.contains(&host) {
         return None;
     }
     // Of a browser; other programs of this user need the token alone.
@@ -288,7 +302,7 @@ fn action_in(request: &mut Request) -> Option<Action> {
     action_of(&body)
 }
 
-/// Returns what a body asks for: `{"action": "accept", "time": 4.91}`; without a time the last tap is meant.
+/// Returns what a body asks for: `{"action": "accept", "time": 4.91}`.
 fn action_of(body: &[u8]) -> Option<Action> {
     if body.len() as u64 > LONGEST_BODY {
         return None;

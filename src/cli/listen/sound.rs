@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use cpal::traits::{DeviceTrait, HostTrait, StreamTrait};
 use cpal::{BufferSize, Device, SampleFormat, StreamConfig, SupportedStreamConfigRange};
 use std::io::{self, Read};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, TrySendError, sync_channel};
 
 /// Pieces of sound that wait for the disk. 1000: several seconds of any device.
 const MOST_WAITING: usize = 1000;
@@ -28,7 +28,7 @@ pub(super) struct SoundDevice {
     pub(super) channels: Option<u16>,
 }
 
-/// What a device gives, as a stream of bytes. Ends when the device goes.
+/// What a device gives, as a stream of bytes.
 pub(super) struct Sound {
     /// Dropping it ends the sound.
     _stream: cpal::Stream,
@@ -49,10 +49,18 @@ impl SoundDevice {
         let layout = PcmLayout::new(config.sample_rate, config.channels, form)?;
         let (sender, pieces) = sync_channel(MOST_WAITING);
         let [lost, failed] = [report.clone(), report.clone()];
+        let mut has_lost = false;
         let stream = device.build_input_stream_raw(
             config,
             format,
-            move |data, _| give(data.bytes(), &sender, &lost),
+            move |data, _| {
+                let sent = sender.try_send(data.bytes().to_vec());
+                if matches!(sent, Err(TrySendError::Full(_))) && !has_lost {
+                    has_lost = true;
+                    let words = "the disk is too slow: samples of the sound device are lost";
+                    let _ = lost.send(Event::Doubt(words.to_owned()));
+                }
+            },
             // The recording may have ended.
             move |cause| drop(failed.send(Event::Doubt(format!("sound device: {cause}")))),
             None,
@@ -135,14 +143,6 @@ impl SoundDevice {
 fn offer(range: &SupportedStreamConfigRange) -> String {
     let (low, high) = (range.min_sample_rate(), range.max_sample_rate());
     format!("{} channels at {low} to {high} Hz", range.channels())
-}
-
-/// Hands a piece over. A disk that is too slow for it loses pieces, and that is said.
-fn give(bytes: &[u8], pieces: &SyncSender<Vec<u8>>, lost: &Sender<Event>) {
-    if let Err(TrySendError::Full(_)) = pieces.try_send(bytes.to_vec()) {
-        let words = "the disk is too slow: samples of the sound device are lost".to_owned();
-        let _ = lost.send(Event::Doubt(words));
-    }
 }
 
 impl Read for Sound {

@@ -14,8 +14,14 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
-/// Share of the taps by which their number has to change for a new state. A fifth: up to nine taps each gives one.
-const CHANGE: f64 = 0.2;
+/// Up to so many taps each gives a new state. 9: tests with more are rare.
+const EACH: usize = 9;
+/// Of more taps, share by which their number has to change for a new state. A third: all states together then take three
+/// times the work of the last one.
+const CHANGE: f64 = 1.0 / 3.0;
+/// Added to the nice value of the thread that works states out: the taps are judged first.
+#[cfg(target_os = "linux")]
+const NICE: i32 = 10;
 
 /// What is analysed.
 pub(super) enum Subject {
@@ -149,6 +155,9 @@ impl States {
         let (ask, questions) = channel::<Question>();
         let (reply, answers) = channel();
         thread::spawn(move || {
+            // On Linux of this thread and those that it begins; elsewhere it would be the whole process.
+            #[cfg(target_os = "linux")]
+            let _ = rustix::process::nice(NICE);
             // One thread: the other processors judge taps.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
             for question in questions {
@@ -175,7 +184,11 @@ impl States {
         let (accepted, by_hand) = &self.last;
         // The scatter of a mean falls with the square root of their number: among many one more says little.
         let change = question.accepted.abs_diff(*accepted);
-        let has_changed = change > 0 && change >= (question.accepted as f64 * CHANGE) as usize;
+        let least = match question.accepted {
+            0..=EACH => 1,
+            many => (many as f64 * CHANGE) as usize,
+        };
+        let has_changed = change >= least;
         if has_changed || *by_hand != question.by_hand {
             self.last = (question.accepted, question.by_hand.clone());
             self.waiting = Some(question);

@@ -46,6 +46,8 @@ pub(super) enum Event {
     File(PathBuf),
     /// The next recording has begun in this file, as it was asked for.
     Turned(PathBuf),
+    /// The next recording cannot be written, in words. The last one goes on.
+    NotTurned(String),
     /// Something is wrong with the stream, which goes on.
     Doubt(String),
     /// The stream has ended, or it cannot be read or written.
@@ -286,9 +288,14 @@ impl Stream {
                 recorder = Some(Recorder::begin(destination.names.clone(), layout.clone())?);
             }
             if let Some(recorder) = &mut recorder {
-                if let Some(place) = destination.turned_to() {
-                    recorder.turn_to(place)?;
-                    is_turning = true;
+                if let Some(names) = destination.turned_to() {
+                    match recorder.turn_to(names) {
+                        Ok(()) => is_turning = true,
+                        Err(cause) => {
+                            let words = format!("{cause:#}; the recording before it goes on");
+                            let _ = report.send(Event::NotTurned(words));
+                        }
+                    }
                 }
                 let is_first = recorder.bytes() == 0;
                 let is_next = recorder.write(&bytes)?;

@@ -2,7 +2,7 @@
 
 use super::{ListenError, Listener};
 use crate::news::News;
-use tapjoint_signal::taps::{REACH, Rejection, TapMemo, TapsByHand};
+use tapjoint_signal::taps::{REACH, TapsByHand};
 
 /// Decisions by hand that can be taken back. 1000: more than anybody takes, and a bound on memory.
 const MOST_UNDONE: usize = 1000;
@@ -26,22 +26,19 @@ impl Listener<'_> {
         if (tap.time - time).abs() > REACH {
             return Ok(None);
         }
-        if tap.rejection.is_none() == accept {
-            return Ok(Some(Vec::new()));
-        }
         let mut by_hand = self.by_hand.clone();
         for times in [&mut by_hand.accept, &mut by_hand.reject] {
             times.retain(|other| (other - tap.time).abs() > 2.0 * REACH);
         }
-        // Where the rules agree, the tap needs no decision any more.
-        let by_rules = tap.is_overruled || tap.rejection == Some(Rejection::ByHand);
-        if !by_rules {
-            let times = match accept {
-                true => &mut by_hand.accept,
-                false => &mut by_hand.reject,
-            };
-            times.push((tap.time * PER_SECOND).round() / PER_SECOND);
-            times.sort_by(f64::total_cmp);
+        let times = match accept {
+            true => &mut by_hand.accept,
+            false => &mut by_hand.reject,
+        };
+        // Where the rules say the same now, later taps may still change what they say.
+        times.push((tap.time * PER_SECOND).round() / PER_SECOND);
+        times.sort_by(f64::total_cmp);
+        if by_hand == self.by_hand {
+            return Ok(Some(Vec::new()));
         }
         self.earlier_by_hand.push(self.by_hand.clone());
         if self.earlier_by_hand.len() > MOST_UNDONE {
@@ -62,7 +59,6 @@ impl Listener<'_> {
     /// Looks again with other decisions by hand.
     fn look_by(&mut self, by_hand: TapsByHand) -> Result<Vec<News>, ListenError> {
         self.by_hand = by_hand;
-        self.memo = TapMemo::default();
         self.look(true)
     }
 

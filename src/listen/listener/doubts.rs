@@ -9,6 +9,10 @@ use tapjoint_signal::taps::{TapRemark, TapSource};
 impl Listener<'_> {
     /// Returns a doubt where the responses rise and the hammer shows nothing.
     pub(super) fn silent_hammer(&mut self, now: u64) -> Vec<News> {
+        // A hammer that has struck is connected, and rests at 0 between taps.
+        if !self.reported.is_empty() {
+            return Vec::new();
+        }
         let source = self.latest.as_ref().map(|found| &found.source);
         let Some(TapSource::Hammer { channel, responses }) = source else {
             return Vec::new();

@@ -56,8 +56,6 @@ struct Reported {
     time: f64,
     /// Why it does not count; `None` = it counts.
     rejection: Option<Rejection>,
-    /// True where it counts by hand alone.
-    is_overruled: bool,
 }
 
 impl From<&Tap> for Reported {
@@ -65,7 +63,6 @@ impl From<&Tap> for Reported {
         Self {
             time: tap.time,
             rejection: tap.rejection.clone(),
-            is_overruled: tap.overruled.is_some(),
         }
     }
 }

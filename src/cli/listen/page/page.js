@@ -5,9 +5,10 @@
   let chosen = null;
   let bench = { taps: [] };
 
-  // A time of null stands for the last tap.
+  // The tap that is chosen, or the last one that is shown.
   function act(action) {
-    const body = JSON.stringify({ action, time: chosen });
+    const last = bench.taps.length ? bench.taps[bench.taps.length - 1].time : null;
+    const body = JSON.stringify({ action, time: chosen === null ? last : chosen });
     fetch("act", { method: "POST", headers: { "Content-Type": "application/json" }, body })
       .then((answer) => { if (!answer.ok) lost(); })
       .catch(lost);

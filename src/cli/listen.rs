@@ -191,10 +191,20 @@ impl ListenArguments {
     /// # Errors
     /// The page cannot be served.
     fn views<'a>(&self, terminal: &'a Terminal) -> anyhow::Result<Views<'a>> {
+        #[cfg_attr(
+            not(any(feature = "screen", feature = "serve")),
+            expect(unused_mut, reason = "there are lines alone")
+        )]
         let mut views = Views::new(terminal);
         if let Some(port) = self.serve {
             #[cfg(feature = "serve")]
-            views.add_page(server::Page::serve(port)?);
+            {
+                let page = server::Page::serve(port)?;
+                // Its address is needed where nothing else is printed, too.
+                let _ = terminal.seal(&format!("page: {}\n", page.address()));
+                views.bench.address = Some(page.address().to_owned());
+                views.add(Box::new(page));
+            }
             #[cfg(not(feature = "serve"))]
             bail!(
                 "--serve {port}: this program was built without the page; build it with `--features serve`"

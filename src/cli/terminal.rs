@@ -169,6 +169,7 @@ impl Terminal {
     }
 
     /// Returns true where a live screen may fill the terminal.
+    #[cfg(feature = "screen")]
     pub(super) fn may_be_filled(&self) -> bool {
         let is_silent = self.quiet || self.session.is_some();
         let is_taken = matches!(self.json, Some(Json::StandardOutput));
@@ -283,13 +284,13 @@ pub(super) fn screen() -> Screen {
 }
 
 /// Returns true of a process that its terminal lets change its screen.
-#[cfg(any(target_os = "linux", target_os = "macos"))]
+#[cfg(all(feature = "screen", any(target_os = "linux", target_os = "macos")))]
 fn is_in_foreground() -> bool {
     let owner = rustix::termios::tcgetpgrp(io::stdout());
     owner.is_ok_and(|owner| owner == rustix::process::getpgrp())
 }
 
-#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+#[cfg(all(feature = "screen", not(any(target_os = "linux", target_os = "macos"))))]
 fn is_in_foreground() -> bool {
     true
 }

@@ -148,10 +148,8 @@ fn recover_what_the_next_tap_brings() {
             });
             promised = Precision::of(&without, taps).unwrap().gain.unwrap();
             let half = |document: &tapjoint::report::document::Document, frequency: f64| {
-                let modes = document.modes.iter().flatten();
-                let mode = modes
-                    .filter(|mode| (mode.frequency - frequency).abs() < 0.5)
-                    .next()?;
+                let mut modes = document.modes.iter().flatten();
+                let mode = modes.find(|mode| (mode.frequency - frequency).abs() < 0.5)?;
                 Some(mode.high? - mode.low?)
             };
             for (frequency, _, _) in MODES {

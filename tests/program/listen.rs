@@ -639,14 +639,19 @@ fn recover_decisions_by_hand_and_the_answer_of_run() {
     let tap = taps(&first)[1].clone();
     assert_eq!(tap["accepted"], true, "{tap}");
     let time = tap["time"].as_f64().unwrap();
-    // Of the last tap, of one that is named, and back again.
+    let last = &taps(&first)[4]["time"];
+    // Two taps, and the second decision back again.
     for (action, place, accepted) in [
         (
             format!("{{\"action\": \"reject\", \"time\": {time}}}"),
             1,
             false,
         ),
-        ("{\"action\": \"reject\"}".to_owned(), 4, false),
+        (
+            format!("{{\"action\": \"reject\", \"time\": {last}}}"),
+            4,
+            false,
+        ),
         ("{\"action\": \"undo\"}".to_owned(), 4, true),
     ] {
         assert_eq!(page.act(&action), 204);
@@ -722,7 +727,9 @@ fn recover_a_test_in_one_stream_by_next() {
     let taps = |bench: &Value| bench["taps"].as_array().unwrap().len();
     let first = benches.find(|bench| taps(bench) == 5).unwrap();
     assert_eq!(first["next"], "high.wav, tap at 0.385 m");
-    assert_eq!(page.act("{\"action\": \"reject\"}"), 204);
+    let last = &first["taps"][4]["time"];
+    let reject = format!("{{\"action\": \"reject\", \"time\": {last}}}");
+    assert_eq!(page.act(&reject), 204);
     assert_eq!(page.act("{\"action\": \"next\"}"), 204);
     // The stream turns with its next samples, whichever they are.
     let quiet = vec![0; 9000];

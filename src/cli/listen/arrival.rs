@@ -13,7 +13,7 @@ const FILE_SPEED: f64 = 8.0;
 /// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
 const LEAST_LOSS: f64 = 0.5;
 /// Samples are missing that were there so long before (s). 60 s: a clock that is off by less than 0.8 % is then no loss.
-const WITHIN: usize = 60;
+const WITHIN: f64 = 60.0;
 /// A loss has to last so long (s), or the samples are only late.
 const LATE: f64 = 5.0;
 
@@ -28,10 +28,8 @@ pub(super) struct Arrival {
     longest_gap: f64,
     /// Frames after the first piece.
     frames: f64,
-    /// Time by which samples are behind the clock at the end of each of the last seconds (s), the newest last.
-    behind: VecDeque<f64>,
-    /// Time at which the next entry is due (s).
-    next_second: f64,
+    /// Times of the last minute, a second apart at least, and how far samples were behind the clock then (s).
+    behind: VecDeque<[f64; 2]>,
     /// Time since which more of them are behind (s).
     behind_since: Option<f64>,
     is_judged: bool,
@@ -47,7 +45,6 @@ impl Arrival {
             longest_gap: 0.0,
             frames: 0.0,
             behind: VecDeque::new(),
-            next_second: 0.0,
             behind_since: None,
             is_judged: false,
             is_off: false,
@@ -92,14 +89,15 @@ impl Arrival {
 
     fn judge_loss(&mut self, elapsed: f64) -> Option<String> {
         let behind = elapsed - self.frames / self.rate;
-        let least = self.behind.iter().copied().fold(behind, f64::min);
-        // Of a pause the seconds in it are left out.
-        if elapsed >= self.next_second {
-            self.next_second = elapsed.floor() + 1.0;
-            self.behind.push_back(behind);
-            if self.behind.len() > WITHIN {
-                self.behind.pop_front();
-            }
+        self.behind.retain(|[then, _]| *then > elapsed - WITHIN);
+        let earlier = self.behind.iter().map(|[_, behind]| *behind);
+        let least = earlier.fold(behind, f64::min);
+        if self
+            .behind
+            .back()
+            .is_none_or(|[then, _]| elapsed - then >= 1.0)
+        {
+            self.behind.push_back([elapsed, behind]);
         }
         let lost = behind - least;
         if lost <= LEAST_LOSS {
@@ -154,12 +152,16 @@ mod tests {
                      drops samples: frequencies may be wrong by this factor";
         assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [format!("919 {words}")]);
         assert_eq!(said(2.0, 0.1, 60.0, 0.0..0.0), [format!("2000 {words}")]);
-        assert_eq!(
-            said(1.0, 0.1, 60.0, 29.95..31.45),
-            [
-                "1.5 s of samples are missing since about 30 s: the recorder has dropped them. A tap there may be wrong"
-            ]
-        );
+        // Soon, or after an hour.
+        for lost in [29.95, 3599.95] {
+            assert_eq!(
+                said(1.0, 0.1, 3700.0, lost..lost + 1.5),
+                [
+                    "1.5 s of samples are missing within the last minute: the recorder drops them. The taps of this minute may \
+                  be wrong"
+                ]
+            );
+        }
     }
 
     #[test]

@@ -11,6 +11,10 @@ const MOST_SWINGS: usize = 200;
 
 /// What is asked for by a key, or on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    not(any(feature = "screen", feature = "serve")),
+    expect(dead_code, reason = "lines ask for nothing")
+)]
 pub(super) enum Action {
     /// The tap at this time (s) is to count; `None` where none is there to be meant.
     Accept(Option<f64>),

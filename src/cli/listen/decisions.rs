@@ -105,7 +105,12 @@ fn change(
     for time in added {
         let items = list.iter();
         let place = items.filter(|item| seconds(item).is_some_and(|own| own < time));
-        list.insert(place.count(), time);
+        let place = place.count();
+        list.insert(place, time);
+        // The library puts a space before what is added behind others alone.
+        if let Some(second) = list.get_mut(1).filter(|_| place == 0) {
+            second.decor_mut().set_prefix(" ");
+        }
     }
     if list.is_empty() {
         keys.remove(key);

@@ -1,12 +1,11 @@
 //! Samples of a sound device.
 
-use super::stream::Event;
 use crate::recording::{PcmLayout, SampleForm};
 use anyhow::{Context, anyhow, bail};
 use cpal::traits::{DeviceTrait, HostTrait, StreamTrait};
 use cpal::{BufferSize, Device, SampleFormat, StreamConfig, SupportedStreamConfigRange};
 use std::io::{self, Read};
-use std::sync::mpsc::{Receiver, Sender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
 
 /// Pieces of sound that wait for the disk. 1000: several seconds of any device.
 const MOST_WAITING: usize = 1000;
@@ -39,16 +38,19 @@ pub(super) struct Sound {
 }
 
 impl SoundDevice {
-    /// Opens the device. What it loses on the way is reported as a doubt.
+    /// Opens the device. `doubt` is told what it loses on the way.
     ///
     /// # Errors
     /// There is no such device, or it does not give what is asked for.
-    pub(super) fn open(&self, report: &Sender<Event>) -> anyhow::Result<(PcmLayout, Sound)> {
+    pub(super) fn open(
+        &self,
+        doubt: impl Fn(String) + Clone + Send + 'static,
+    ) -> anyhow::Result<(PcmLayout, Sound)> {
         let device = self.found()?;
         let (config, format, form) = self.config(&device)?;
         let layout = PcmLayout::new(config.sample_rate, config.channels, form)?;
         let (sender, pieces) = sync_channel(MOST_WAITING);
-        let [lost, failed] = [report.clone(), report.clone()];
+        let doubt_device = doubt.clone();
         let mut has_lost = false;
         let stream = device.build_input_stream_raw(
             config,
@@ -57,12 +59,10 @@ impl SoundDevice {
                 let sent = sender.try_send(data.bytes().to_vec());
                 if matches!(sent, Err(TrySendError::Full(_))) && !has_lost {
                     has_lost = true;
-                    let words = "the disk is too slow: samples of the sound device are lost";
-                    let _ = lost.send(Event::Doubt(words.to_owned()));
+                    doubt("the disk is too slow: samples of the sound device are lost".to_owned());
                 }
             },
-            // The recording may have ended.
-            move |cause| drop(failed.send(Event::Doubt(format!("sound device: {cause}")))),
+            move |cause| doubt_device(format!("sound device: {cause}")),
             None,
         );
         let stream = stream.map_err(|cause| anyhow!("--sound {}: {cause}", self.name))?;

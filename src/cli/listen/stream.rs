@@ -90,13 +90,18 @@ impl Running {
                     is_live: true,
                 }),
                 #[cfg(feature = "sound")]
-                Source::Sound(device) => device.open(&report).map(|(layout, sound)| Stream {
-                    input: Box::new(sound),
-                    layout: Some(layout),
-                    speed: None,
-                    frames: None,
-                    is_live: true,
-                }),
+                Source::Sound(device) => {
+                    let report = report.clone();
+                    // The recording may have ended.
+                    let doubt = move |words| drop(report.send(Event::Doubt(words)));
+                    device.open(doubt).map(|(layout, sound)| Stream {
+                        input: Box::new(sound),
+                        layout: Some(layout),
+                        speed: None,
+                        frames: None,
+                        is_live: true,
+                    })
+                }
                 Source::Replay {
                     path,
                     recording,

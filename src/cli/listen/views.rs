@@ -58,18 +58,12 @@ impl<'a> Views<'a> {
     }
 
     /// Adds a view.
+    #[cfg_attr(
+        not(any(feature = "screen", feature = "serve")),
+        expect(dead_code, reason = "there are lines alone")
+    )]
     pub(super) fn add(&mut self, view: Box<dyn View>) {
         self.live.push(view);
-    }
-
-    /// Adds a page, and says its address.
-    #[cfg(feature = "serve")]
-    pub(super) fn add_page(&mut self, page: super::server::Page) {
-        let address = page.address().to_owned();
-        // It is needed where nothing else is printed, too.
-        let _ = self.terminal.seal(&format!("page: {address}\n"));
-        self.bench.address = Some(address);
-        self.add(Box::new(page));
     }
 
     /// Begins with a recording of this title.

@@ -3,7 +3,7 @@
 #
 #   scripts/make_pictures.sh
 #
-# Needs a Chromium for the page; TAPJOINT names another program than the one that cargo builds here,
+# Needs a Chromium and playwright (Python) for the pages; TAPJOINT names another program than the one that cargo builds here,
 # TAPJOINT_CHROMIUM another browser than `chromium`.
 set -euo pipefail
 
@@ -28,6 +28,8 @@ cp "$made/cantilever/gap-place.png" docs/pictures/place.png
 "$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=1280,800 \
     --blink-settings=preferredColorScheme=1 --virtual-time-budget=4000 \
     --screenshot="$PWD/docs/pictures/report.png" "file://$made/cantilever/report.html" 2>/dev/null
+python3 scripts/listen_page.py "${tapjoint[0]}" "$made/page" --chromium "$(command -v "$browser")"
+cp "$made/page/wide.png" docs/pictures/listen.png
 # A page of few colours: a palette is a third of the size. Without Pillow it stays as it is.
 python3 - docs/pictures/*.png <<'END' || true
 import sys

@@ -246,15 +246,18 @@ fn select_taps(
         // The same is said of the spectra.
         return Ok(Vec::new());
     };
-    // Of many taps, parts that follow one another are compared by themselves.
-    let parts = compared.len().div_ceil(MOST_COMPARED);
+    // Of many taps, parts are compared by themselves. Each holds taps of the whole recording.
+    let sensors = settings.source.channels().len().saturating_sub(1);
+    let by_memory = (compared.len() * sensors).div_ceil(MOST_RESPONSES);
+    let by_memory = by_memory.min(compared.len() / LEAST_COMPARED);
+    let parts = compared.len().div_ceil(MOST_COMPARED).max(by_memory);
     let mut doubts = Vec::new();
     let mut rejections = Vec::new();
     for part in 0..parts {
-        let own = compared.len() * part / parts..compared.len() * (part + 1) / parts;
-        let own = &compared[own];
+        let own = compared.iter().copied().skip(part).step_by(parts);
+        let own: Vec<usize> = own.collect();
         let inputs = Inputs::new(recording, settings, taps, lines);
-        let choice = inputs.choice(own)?;
+        let choice = inputs.choice(&own)?;
         doubts.extend(Warning::of_selection(file, &choice, own.len()));
         for one in choice.departing {
             rejections.push((
@@ -298,8 +301,13 @@ pub(super) fn lines_for(
 /// Most taps from which the decay in the records is taken, evenly spread: more would hardly find a slower one.
 const MOST_LOOKED_AT: usize = 32;
 
-/// Most taps that are compared with each other: a bound on memory, and more make the median no better.
+/// Most taps that are compared with each other: more make the median no better.
 const MOST_COMPARED: usize = 200;
+/// Most responses of taps, over all sensors, that are compared with each other, where there are many sensors: a bound on
+/// memory. 800: 200 taps of four sensors.
+const MOST_RESPONSES: usize = 800;
+/// Taps that are compared with each other at least, whatever the sensors: few of them tell little.
+const LEAST_COMPARED: usize = 20;
 
 /// Data that every step of one recording's measurement needs.
 struct Inputs<'a> {

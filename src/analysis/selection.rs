@@ -16,8 +16,8 @@ const MOST_REJECTED: f64 = 1.0 / 3.0;
 /// A departure up to this (1) rejects no tap. 12 %: on a clamped bar a tap that is 3 % of the length off departs by about as
 /// much. Nearer hits spoil little.
 const FLOOR: f64 = 0.12;
-/// A tap departs by so many times as much as the others, at least, where there are many of them. 5: of places that
-/// scatter as normal values do, 4 in 1000 are that far off.
+/// A tap departs by so many times as much as the others, at least, where there are many of them. 5: of many normal values
+/// 1 in 1000 is that far from their median; of 20, 4 in 1000 are beyond the limit for 20.
 const TIMES: f64 = 5.0;
 /// Added to [`TIMES`] over the number of taps less two. 12: the median departure of few taps is itself uncertain. The
 /// study `examples/tap_selection` then sees no right tap rejected among four or six, at any scatter up to 5 mm.
@@ -91,7 +91,8 @@ struct Departures {
     departure: Vec<f64>,
     /// What the responses did before each tap, relative to those after it (1).
     disturbance: Vec<f64>,
-    /// What is left of each tap: over lines and sensors, weighted so that its norm is the departure.
+    /// What is left of each tap: over lines and sensors, weighted so that its norm is the departure. Empty of references to
+    /// the others.
     rest: Vec<Vec<Complex64>>,
 }
 
@@ -259,7 +260,10 @@ impl<'a> Comparison<'a> {
                         whole: octave.spacing * power(&part.expected),
                         left: octave.spacing * power(&part.left),
                         disturbed: octave.spacing * before.sum::<f64>(),
-                        rest: part.left.iter().map(|x| x * root).collect(),
+                        rest: match reference {
+                            Reference::OfAll => part.left.iter().map(|x| x * root).collect(),
+                            Reference::OfOthers => Vec::new(),
+                        },
                     });
                 }
             }
@@ -284,6 +288,7 @@ impl<'a> Comparison<'a> {
                 .collect(),
             rest: cells
                 .iter()
+                .filter(|_| reference == Reference::OfAll)
                 .map(|own| {
                     let pairs = own.iter().zip(&weights);
                     let parts = pairs.flat_map(|(cell, weight)| {

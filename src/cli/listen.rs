@@ -47,11 +47,17 @@ use views::Views;
 ///
 /// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is the WAV file to be written, or a
 /// test description (.toml). Of a description the first [[recording]] without a file is written. Says after each tap
-/// whether it counts and why, then what all taps give so far. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing, the
+/// whether it counts and why, then what all taps give so far. Keys of the live screen: a accepts the last tap, r rejects it, u
+/// undoes, n goes on with the next recording, s stops. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing, the
 /// test is run as by `tapjoint run`, with the options of `run`; --json is written then.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("file", |file| file.help("Test description (.toml), or the WAV file to be written").long_help(None)),
+    // A stream has neither a time column nor variables.
+    mut_arg("sample_rate", |own| own.hide(true)),
+    mut_arg("time_unit", |own| own.hide(true)),
+    mut_arg("values", |own| own.hide(true)),
+    mut_arg("variable", |own| own.hide(true)),
     after_help = "Examples:\n  arecord -f S16_LE -r 48000 -c 2 -t raw | tapjoint listen test.toml --rate 48000 --channels 2 --format s16le\n  rec -q -t wav - | tapjoint listen taps.wav --hammer 1\n  tapjoint listen test.toml --replay low.wav"
 )]
 pub(super) struct ListenArguments {
@@ -88,7 +94,7 @@ pub(super) struct ListenArguments {
     #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
     record: f64,
     /// Half width of the 95 % intervals that is wanted, as a share of the value, such as "5 %": of the joint, without a joint
-    /// of the frequencies. Default: the number of taps alone is wanted
+    /// of the frequencies, which are known far better ("0.01 %"). Default: the number of taps alone is wanted
     #[arg(long, value_name = "P", value_parser = accuracy)]
     accuracy: Option<f64>,
     /// Print lines, and show no live screen. Lines are printed anyhow where standard output is no terminal

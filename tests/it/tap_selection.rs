@@ -126,6 +126,19 @@ fn prop_no_half_of_the_taps_is_preferred() {
 }
 
 #[test]
+fn regress_a_change_half_way_through_many_taps_is_seen() {
+    // Of more than 200 taps parts are compared. Each part holds taps of both halves.
+    let mut trial = Trial::by_hand(402, 0.0005, 2);
+    trial.interval = 0.4;
+    for hit in &mut trial.hits[201..] {
+        hit.place -= 0.1 * LENGTH;
+    }
+    let chosen = consistent(&trial);
+    assert!(inconsistent(&chosen).is_empty());
+    assert!(warns(&chosen, "taps-disagree"));
+}
+
+#[test]
 fn limit_no_more_than_a_third_of_the_taps_goes() {
     let mut trial = Trial::by_hand(7, 0.0005, 2);
     for (tap, away) in [(1, 0.1), (3, 0.2), (5, 0.3)] {

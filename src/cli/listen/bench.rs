@@ -115,6 +115,8 @@ impl Bench {
 pub(super) struct Progress<'a> {
     /// Taps that count.
     pub(super) accepted: usize,
+    /// Taps that would count but do not agree with the others, by the last result.
+    pub(super) apart: usize,
     /// Taps that are wanted at least.
     pub(super) wanted: usize,
     /// Half width of the intervals that is wanted (1).
@@ -126,10 +128,13 @@ pub(super) struct Progress<'a> {
 impl Progress<'_> {
     /// Returns whether the taps are enough, and says how many count and what is missing.
     pub(super) fn words(&self) -> (bool, String) {
-        let count = match self.accepted {
+        let mut count = match self.accepted {
             1 => "1 tap counts".to_owned(),
             count => format!("{count} taps count"),
         };
+        if self.apart > 0 {
+            count.push_str(&format!(", {} do not agree with the others", self.apart));
+        }
         let (is_enough, why) = match self.wanted.saturating_sub(self.accepted) {
             0 => self.why(),
             1 => (false, "1 more is wanted".to_owned()),
@@ -166,9 +171,9 @@ impl Progress<'_> {
         match precision.can_reach(accuracy) {
             true => (false, format!("go on: {now}, and {wanted} is wanted")),
             false => (
-                true,
+                false,
                 format!(
-                    "enough: {now}, and no number of taps brings {wanted}; the report says what helps"
+                    "more taps do not help: {now}, and {wanted} is wanted; the report says what does"
                 ),
             ),
         }
@@ -229,6 +234,7 @@ mod tests {
         let words = |accepted, accuracy, precision: Option<Precision>| {
             let progress = Progress {
                 accepted,
+                apart: 0,
                 wanted: 3,
                 accuracy,
                 precision: precision.as_ref(),
@@ -266,10 +272,10 @@ mod tests {
              false: 4 taps count; go on: no interval is known yet, and 5.0 % is wanted\n\
              true: 4 taps count; enough: every interval is within 5.0 %\n\
              false: 4 taps count; go on: Kt is known within 3.1 %, and 1.0 % is wanted\n\
-             true: 4 taps count; enough: Kt is known within 3.1 %, and no number of taps brings 1.0 %; the report says what \
-             helps\n\
-             true: 4 taps count; enough: the interval of Kt has no end, and no number of taps brings 1.0 %; the report says \
-             what helps\n\
+             false: 4 taps count; more taps do not help: Kt is known within 3.1 %, and 1.0 % is wanted; the report says what \
+             does\n\
+             false: 4 taps count; more taps do not help: the interval of Kt has no end, and 1.0 % is wanted; the report says \
+             what does\n\
              least certain: Kt, within 3.1 %; the next tap makes it about 4.6 % narrower\n\
              least certain: Kt, within 3.1 %; the next tap would bring nothing\n\
              least certain: Kt, whose interval has no end"

@@ -56,6 +56,8 @@ pub(super) struct Hearing<'a, 'v> {
     listener: Option<Listener<'a>>,
     /// How narrow the intervals are by the last state.
     precision: Option<Precision>,
+    /// Taps that do not agree with the others, by the last state.
+    apart: usize,
     files: Vec<PathBuf>,
     /// Why taps are no longer judged.
     fault: Option<ListenError>,
@@ -84,6 +86,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             views,
             listener: None,
             precision: None,
+            apart: 0,
             files: target.earlier.clone(),
             fault: None,
             turns_to: None,
@@ -234,6 +237,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let mut lines = so_far.lines;
         lines.extend(Some(bench.precision.clone()).filter(|words| !words.is_empty()));
         self.precision = so_far.precision;
+        self.apart = so_far.apart;
         self.advise();
         if before != self.views.bench.advice {
             lines.push(self.views.bench.advice.clone());
@@ -291,8 +295,10 @@ impl<'a, 'v> Hearing<'a, 'v> {
     /// Renews the advice by the taps so far.
     fn advise(&mut self) {
         let listener = self.listener.as_ref();
+        let accepted = listener.map_or(0, Listener::accepted);
         let progress = Progress {
-            accepted: listener.map_or(0, Listener::accepted),
+            accepted: accepted.saturating_sub(self.apart),
+            apart: self.apart,
             wanted: self.arguments.taps,
             accuracy: self.arguments.accuracy,
             precision: self.precision.as_ref(),

@@ -9,7 +9,7 @@ use crate::pipeline::{
     BareSettings, IdentifySettings, analysis_of_bare, diagnose_test, measure_bare_file,
 };
 use crate::report::{document_of, gap_section, render_first_screen, render_progress};
-use crate::taps::TapsByHand;
+use crate::taps::{Rejection, Tap, TapsByHand};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -105,12 +105,16 @@ impl Subject {
                 )
             }
         };
+        let taps = recording.iter().flat_map(|own| &own.measurement.taps.taps);
+        let is_apart = |tap: &&Tap| matches!(tap.rejection, Some(Rejection::Inconsistent { .. }));
+        let apart = taps.filter(is_apart).count();
         // With the picture of the recording that goes on.
         let recording = recording.filter(|_| question.wants_page);
         let first_screen = recording.map(|own| render_first_screen(&document, &[own]));
         Ok(SoFar {
             lines: render_progress(&document),
-            precision: Precision::of(&document, question.accepted),
+            apart,
+            precision: Precision::of(&document, question.accepted.saturating_sub(apart)),
             first_screen: first_screen.transpose()?,
         })
     }
@@ -120,6 +124,8 @@ impl Subject {
 pub(super) struct SoFar {
     /// In a few sentences.
     pub(super) lines: Vec<String>,
+    /// Taps of the recording that count by themselves, but do not agree with the others.
+    pub(super) apart: usize,
     /// How narrow the intervals are; `None` without any.
     pub(super) precision: Option<Precision>,
     /// The first screen of a report on it; `None` where no page is served.

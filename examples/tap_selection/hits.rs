@@ -8,12 +8,13 @@ use tapjoint::description::{ChannelRef, TapSelection};
 use tapjoint::pipeline::{Analysis, run_recording};
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{
-    JointMoment, Motion, Pulse, PulseShape, ReducedMode, ReducedStructure, Sensed, Strike,
-    StruckPlace,
+    Damping, JointMoment, Motion, ObservedStructure, Pulse, PulseShape, Sensed, SpecimenSettings,
+    Strike,
 };
+use tapjoint::structure::Beam;
 use tapjoint::structure::effects::JointLaw;
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::{Assembly, Beam, JointStiffness, mode_shapes};
+use tapjoint::structure::specimen::{Body, Joint, Specimen};
 use tapjoint::taps::{Rejection, Tap};
 
 /// Length of the bar (m).
@@ -21,9 +22,10 @@ pub const LENGTH: f64 = 0.423;
 /// Sample rate (Hz), and steps of the simulation for each sample.
 const RATE: f64 = 5120.0;
 const STEPS: usize = 4;
-/// Modes that move, and all modes, of which the others follow like springs.
-const MODES: usize = 6;
-const ALL: usize = 30;
+/// Modes up to this frequency move in time (Hz): those of the band. The others follow like springs.
+const HIGHEST: f64 = 2000.0;
+/// Place of the hits (m).
+const PLACE: f64 = 0.36;
 
 /// One hit.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +78,7 @@ impl Trial {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let hits = (0..taps).map(|_| Hit {
-            place: 0.36 * LENGTH / 0.423 + scatter * normal(),
+            place: PLACE + scatter * normal(),
             level: 20.0 * (1.0 + 0.1 * normal()),
             length: 2e-3 * (1.0 + 0.03 * normal()),
             sensor: 1.0,
@@ -107,7 +109,7 @@ impl Trial {
         trial
             .hits
             .iter_mut()
-            .for_each(|hit| hit.place += place - 0.36);
+            .for_each(|hit| hit.place += place - PLACE);
         trial.sensors = vec![between(0.1, 0.42), between(0.1, 0.42)];
         trial.noise =
             [Noise::White, Noise::Red, Noise::HeavyTailed, Noise::Hum][(seed % 4) as usize];
@@ -116,11 +118,13 @@ impl Trial {
 
     /// Natural frequencies of the modes that move (Hz).
     pub fn frequencies(&self) -> Vec<f64> {
-        let modes = self.structure().0.modes;
-        modes.iter().map(|mode| mode.frequency).collect()
+        let (structure, _) = self.structure();
+        let modes = structure.reduced().modes.iter();
+        modes.map(|mode| mode.frequency).collect()
     }
 
-    fn structure(&self) -> (ReducedStructure, impl Fn(f64) -> StruckPlace, f64) {
+    /// The bar as the sensors see it, and the rotational stiffness of its joint (N m/rad).
+    fn structure(&self) -> (ObservedStructure, f64) {
         let beam = Beam {
             length: LENGTH,
             width: 0.05,
@@ -129,59 +133,24 @@ impl Trial {
             density: 7850.0,
             poisson: 0.3,
         };
-        let joint = JointStiffness::two_parameter(2000.0, 5.0);
-        let shapes = mode_shapes(&beam, Assembly::Cantilever, &joint, ALL).expect("modes");
-        let stiffness = 5.0 * StiffnessUnits::of(&beam).kr;
-        // The slope at the joint by differences to the fourth order.
-        let h = 1e-4 * LENGTH;
-        let mut rotations = Vec::new();
-        for shape in &shapes {
-            let w: Vec<f64> = (0..5)
-                .map(|n| shape.displacement(f64::from(n) * h))
-                .collect();
-            rotations.push(
-                (-25.0 * w[0] + 48.0 * w[1] - 36.0 * w[2] + 16.0 * w[3] - 3.0 * w[4]) / (12.0 * h),
-            );
-        }
-        let square = |n: usize| {
-            let omega: f64 = TAU * shapes[n].frequency;
-            omega * omega
+        let units = StiffnessUnits::of(&beam);
+        let joint = Joint {
+            kt: 2000.0 * units.kt,
+            kr: 5.0 * units.kr,
+            coupling: 0.0,
         };
-        let beyond = |f: &dyn Fn(usize) -> f64| (MODES..ALL).map(|n| f(n) / square(n)).sum();
-        let moving: f64 = (0..MODES).map(|n| rotations[n].powi(2) / square(n)).sum();
-        let sensors = self.sensors.clone();
-        let modes = (0..MODES).map(|n| ReducedMode {
-            frequency: shapes[n].frequency,
-            damping_ratio: self.damping,
-            at_sensors: sensors.iter().map(|x| shapes[n].displacement(*x)).collect(),
-            at_joint: rotations[n],
-        });
-        let at = |x: &f64| beyond(&|n| rotations[n] * shapes[n].displacement(*x));
-        let structure = ReducedStructure {
-            modes: modes.collect(),
-            joint_compliance: 1.0 / stiffness - moving,
-            joint_to_sensors: sensors.iter().map(at).collect(),
+        let settings = SpecimenSettings {
+            damping: Damping::Modal(vec![self.damping]),
+            suspension: None,
         };
-        let place = move |tap: f64| {
-            let square = |n: usize| {
-                let omega: f64 = TAU * shapes[n].frequency;
-                omega * omega
-            };
-            let beyond = |f: &dyn Fn(usize) -> f64| (MODES..ALL).map(|n| f(n) / square(n)).sum();
-            let both =
-                |x: &f64| beyond(&|n| shapes[n].displacement(tap) * shapes[n].displacement(*x));
-            StruckPlace {
-                at_modes: (0..MODES).map(|n| shapes[n].displacement(tap)).collect(),
-                to_sensors: sensors.iter().map(both).collect(),
-                to_joint: beyond(&|n| rotations[n] * shapes[n].displacement(tap)),
-            }
-        };
-        (structure, place, stiffness)
+        let specimen = Specimen::new(Body::One(beam), Some(joint));
+        let seen = ObservedStructure::new(&specimen, &settings, &self.sensors, 0.0, HIGHEST);
+        (seen.expect("modes"), joint.kr)
     }
 
     /// Force and responses (N, m/s2) without noise.
     pub fn signals(&self) -> Vec<Vec<f64>> {
-        let (structure, place, stiffness) = self.structure();
+        let (structure, stiffness) = self.structure();
         let step = 1.0 / (RATE * STEPS as f64);
         let sensed = vec![Sensed::Acceleration; self.sensors.len()];
         let strike = |hit: &Hit, start: f64, peak: f64| Strike {
@@ -191,10 +160,10 @@ impl Trial {
                 peak,
                 shape: PulseShape::SineSquared,
             },
-            place: place(hit.place),
+            place: structure.struck(hit.place),
         };
         let joint = self.law.as_ref().map(|law| {
-            let mut motion = Motion::new(structure.clone(), &sensed, 0.0, step, None);
+            let mut motion = Motion::new(structure.reduced().clone(), &sensed, 0.0, step, None);
             motion.strike(strike(&self.hits[0], 1.3e-4, self.hardest));
             let mut largest = 0.0_f64;
             for _ in 0..(0.3 / step) as usize {
@@ -203,7 +172,7 @@ impl Trial {
             }
             JointMoment::of_law(law, stiffness, largest)
         });
-        let mut motion = Motion::new(structure, &sensed, 0.0, step, joint);
+        let mut motion = Motion::new(structure.reduced().clone(), &sensed, 0.0, step, joint);
         for (number, hit) in self.hits.iter().enumerate() {
             let start = 0.5 + number as f64 * self.interval + 1.3e-5 * number as f64;
             motion.strike(strike(hit, start, hit.level));
@@ -324,7 +293,14 @@ pub fn inconsistent(analysis: &Analysis) -> Vec<usize> {
     departing.map(|(place, _)| place).collect()
 }
 
+/// The warning of this code in words; empty without one.
+pub fn words(analysis: &Analysis, code: &str) -> String {
+    let mut warnings = analysis.warnings.iter();
+    let found = warnings.find(|warning| warning.code == code);
+    found.map(ToString::to_string).unwrap_or_default()
+}
+
 /// Returns true where the analysis has a warning of this code.
 pub fn warns(analysis: &Analysis, code: &str) -> bool {
-    analysis.warnings.iter().any(|warning| warning.code == code)
+    !words(analysis, code).is_empty()
 }

@@ -53,7 +53,8 @@ pub struct TapsSoFar {
 }
 
 /// Finds the taps of a recording as the whole chain does, with these decisions `by_hand` in place of those of the plan. The
-/// end of a recording that `is_growing` cuts off no tap. `memo` holds what was found in it before, with the same decisions.
+/// end of a recording that `is_growing` cuts off no tap. `memo` holds what was found in it before; the
+/// decisions may have changed since.
 ///
 /// # Errors
 /// An unknown channel, an unreadable recording, a band or block that does not fit.

@@ -243,7 +243,7 @@ fn select_taps(
     }
     let shortest = taps.shortest().unwrap_or(0) as f64 / recording.sample_rate();
     let Ok(lines) = lines_for(settings, recording.sample_rate(), shortest) else {
-        // The same is said of the spectra.
+        // The spectra fail for the same reason, and that is told there.
         return Ok(Vec::new());
     };
     // Of many taps, parts are compared by themselves. Each holds taps of the whole recording.
@@ -251,14 +251,18 @@ fn select_taps(
     let by_memory = (compared.len() * sensors).div_ceil(MOST_RESPONSES);
     let by_memory = by_memory.min(compared.len() / LEAST_COMPARED);
     let parts = compared.len().div_ceil(MOST_COMPARED).max(by_memory);
-    let mut doubts = Vec::new();
-    let mut rejections = Vec::new();
+    let inputs = Inputs::new(recording, settings, taps, lines);
+    let (mut doubts, mut rejections) = (Vec::new(), Vec::new());
     for part in 0..parts {
         let own = compared.iter().copied().skip(part).step_by(parts);
         let own: Vec<usize> = own.collect();
-        let inputs = Inputs::new(recording, settings, taps, lines);
-        let choice = inputs.choice(&own)?;
-        doubts.extend(Warning::of_selection(file, &choice, own.len()));
+        let Some(choice) = inputs.choice(&own)? else {
+            return Ok(vec![Warning::select_without_force(file)]);
+        };
+        // The parts are alike, and one warning is enough.
+        if doubts.is_empty() {
+            doubts = Warning::of_selection(file, &choice, own.len(), compared.len());
+        }
         for one in choice.departing {
             rejections.push((
                 own[one.tap],
@@ -301,12 +305,12 @@ pub(super) fn lines_for(
 /// Most taps from which the decay in the records is taken, evenly spread: more would hardly find a slower one.
 const MOST_LOOKED_AT: usize = 32;
 
-/// Most taps that are compared with each other: more make the median no better.
+/// Most taps that are compared with each other. 200: the time grows with the square of their number.
 const MOST_COMPARED: usize = 200;
 /// Most responses of taps, over all sensors, that are compared with each other, where there are many sensors: a bound on
 /// memory. 800: 200 taps of four sensors.
 const MOST_RESPONSES: usize = 800;
-/// Taps that are compared with each other at least, whatever the sensors: few of them tell little.
+/// Fewest taps in a part, whatever the sensors. 20: `TIMES_OF_FEW` then adds little to the limit.
 const LEAST_COMPARED: usize = 20;
 
 /// Data that every step of one recording's measurement needs.
@@ -365,8 +369,8 @@ impl<'a> Inputs<'a> {
         self.read(tap.record.start..tap.usable_from() + self.gate, into)
     }
 
-    /// Compares the taps at these places, and chooses among them.
-    fn choice(&self, places: &[usize]) -> Result<Choice, RecordingError> {
+    /// Compares the taps at these places, and chooses among them. `None` where a tap has no pulse, or nothing answers it.
+    fn choice(&self, places: &[usize]) -> Result<Option<Choice>, RecordingError> {
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
         let octaves = Octave::all(band, rate, self.gate as usize);
@@ -386,15 +390,14 @@ impl<'a> Inputs<'a> {
             record.resize_with(self.channels.len(), Vec::new);
             before.resize_with(self.channels.len(), Vec::new);
         }
-        // Every tap of a hammer has a pulse.
         if responses.len() < places.len() || self.responses() == 0 {
-            return Ok(Choice::default());
+            return Ok(None);
         }
         let taps = places.iter().map(|place| &self.taps.taps[*place]);
         let by_hand = &self.settings.taps.by_hand;
         let protected: Vec<bool> = taps.clone().map(|tap| by_hand.accepts(tap)).collect();
         let peaks: Vec<f64> = taps.map(|tap| tap.peak).collect();
-        Ok(choose(&octaves, &responses, &protected, &peaks))
+        Ok(Some(choose(&octaves, &responses, &protected, &peaks)))
     }
 
     /// Frames before the record of a tap that show how the structure rested: at most a block, and half of the time since

@@ -9,27 +9,24 @@ use tapjoint_numerics::stats::median;
 
 /// Fewest taps among which one can be chosen. 4: of three, two that agree by chance would make the third a fault.
 pub(super) const LEAST_TAPS: usize = 4;
-/// Fewest taps that are kept.
-const LEAST_KEPT: usize = 3;
-/// Most taps that are taken out, as a share of all. Where more depart, no group of taps has the right on its side.
-const MOST_REJECTED: f64 = 1.0 / 3.0;
-/// A departure up to this (1) rejects no tap. 12 %: on a clamped bar a tap that is 3 % of the length off departs by about as
-/// much. Nearer hits spoil little.
+/// One tap in so many is taken out at most. 3: two thirds that agree are a clear majority, and of four taps three are left.
+const ONE_IN: usize = 3;
+/// A departure up to this (1) rejects no tap. 12 %, chosen: small scatter of the places is then no fault.
 const FLOOR: f64 = 0.12;
-/// A tap departs by so many times as much as the others, at least, where there are many of them. 5: of many normal values
-/// 1 in 1000 is that far from their median; of 20, 4 in 1000 are beyond the limit for 20.
+/// A tap departs from so many times the median departure of the others on, where there are many. 5: of many normal values 1 in
+/// 1000 is that far from their median; of 20, 4 in 1000 are beyond the limit for 20.
 const TIMES: f64 = 5.0;
 /// Added to [`TIMES`] over the number of taps less two. 12: the median departure of few taps is itself uncertain. The
 /// study `examples/tap_selection` then sees no right tap rejected among four or six, at any scatter up to 5 mm.
 const TIMES_OF_FEW: f64 = 12.0;
-/// Two groups are apart by so many times as much as the taps within them, at least, where there are many. 4: places that
-/// scatter as normal values do leave such a gap in their middle in less than 3 of 100 tests of ten taps.
+/// Two groups are apart by so many times as much as the taps within them, at least, where there are many; among n taps
+/// n/(n - 3) times as much. 4: of four or more normal values, fewer than 1 % of all draws have such a gap in their middle.
 const TIMES_OF_GROUPS: f64 = 4.0;
 /// Times the disturbance before a tap that its departure may have (1). 1.5: what rings on is less than what came before it,
 /// and noise differs from one stretch to the next.
 const OF_DISTURBANCE: f64 = 1.5;
-/// Weight of the disturbance against that of the scatter, where sensors and octaves are weighed (1). 10: lines on which the
-/// tap before still rings tell little of the place of a hit, and the others suffice.
+/// Weight of the disturbance beside the scatter in the weights of cells (1). 10: lines where the last tap still rings say
+/// little about the place.
 const AGAINST_DISTURBANCE: f64 = 10.0;
 /// Lines where the force has less than this share of its largest power are left out. 1 %, or 20 dB, as is usual.
 const EXCITED: f64 = 0.01;
@@ -38,8 +35,7 @@ const EXCITED: f64 = 0.01;
 const MOST_SHIFT: f64 = 0.01;
 /// Most change of the damping ratio in an octave that is no departure. 0.5 %, for the same reason.
 const MOST_DAMPING: f64 = 0.005;
-/// A tap that is so many times stronger or weaker than all that agree is kept: its level may be the cause. 1.25: hands
-/// scatter by some 10 %, so that few wrong hits are as far beyond the range of the others.
+/// A tap is kept if its peak is so many times above or below those of all taps that agree. 1.25: hands scatter by some 10 %.
 pub(super) const OTHER_LEVEL: f64 = 1.25;
 
 /// Choice among the taps of a recording.
@@ -91,8 +87,8 @@ struct Departures {
     departure: Vec<f64>,
     /// What the responses did before each tap, relative to those after it (1).
     disturbance: Vec<f64>,
-    /// What is left of each tap: over lines and sensors, weighted so that its norm is the departure. Empty of references to
-    /// the others.
+    /// What the median does not explain of each tap, by lines and sensors. Its norm is the departure. Empty for
+    /// [`Reference::OfOthers`].
     rest: Vec<Vec<Complex64>>,
 }
 
@@ -110,8 +106,8 @@ pub(super) fn choose(
     let comparison = Comparison::new(octaves, taps);
     let mut is_kept = vec![true; taps.len()];
     let mut is_protected = protected.to_vec();
-    let mut of_other_level = 0;
-    let most = (MOST_REJECTED * taps.len() as f64 + 1e-9) as usize;
+    let mut is_of_other_level = vec![false; taps.len()];
+    let most = taps.len() / ONE_IN;
     let mut rejected = 0;
     loop {
         let found = comparison.departures(&is_kept, Reference::OfOthers);
@@ -132,17 +128,17 @@ pub(super) fn choose(
             .map(|tap| is_kept[tap] && found.departure[tap] <= limits[tap].limit)
             .collect();
         let agreeing = (0..taps.len()).filter(|tap| agrees[*tap]);
-        let is_of_level = is_of_other_level(peaks[worst], agreeing.map(|tap| peaks[tap])) || {
+        let is_of_level = lies_beyond(peaks[worst], agreeing.map(|tap| peaks[tap])) || {
             let common = comparison.departures(&is_kept, Reference::OfAll);
             common.beside_level(worst, &is_kept, peaks) <= limits[worst].limit
         };
         if is_of_level {
             is_protected[worst] = true;
-            of_other_level += 1;
+            is_of_other_level[worst] = true;
             continue;
         }
         rejected += 1;
-        if rejected > most || taps.len() - rejected < LEAST_KEPT {
+        if rejected > most {
             return Choice {
                 disagreement: Some(Disagreement::TooMany {
                     departing: rejected,
@@ -152,7 +148,7 @@ pub(super) fn choose(
         }
         is_kept[worst] = false;
     }
-    // Beside the taps that are left, one that was taken out early may agree after all.
+    // Beside the taps that are left, one that was judged early may agree after all.
     let found = comparison.departures(&is_kept, Reference::OfOthers);
     let departing = (0..taps.len()).filter(|tap| !is_kept[*tap] || protected[*tap]);
     let departing = departing.filter_map(|tap| {
@@ -167,7 +163,10 @@ pub(super) fn choose(
     });
     Choice {
         departing: departing.collect(),
-        of_other_level,
+        of_other_level: (0..taps.len())
+            .filter(|tap| is_of_other_level[*tap])
+            .filter(|tap| found.departure[*tap] > found.limit(*tap, &is_kept).limit)
+            .count(),
         disagreement: comparison
             .departures(&is_kept, Reference::OfAll)
             .groups(&is_kept, peaks),
@@ -175,7 +174,7 @@ pub(super) fn choose(
 }
 
 /// Returns true if a peak lies far above or below all others.
-fn is_of_other_level(peak: f64, others: impl Iterator<Item = f64>) -> bool {
+fn lies_beyond(peak: f64, others: impl Iterator<Item = f64>) -> bool {
     let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
     for other in others {
         low = low.min(other);
@@ -186,7 +185,7 @@ fn is_of_other_level(peak: f64, others: impl Iterator<Item = f64>) -> bool {
 
 /// Times the median departure of the others at which one of `taps` taps departs.
 fn times(taps: usize) -> f64 {
-    TIMES + TIMES_OF_FEW / (taps as f64 - 2.0).max(1.0)
+    TIMES + TIMES_OF_FEW / (taps as f64 - 2.0)
 }
 
 /// Taps over which the medians are taken.
@@ -200,7 +199,9 @@ enum Reference {
 
 /// Limit of one tap's departure.
 struct Limit {
+    /// Median departure of the other kept taps (1).
     others: f64,
+    /// A tap departs beyond it (1).
     limit: f64,
 }
 
@@ -210,6 +211,7 @@ struct Comparison<'a> {
     taps: &'a [TapResponse],
     /// Lines that the force excites, by octave.
     lines: Vec<Vec<usize>>,
+    /// Number of responses.
     sensors: usize,
 }
 
@@ -424,6 +426,7 @@ impl<'a> Comparison<'a> {
 
 /// Squared norms of one sensor's response to one tap in an octave.
 struct Cell {
+    /// Its place among the responses.
     sensor: usize,
     /// Of the expected response.
     whole: f64,
@@ -431,6 +434,7 @@ struct Cell {
     left: f64,
     /// Of what the sensor did before the tap.
     disturbed: f64,
+    /// What the reference does not explain, by lines; empty for [`Reference::OfOthers`].
     rest: Vec<Complex64>,
 }
 
@@ -576,7 +580,7 @@ impl Departures {
             sides[usize::from(is_beyond[tap])].push(tap);
         }
         let smaller = sides[0].len().min(sides[1].len());
-        if smaller < 2 || smaller as f64 <= MOST_REJECTED * count as f64 {
+        if ONE_IN * smaller <= count {
             return None;
         }
         let mut within = 0.0_f64;
@@ -588,7 +592,7 @@ impl Departures {
             within = within.max(median(&mut own));
         }
         // Distances of two taps are larger than departures from a median by the square root of two.
-        let times = TIMES_OF_GROUPS * count as f64 / (count as f64 - 3.0).max(1.0);
+        let times = TIMES_OF_GROUPS * count as f64 / (count as f64 - 3.0);
         let limit = (2f64.sqrt() * FLOOR).max(times * within / 2f64.sqrt());
         let disturbance = OF_DISTURBANCE * self.usual_disturbance(is_kept);
         if apart <= limit.hypot(2f64.sqrt() * disturbance) {
@@ -608,5 +612,35 @@ impl Departures {
             apart,
             level: one.max(other) / one.min(other),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prop_the_median_without_one_is_that_of_the_others() {
+        let mut state = 1_u32;
+        for count in 3..10 {
+            let values: Vec<f64> = (0..count)
+                .map(|_| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    // Five values, so that some are equal.
+                    f64::from(state >> 16) % 5.0
+                })
+                .collect();
+            let sorted = Sorted::of(&values);
+            assert_eq!(sorted.median(None), median(&mut values.clone()));
+            for place in 0..count {
+                let mut others = values.clone();
+                others.remove(place);
+                assert_eq!(
+                    sorted.median(Some(place)),
+                    median(&mut others),
+                    "{values:?}"
+                );
+            }
+        }
     }
 }

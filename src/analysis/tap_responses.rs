@@ -6,7 +6,7 @@
 use super::pulse_window::{PulseWindow, remove_offset};
 use num_complex::Complex64;
 use rayon::prelude::*;
-use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer};
+use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 use tapjoint_signal::taps::Tap;
 
 /// Damping ratio that the window adds at the lower end of an octave. 3 %: ten times the damping of metal, so that
@@ -16,7 +16,7 @@ const ADDED_DAMPING: f64 = 0.03;
 const WINDOW_END: f64 = 1e-3;
 /// Shortest window (s), longer than a pulse.
 const SHORTEST: f64 = 0.01;
-/// Fewest periods in a window. 5: below, the window's own width covers the octave.
+/// Fewest periods in a window. 5: there the lines of the window are half an octave wide.
 const LEAST_PERIODS: f64 = 5.0;
 /// Most octaves: from 10 kHz down to 1 Hz, and some.
 const MOST_OCTAVES: usize = 16;
@@ -30,8 +30,9 @@ pub(super) struct Octave {
     pub spacing: f64,
     /// Number of lines.
     pub points: usize,
-    /// Window (1).
-    window: Vec<f64>,
+    window: Window,
+    /// Length of the window (samples).
+    samples: usize,
     transformer: Transformer,
 }
 
@@ -77,12 +78,14 @@ impl Octave {
             block: ((points - 1) as f64 * DISPLAY_RATIO).ceil() as usize,
             duration: samples as f64 / sample_rate,
         };
-        let step = -decay / samples as f64;
         Some(Octave {
             low: lines.low,
             spacing,
             points: lines.points(),
-            window: (0..samples).map(|n| (step * n as f64).exp()).collect(),
+            window: Window::Exponential {
+                decay: decay * sample_rate / samples as f64,
+            },
+            samples,
             transformer: Transformer::new(sample_rate, lines, samples),
         })
     }
@@ -93,8 +96,9 @@ impl Octave {
         (self.low * high).sqrt()
     }
 
-    fn transform(&self, samples: impl Iterator<Item = f64>) -> Vec<Complex64> {
-        let windowed: Vec<f64> = samples.zip(&self.window).map(|(x, w)| x * w).collect();
+    fn transform(&self, samples: impl Iterator<Item = f64>, sample_rate: f64) -> Vec<Complex64> {
+        let mut windowed: Vec<f64> = samples.take(self.samples).collect();
+        self.window.apply(&mut windowed, sample_rate);
         self.transformer.transform(&windowed)
     }
 }
@@ -121,7 +125,7 @@ pub(super) struct TapSamples {
 }
 
 impl TapResponse {
-    /// Transforms a tap; `None` without its pulse.
+    /// Transforms a tap of this sample rate (Hz); `None` without its pulse.
     pub fn of(
         tap: &Tap,
         octaves: &[Octave],
@@ -138,13 +142,14 @@ impl TapResponse {
         let transformed: Vec<_> = octaves
             .par_iter()
             .map(|octave| {
-                let transform = |samples: &Vec<f64>| octave.transform(samples.iter().copied());
+                let transform =
+                    |samples: &Vec<f64>| octave.transform(samples.iter().copied(), sample_rate);
                 let before = samples.before.iter().zip(&samples.responses);
                 // Backwards from the pulse: the part of the record before it, then what came before the record.
                 let before = before.map(|(before, record)| {
                     let head = &record[..start.min(record.len())];
                     let backwards = head.iter().rev().chain(before.iter().rev());
-                    let values = octave.transform(backwards.copied());
+                    let values = octave.transform(backwards.copied(), sample_rate);
                     values.iter().map(Complex64::norm_sqr).collect()
                 });
                 (

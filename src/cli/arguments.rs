@@ -297,8 +297,8 @@ pub(super) struct SpectrumSettings {
     /// Window; default: rectangular if the taps decay to 1 % within the block, else exponential
     #[arg(long, value_name = "W", value_parser = window())]
     pub(super) window: Option<WindowKind>,
-    /// Taps that count: all that are in order, or of those the ones whose responses agree. The latter needs a hammer
-    /// and four taps; default: all
+    /// Taps to average: all that count by themselves, or only those whose responses agree. "consistent" needs a hammer and
+    /// four taps; default: all
     #[arg(long, value_name = "WHICH", value_parser = selection())]
     pub(super) select: Option<TapSelection>,
 }

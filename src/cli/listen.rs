@@ -47,9 +47,11 @@ use views::Views;
 ///
 /// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is the WAV file to be written, or a
 /// test description (.toml). Of a description the first [[recording]] without a file is written. Says after each tap
-/// whether it counts and why, then what all taps give so far. Keys of the live screen: a accepts the last tap, r rejects it, u
-/// undoes, n goes on with the next recording, s stops. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing, the
-/// test is run as by `tapjoint run`, with the options of `run`; --json is written then.
+/// whether it counts and why, then what all taps give so far.
+///
+/// Keys of the live screen: up and down choose a tap, at first the last one. a accepts it, r rejects it, u undoes. n goes on
+/// with the next recording, s stops. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing,
+/// the test is run as by `tapjoint run`. It takes the options of `run`, such as --json.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("file", |file| file.help("Test description (.toml), or the WAV file to be written").long_help(None)),
@@ -93,8 +95,8 @@ pub(super) struct ListenArguments {
     /// Time from a tap to its verdict (s). The next tap shortens it, and a described `block` may lengthen it
     #[arg(long, value_name = "S", default_value = "2", value_parser = record)]
     record: f64,
-    /// Half width of the 95 % intervals that is wanted, as a share of the value, such as "5 %": of the joint, without a joint
-    /// of the frequencies, which are known far better ("0.01 %"). Default: the number of taps alone is wanted
+    /// Wanted half width of the 95 % intervals as a share of the value, such as "5 %". It is that of the joint. Without a
+    /// joint it is that of the frequencies, which are known far better ("0.01 %"). Default: only the number of taps is wanted
     #[arg(long, value_name = "P", value_parser = accuracy)]
     accuracy: Option<f64>,
     /// Print lines, and show no live screen. Lines are printed anyhow where standard output is no terminal
@@ -148,6 +150,41 @@ fn record(text: &str) -> Result<f64, String> {
 }
 
 impl ListenArguments {
+    /// Returns the views that were asked for.
+    ///
+    /// # Errors
+    /// The page cannot be served.
+    fn views<'a>(&self, terminal: &'a Terminal) -> anyhow::Result<Views<'a>> {
+        #[cfg_attr(
+            not(any(feature = "screen", feature = "serve")),
+            expect(unused_mut, reason = "there are lines alone")
+        )]
+        let mut views = Views::new(terminal);
+        if let Some(port) = self.serve {
+            #[cfg(feature = "serve")]
+            {
+                let page = server::Page::serve(port)?;
+                // Its address is needed where nothing else is printed, too.
+                let _ = terminal.seal(&format!("page: {}\n", page.address()));
+                views.bench.address = Some(page.address().to_owned());
+                views.add(Box::new(page));
+            }
+            #[cfg(not(feature = "serve"))]
+            bail!(
+                "--serve {port}: this program was built without the page; build it with `--features serve`"
+            );
+        }
+        #[cfg(feature = "screen")]
+        if !self.plain
+            && terminal.may_be_filled()
+            && let Ok(screen) = screen::LiveScreen::begin()
+        {
+            ledger().restore = Some(screen::restore);
+            views.add(Box::new(screen));
+        }
+        Ok(views)
+    }
+
     /// Returns where the samples come from. A recording that is played is read as `read` says.
     fn source(&self, read: &ReadSettings) -> anyhow::Result<Source> {
         if let Some(name) = &self.sound {
@@ -188,43 +225,6 @@ impl ListenArguments {
             layout,
             speed: self.speed,
         })
-    }
-}
-
-impl ListenArguments {
-    /// Returns the views that were asked for.
-    ///
-    /// # Errors
-    /// The page cannot be served.
-    fn views<'a>(&self, terminal: &'a Terminal) -> anyhow::Result<Views<'a>> {
-        #[cfg_attr(
-            not(any(feature = "screen", feature = "serve")),
-            expect(unused_mut, reason = "there are lines alone")
-        )]
-        let mut views = Views::new(terminal);
-        if let Some(port) = self.serve {
-            #[cfg(feature = "serve")]
-            {
-                let page = server::Page::serve(port)?;
-                // Its address is needed where nothing else is printed, too.
-                let _ = terminal.seal(&format!("page: {}\n", page.address()));
-                views.bench.address = Some(page.address().to_owned());
-                views.add(Box::new(page));
-            }
-            #[cfg(not(feature = "serve"))]
-            bail!(
-                "--serve {port}: this program was built without the page; build it with `--features serve`"
-            );
-        }
-        #[cfg(feature = "screen")]
-        if !self.plain
-            && terminal.may_be_filled()
-            && let Ok(screen) = screen::LiveScreen::begin()
-        {
-            ledger().restore = Some(screen::restore);
-            views.add(Box::new(screen));
-        }
-        Ok(views)
     }
 }
 
@@ -337,7 +337,11 @@ pub(super) fn run(
         return Ok(Outcome::of(heard.accepted > 0));
     }
     if let Some(by_hand) = heard.by_hand {
-        terminal.say(&by_hand_words(described.is_some(), &by_hand))?;
+        terminal.say(&by_hand_words(
+            described.is_some(),
+            heard.is_unwritten,
+            &by_hand,
+        ))?;
         // `run` reads those of a description from its file.
         if described.is_none() {
             let _ = arguments.run.taps.decided.set(by_hand);
@@ -451,7 +455,10 @@ fn described_files(file: &TestFile) -> Vec<PathBuf> {
 }
 
 /// Says where decisions by hand stand.
-fn by_hand_words(is_described: bool, by_hand: &TapsByHand) -> String {
+fn by_hand_words(is_described: bool, is_unwritten: bool, by_hand: &TapsByHand) -> String {
+    if is_described && is_unwritten {
+        return "decided by hand: not all of it could be written into the description; copy the times from the log\n".to_owned();
+    }
     if is_described {
         return "decided by hand: accept_taps and reject_taps of the description hold it\n"
             .to_owned();

@@ -54,7 +54,8 @@ impl fmt::Display for JudgedTap {
     /// Writes "accepted: peak 18.2 N, pulse 1.21 ms, excites up to 830 Hz, decays to 0.4 % in 5.0 s".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(rejection) = &self.rejection {
-            return write!(f, "REJECTED: {rejection}");
+            write!(f, "REJECTED: {rejection}")?;
+            return self.remedy.map_or(Ok(()), |remedy| write!(f, ". {remedy}"));
         }
         f.write_str("accepted")?;
         if let Some(fault) = &self.overruled {
@@ -73,9 +74,13 @@ impl fmt::Display for JudgedTap {
             return Ok(());
         };
         let (percent, seconds) = (significant(100.0 * remaining, 2), self.seconds);
-        match self.has_ended {
-            true => write!(f, ", decays to {percent} % in {seconds:.1} s"),
-            false => write!(f, ", still {percent} % after {seconds:.1} s"),
+        if !self.has_ended {
+            return write!(f, ", still {percent} % after {seconds:.1} s");
+        }
+        write!(f, ", decays to {percent} % in {seconds:.1} s")?;
+        match remaining > RUNG_DOWN {
+            true => f.write_str(". Wait longer before the next tap."),
+            false => Ok(()),
         }
     }
 }
@@ -84,25 +89,13 @@ impl fmt::Display for News {
     /// Writes one or two sentences.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            News::Tap(tap) => write!(f, "tap at {:.2} s {tap}", tap.time)?,
-            News::Revised(tap) => write!(f, "tap at {:.2} s is now {tap}", tap.time)?,
+            News::Tap(tap) => write!(f, "tap at {:.2} s {tap}", tap.time),
+            News::Revised(tap) => write!(f, "tap at {:.2} s is now {tap}", tap.time),
             News::Gone { time } => write!(
                 f,
                 "tap at {time:.2} s withdrawn: later samples show that it was none"
-            )?,
-            News::Doubt(text) => return write!(f, "doubt: {text}"),
-        }
-        let (News::Tap(tap) | News::Revised(tap)) = self else {
-            return Ok(());
-        };
-        if let Some(remedy) = tap.remedy {
-            return write!(f, ". {remedy}");
-        }
-        match tap.remaining {
-            Some(remaining) if remaining > RUNG_DOWN && tap.has_ended => {
-                f.write_str(". Wait longer before the next tap.")
-            }
-            _ => Ok(()),
+            ),
+            News::Doubt(text) => write!(f, "doubt: {text}"),
         }
     }
 }

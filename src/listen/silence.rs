@@ -46,8 +46,8 @@ impl Silence {
     }
 
     /// Takes a rise of the responses. Returns true once, if the hammer has shown nothing for several of them.
-    pub(crate) fn rises_without(&mut self, hammer: usize, is_moving: bool) -> bool {
-        if is_moving || self.since.get(hammer) != Some(&0.0) {
+    pub(crate) fn rises_without(&mut self, hammer: usize) -> bool {
+        if self.since.get(hammer) != Some(&0.0) {
             self.rises = 0;
             return false;
         }
@@ -82,6 +82,6 @@ mod tests {
         silence.begin();
         silence.takes(&[9.0, 1e-9]);
         assert_eq!(silence.still(&[1]), [0_usize; 0]);
-        assert!(!silence.rises_without(0, false));
+        assert!(!silence.rises_without(0));
     }
 }

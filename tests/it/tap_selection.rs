@@ -3,7 +3,7 @@
 #[path = "../../examples/tap_selection/hits.rs"]
 mod hits;
 
-use hits::{Hit, LENGTH, Noise, Trial, held, inconsistent, taps, warns};
+use hits::{Hit, LENGTH, Noise, Trial, held, inconsistent, taps, warns, words};
 use tapjoint::description::{ChannelRef, TapSelection};
 use tapjoint::pipeline::{Analysis, run_recording};
 use tapjoint::structure::effects::JointLaw;
@@ -28,27 +28,24 @@ fn recover_two_of_ten_taps_that_hit_another_place() {
     let chosen = consistent(&trial);
     assert_eq!(inconsistent(&chosen), [2, 7]);
     let Some(Rejection::Inconsistent {
-        departure,
-        others,
-        limit,
+        departure, others, ..
     }) = taps(&chosen)[2].rejection
     else {
         panic!("{:?}", taps(&chosen)[2].rejection);
     };
+    // Half a millimetre of scatter is a fortieth of the way to the wrong place.
     assert!(
-        departure > limit && limit > 3.0 * others,
-        "{departure} {others} {limit}"
+        others < 0.05 && departure > 0.12,
+        "{departure} beside {others}"
     );
     assert_eq!(chosen.recordings[0].measurement.taps.accepted().count(), 8);
     assert!(warns(&chosen, "rejected-taps"));
     // The modes do not depend on the place of a hit, and keep their intervals.
-    assert!(
-        held(&chosen, &trial.frequencies())
-            .iter()
-            .filter(|held| **held)
-            .count()
-            >= 5
-    );
+    let held = held(&chosen, &trial.frequencies());
+    assert_eq!(held.len(), trial.frequencies().len());
+    // Of six 95 % intervals fewer than five hold the truth in 3 of 100 draws.
+    let inside = held.iter().filter(|held| **held).count();
+    assert!(inside + 1 >= held.len(), "{held:?}");
     // All are used without the choice.
     let all = trial.analysis(TapSelection::All);
     assert_eq!(all.recordings[0].measurement.taps.accepted().count(), 10);
@@ -80,7 +77,7 @@ fn prop_clean_tests_keep_their_taps() {
         rejected += inconsistent(&chosen).len();
         assert!(!warns(&chosen, "taps-disagree"), "seed {seed}");
     }
-    // The study in the examples finds less than 1 of 1000.
+    // The study in the examples finds less than 1 of 1000: of some 180 taps two are then rejected in 2 of 100 draws.
     assert!(100 * rejected <= count, "{rejected} of {count}");
 }
 
@@ -108,7 +105,8 @@ fn prop_taps_of_different_level_are_kept_on_a_nonlinear_joint() {
     });
     let chosen = consistent(&trial);
     assert!(inconsistent(&chosen).is_empty());
-    assert!(warns(&chosen, "taps-disagree"));
+    let words = words(&chosen, "taps-disagree");
+    assert!(words.contains("because they differ in level"), "{words}");
 }
 
 #[test]
@@ -119,9 +117,7 @@ fn prop_no_half_of_the_taps_is_preferred() {
     }
     let chosen = consistent(&trial);
     assert!(inconsistent(&chosen).is_empty());
-    let mut warnings = chosen.warnings.iter();
-    let warning = warnings.find(|warning| warning.code == "taps-disagree");
-    let words = warning.map(ToString::to_string).unwrap_or_default();
+    let words = words(&chosen, "taps-disagree");
     assert!(words.contains("groups of 5 and 5"), "{words}");
 }
 
@@ -135,7 +131,9 @@ fn regress_a_change_half_way_through_many_taps_is_seen() {
     }
     let chosen = consistent(&trial);
     assert!(inconsistent(&chosen).is_empty());
-    assert!(warns(&chosen, "taps-disagree"));
+    let words = words(&chosen, "taps-disagree");
+    let told = "134 taps that were compared, of 402 fall into groups of 67 and 67";
+    assert!(words.contains(told), "{words}");
 }
 
 #[test]
@@ -146,7 +144,11 @@ fn limit_no_more_than_a_third_of_the_taps_goes() {
     }
     let chosen = consistent(&trial);
     assert!(inconsistent(&chosen).is_empty());
-    assert!(warns(&chosen, "taps-disagree"));
+    let words = words(&chosen, "taps-disagree");
+    assert!(
+        words.contains("depart from the others, more than a third"),
+        "{words}"
+    );
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::time::Duration;
 
 const LOW: &str = "recordings/cantilever/low.wav";
 
@@ -499,6 +500,9 @@ impl Page {
     fn benches(&self) -> impl Iterator<Item = Value> + use<> {
         let first = format!("GET /{}/events", self.token);
         let stream = self.send(&first, &[&self.own_host()], "");
+        // What never comes fails the test, and does not hold it up.
+        let patience = Some(Duration::from_secs(120));
+        stream.set_read_timeout(patience).unwrap();
         let lines = BufReader::new(stream).lines();
         let told = lines.filter_map(|line| {
             let line = line.unwrap();
@@ -734,11 +738,15 @@ fn recover_a_test_in_one_stream_by_next() {
     // The stream turns with its next samples, whichever they are.
     let quiet = vec![0; 9000];
     let mut sent = low[head..].to_vec();
-    while !test.join("high.wav").exists() {
+    for _ in 0..500 {
+        if test.join("high.wav").exists() {
+            break;
+        }
         input.write_all(&quiet).unwrap();
         sent.extend_from_slice(&quiet);
-        std::thread::sleep(std::time::Duration::from_millis(20));
+        std::thread::sleep(Duration::from_millis(20));
     }
+    assert!(test.join("high.wav").exists());
     let samples = &high[head_of(&high)..];
     input.write_all(samples).unwrap();
     sent.extend_from_slice(samples);

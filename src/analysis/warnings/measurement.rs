@@ -49,29 +49,32 @@ impl Warning {
 
     /// Taps were to be chosen by their responses, and no force was measured.
     pub(crate) fn select_without_force(file: &str) -> Self {
-        let text = "select = \"consistent\" needs the force, because without it a weak tap looks like one at another \
-                    place; all taps are kept; describe the hammer's channel, or leave `select` out";
+        let text = "select = \"consistent\" needs the force: without it a weak tap looks like one at another place; all taps \
+                    are kept; name the hammer's channel ([hammer] or --hammer)";
         Warning::about(file, "not-selected", text)
     }
 
     /// Taps were to be chosen by their responses, and there are too few.
     pub(crate) fn select_of_few(file: &str, taps: usize) -> Self {
         let text = format!(
-            "select = \"consistent\" needs at least {LEAST_TAPS} taps in order, and there are {taps}; all are kept; \
+            "select = \"consistent\" needs at least {LEAST_TAPS} taps that count, and there are {taps}; all are kept; \
              record more taps"
         );
         Warning::about(file, "not-selected", text)
     }
 
-    /// Doubts about the choice among `taps` taps.
-    pub(crate) fn of_selection(file: &str, choice: &Choice, taps: usize) -> Vec<Self> {
-        let advice =
-            "look at the taps, leave the wrong ones out by `reject_taps`, or measure again";
+    /// Doubts about the choice among `taps` of `all` taps, which were compared together.
+    pub(crate) fn of_selection(file: &str, choice: &Choice, taps: usize, all: usize) -> Vec<Self> {
+        let advice = "look at the taps; leave wrong ones out by reject_taps or --reject-taps, or measure again";
+        let compared = match taps < all {
+            true => format!("{taps} taps that were compared, of {all}"),
+            false => format!("{taps} taps"),
+        };
         let mut warnings = Vec::new();
         match choice.disagreement {
             Some(Disagreement::TooMany { departing }) => {
                 let text = format!(
-                    "the taps do not agree: at least {departing} of {taps} depart from the others, more than a third; \
+                    "the taps do not agree: at least {departing} of {compared} depart from the others, more than a third; \
                      all are kept; {advice}"
                 );
                 warnings.push(Warning::about(file, "taps-disagree", text));
@@ -90,7 +93,7 @@ impl Warning {
                     false => "the place of the hits or a sensor has probably moved".to_owned(),
                 };
                 let text = format!(
-                    "the taps fall into groups of {larger} and {smaller}, whose responses differ by {percent:.0} %; \
+                    "{compared} fall into groups of {larger} and {smaller}, whose responses differ by {percent:.0} %; \
                      {cause}; no group is preferred; {advice}"
                 );
                 warnings.push(Warning::about(file, "taps-disagree", text));
@@ -100,8 +103,8 @@ impl Warning {
         if choice.of_other_level > 0 {
             let count = choice.of_other_level;
             let text = format!(
-                "{count} of {taps} taps depart from the others and are kept, because they differ in level, and a joint may \
-                 respond to that; tap at one level, or leave them out by `reject_taps`"
+                "{count} of {compared} depart from the others; they are kept because they differ in level, and a joint may \
+                 respond to that; tap at one level, or leave them out by reject_taps or --reject-taps"
             );
             warnings.push(Warning::about(file, "taps-disagree", text));
         }

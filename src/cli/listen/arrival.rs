@@ -12,7 +12,7 @@ const RATE_TOLERANCE: f64 = 0.02;
 const FILE_SPEED: f64 = 8.0;
 /// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
 const LEAST_LOSS: f64 = 0.5;
-/// Samples are missing that were there so long before (s). 60 s: a clock that is off by less than 0.8 % is then no loss.
+/// A loss is measured against the best state within this time (s). 60 s: a clock that is off by less than 0.8 % is then no loss.
 const WITHIN: f64 = 60.0;
 /// A loss has to last so long (s), or the samples are only late.
 const LATE: f64 = 5.0;
@@ -61,7 +61,7 @@ impl Arrival {
         self.frames += frames;
         let (elapsed, gap) = (now - *first, now - *last);
         *last = now;
-        // Before the samples of a pause count, they have to come.
+        // A piece may hold the samples of the pause before it, so a long pause widens the tolerance of the rate.
         self.longest_gap = self.longest_gap.max(gap);
         if !self.is_judged && elapsed >= JUDGED_AFTER {
             self.is_judged = true;
@@ -105,7 +105,8 @@ impl Arrival {
             return None;
         }
         let since = *self.behind_since.get_or_insert(elapsed);
-        if elapsed - since < LATE {
+        // Until the rate is judged, a wrong one looks like a loss.
+        if elapsed - since < LATE || !self.is_judged {
             return None;
         }
         self.behind_since = None;
@@ -152,6 +153,8 @@ mod tests {
                      drops samples: frequencies may be wrong by this factor";
         assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [format!("919 {words}")]);
         assert_eq!(said(2.0, 0.1, 60.0, 0.0..0.0), [format!("2000 {words}")]);
+        // Half of the channels that are stated.
+        assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), [format!("500 {words}")]);
         // Soon, or after an hour.
         for lost in [29.95, 3599.95] {
             assert_eq!(

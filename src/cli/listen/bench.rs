@@ -4,7 +4,7 @@ use crate::listen::{JudgedTap, News, Precision};
 use crate::taps::REACH;
 use std::collections::VecDeque;
 
-/// Doubts that are shown. The log has all.
+/// Doubts and warnings that are shown. The log has all doubts.
 const MOST_NOTES: usize = 100;
 /// Swings of a channel that are shown: 10 s of steps of 50 ms.
 const MOST_SWINGS: usize = 200;
@@ -66,6 +66,21 @@ pub(super) struct Bench {
     pub(super) next: Option<String>,
     /// What became of it, once it has ended.
     pub(super) ended: Option<String>,
+}
+
+impl Level {
+    /// The swings in thousandths of the largest one.
+    #[cfg_attr(
+        not(any(feature = "screen", feature = "serve")),
+        expect(dead_code, reason = "lines show no movement")
+    )]
+    pub(super) fn heights(&self) -> Vec<u64> {
+        let swings = self.recent.iter().copied();
+        let largest = swings.clone().fold(f64::MIN_POSITIVE, f64::max);
+        swings
+            .map(|swing| (1000.0 * swing / largest) as u64)
+            .collect()
+    }
 }
 
 impl Bench {
@@ -132,8 +147,10 @@ impl Progress<'_> {
             1 => "1 tap counts".to_owned(),
             count => format!("{count} taps count"),
         };
-        if self.apart > 0 {
-            count.push_str(&format!(", {} do not agree with the others", self.apart));
+        match self.apart {
+            0 => {}
+            1 => count.push_str(", 1 does not agree with the others"),
+            more => count.push_str(&format!(", {more} do not agree with the others")),
         }
         let (is_enough, why) = match self.wanted.saturating_sub(self.accepted) {
             0 => self.why(),
@@ -231,10 +248,10 @@ mod tests {
 
     #[test]
     fn regress_words_of_the_advice() {
-        let words = |accepted, accuracy, precision: Option<Precision>| {
+        let with_apart = |accepted, apart, accuracy, precision: Option<Precision>| {
             let progress = Progress {
                 accepted,
-                apart: 0,
+                apart,
                 wanted: 3,
                 accuracy,
                 precision: precision.as_ref(),
@@ -242,6 +259,7 @@ mod tests {
             let (is_enough, words) = progress.words();
             format!("{is_enough}: {words}")
         };
+        let words = |accepted, accuracy, precision| with_apart(accepted, 0, accuracy, precision);
         let scattered = || precision(1.6, 0.1, true);
         let stuck = || precision(0.1, 1.6, true);
         let open = || precision(0.1, 1.6, false);
@@ -257,6 +275,8 @@ mod tests {
             words(4, Some(0.01), Some(scattered())),
             words(4, Some(0.01), Some(stuck())),
             words(4, Some(0.01), Some(open())),
+            with_apart(2, 1, None, None),
+            with_apart(4, 2, None, None),
             precision_words(&scattered()),
             precision_words(&stuck()),
             precision_words(&open()),
@@ -276,6 +296,8 @@ mod tests {
              does\n\
              false: 4 taps count; more taps do not help: the interval of Kt has no end, and 1.0 % is wanted; the report says \
              what does\n\
+             false: 2 taps count, 1 does not agree with the others; 1 more is wanted\n\
+             true: 4 taps count, 2 do not agree with the others; enough\n\
              least certain: Kt, within 3.1 %; the next tap makes it about 4.6 % narrower\n\
              least certain: Kt, within 3.1 %; the next tap would bring nothing\n\
              least certain: Kt, whose interval has no end"

@@ -34,6 +34,8 @@ pub(super) struct Heard {
     pub(super) accepted: usize,
     /// Taps that are accepted or rejected by hand; `None` where that is as before.
     pub(super) by_hand: Option<TapsByHand>,
+    /// True where a decision by hand could not be written into the description.
+    pub(super) is_unwritten: bool,
     /// How the stream ended.
     pub(super) ended: anyhow::Result<End>,
     /// The recording that follows in the same stream, and its first file.
@@ -61,6 +63,8 @@ pub(super) struct Hearing<'a, 'v> {
     files: Vec<PathBuf>,
     /// Why taps are no longer judged.
     fault: Option<ListenError>,
+    /// True once a decision by hand could not be written into the description.
+    is_unwritten: bool,
     /// The recording that is to follow.
     turns_to: Option<Target>,
 }
@@ -89,6 +93,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             apart: 0,
             files: target.earlier.clone(),
             fault: None,
+            is_unwritten: false,
             turns_to: None,
         }
     }
@@ -145,6 +150,11 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 return self.turned(path);
             }
         }
+        // The next recording may have begun, and nothing more come.
+        let begun = self.turns_to.as_ref().map(|next| next.file.clone());
+        if let Some(path) = begun.filter(|path| path.exists()) {
+            return self.turned(path);
+        }
         // The keys of the terminal work again while all taps are judged for good.
         self.views.end_screen();
         ledger().stop = None;
@@ -185,7 +195,11 @@ impl<'a, 'v> Hearing<'a, 'v> {
             (Ok(growing), Some(listener)) => {
                 // Time and memory of a result grow with the recording.
                 if self.states.take().is_some() {
-                    self.precision = None;
+                    (self.precision, self.apart) = (None, 0);
+                    let bench = &mut self.views.bench;
+                    bench.precision.clear();
+                    bench.result.clear();
+                    bench.first_screen = None;
                     self.views
                         .say("the first file is full: results come at the end from here on\n");
                 }
@@ -300,7 +314,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             accepted: accepted.saturating_sub(self.apart),
             apart: self.apart,
             wanted: self.arguments.taps,
-            accuracy: self.arguments.accuracy,
+            accuracy: self.arguments.accuracy.filter(|_| self.states.is_some()),
             precision: self.precision.as_ref(),
         };
         let (is_enough, mut words) = progress.words();
@@ -339,39 +353,56 @@ impl<'a, 'v> Hearing<'a, 'v> {
         match action {
             Action::Stop => stream.stop(),
             Action::Next => self.turn(stream),
-            Action::Accept(time) => self.decide("accept", time),
-            Action::Reject(time) => self.decide("reject", time),
-            Action::Undo => self.decide("undo", None),
+            decision => self.decide(decision),
         }
     }
 
-    /// Accepts or rejects the tap at this time (s) by hand, or takes the last decision back.
-    fn decide(&mut self, what: &str, time: Option<f64>) {
+    /// Accepts or rejects a tap by hand, or takes the last decision back.
+    fn decide(&mut self, decision: Action) {
         let Some(listener) = self.listener.as_mut().filter(|_| self.fault.is_none()) else {
             return;
         };
         let before = listener.by_hand().clone();
-        let news = match (what, time) {
-            ("undo", _) => listener.undo(),
-            (_, Some(time)) => listener.decide(time, what == "accept"),
-            (_, None) => Ok(None),
+        let news = match decision {
+            Action::Accept(Some(time)) => listener.decide(time, true),
+            Action::Reject(Some(time)) => listener.decide(time, false),
+            Action::Undo => listener.undo(),
+            _ => Ok(None),
         };
         let (after, heard) = (listener.by_hand().clone(), listener.seconds());
-        let Some(news) = news.transpose() else {
-            let words = match (what, time) {
-                ("undo", _) => "there is no decision by hand to take back".to_owned(),
-                (_, Some(time)) => format!("there is no tap at {time:.2} s any more"),
-                (_, None) => "there is no tap yet".to_owned(),
-            };
-            return self.views.bench.note(&words);
+        let (word, time) = match decision {
+            Action::Accept(time) => ("accept", time),
+            Action::Reject(time) => ("reject", time),
+            _ => ("undo", None),
         };
-        self.note(&line_by_hand(heard, what, time));
-        self.take(news);
+        let words = match (&news, time) {
+            (Ok(None), _) if decision == Action::Undo => {
+                "there is no decision by hand to take back"
+            }
+            (Ok(None), Some(_)) => "this tap is there no more",
+            (Ok(None), None) => "there is no tap yet",
+            _ if before == after => "it is decided so already",
+            _ => "",
+        };
+        if !words.is_empty() {
+            return self.views.bench.note(words);
+        }
+        self.note(&line_by_hand(heard, word, time));
+        self.take(news.map(Option::unwrap_or_default));
+        // A tap may have counted before, and not have agreed with the others.
+        self.ask();
+        self.write_decisions(&before, &after);
+    }
+
+    /// Writes into the description what was decided by hand.
+    fn write_decisions(&mut self, before: &TapsByHand, after: &TapsByHand) {
         let (Some(file), Some(table)) = (self.described, self.target.table) else {
             return;
         };
         let own = file.test.recordings[table].file.display().to_string();
-        if let Err(cause) = write_by_hand(&self.arguments.run.file, &own, &before, &after) {
+        let written = write_by_hand(&self.arguments.run.file, &own, before, after);
+        self.is_unwritten |= written.is_err();
+        if let Err(cause) = written {
             let words = format!("the decision is in the log alone: {cause:#}");
             self.views.warn(&words);
         }
@@ -441,6 +472,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             files: self.files,
             accepted,
             by_hand,
+            is_unwritten: self.is_unwritten,
             ended: match self.fault {
                 Some(fault) => Err(fault.into()),
                 None => ended,

@@ -4,6 +4,7 @@ use super::bench::{Action, Bench, Level};
 use super::views::View;
 use crate::listen::JudgedTap;
 use crate::report::Screen;
+use crate::taps::REACH;
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -96,7 +97,7 @@ impl Chosen {
         let last = bench.taps.len().checked_sub(1)?;
         let found = self.time.and_then(|time| {
             let mut taps = bench.taps.iter();
-            taps.position(|tap| tap.time == time)
+            taps.position(|tap| (tap.time - time).abs() <= REACH)
         });
         Some(found.unwrap_or(last))
     }
@@ -209,16 +210,9 @@ fn draw_level(frame: &mut Frame<'_>, area: Rect, level: &Level) {
     let [name, strip] =
         Layout::horizontal([Constraint::Length(NAME), Constraint::Min(10)]).areas(area);
     frame.render_widget(Line::from(level.name.as_str()).dim(), name);
-    let shown = level.recent.len().min(usize::from(strip.width));
-    let recent = level.recent.iter().skip(level.recent.len() - shown);
-    let largest = level
-        .recent
-        .iter()
-        .copied()
-        .fold(f64::MIN_POSITIVE, f64::max);
-    let heights: Vec<u64> = recent
-        .map(|swing| (1000.0 * swing / largest) as u64)
-        .collect();
+    let mut heights = level.heights();
+    let hidden = heights.len().saturating_sub(usize::from(strip.width));
+    heights.drain(..hidden);
     let strip_widget = Sparkline::default().data(heights).max(1000).cyan();
     frame.render_widget(strip_widget, strip);
 }
@@ -243,10 +237,7 @@ fn draw_taps(frame: &mut Frame<'_>, area: Rect, bench: &Bench, chosen: &Chosen) 
 
 /// A tap in lines of so many columns.
 fn tap_text(tap: &JudgedTap, columns: usize) -> Text<'static> {
-    let mut words = format!("{:.2} s {tap}", tap.time);
-    if let Some(remedy) = tap.remedy {
-        words.push_str(&format!(". {remedy}"));
-    }
+    let words = format!("{:.2} s {tap}", tap.time);
     let colour = match (&tap.rejection, &tap.overruled) {
         (Some(_), _) => Color::Red,
         (None, Some(_)) => Color::Yellow,
@@ -289,11 +280,11 @@ fn key_line(bench: &Bench) -> Line<'static> {
         ("a", "accept".to_owned()),
         ("r", "reject".to_owned()),
         ("u", "undo".to_owned()),
+        ("s", "stop".to_owned()),
     ];
     if let Some(next) = &bench.next {
         keys.push(("n", format!("next: {next}")));
     }
-    keys.push(("s", "stop".to_owned()));
     let spans = keys.into_iter().flat_map(|(key, what)| {
         [
             Span::from(format!(" {key} ")).reversed(),
@@ -344,7 +335,7 @@ mod tests {
                 "so far good".to_owned(),
                 "modes 118.20 \u{b1} 0.04 Hz".to_owned(),
             ],
-            next: Some("high.wav".to_owned()),
+            next: Some("high.wav, tap at 0.385 m".to_owned()),
             address: Some("http://127.0.0.1:8000/0f/".to_owned()),
             ..Bench::default()
         };
@@ -400,7 +391,7 @@ tip             █         █
 1 tap counts; 4 more are wanted
 page: http://127.0.0.1:8000/0f/
 
- up/down  choose   a  accept   r  reject   u  undo   n  next: high.wav   s  stop
+ up/down  choose   a  accept   r  reject   u  undo   s  stop   n  next: high.wav,
 ";
         assert_eq!(drawn(80, 24, &bench()), wanted);
     }

@@ -17,7 +17,7 @@ const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
-/// Pages that are kept up to date at once. More wait: each takes a thread.
+/// Pages that are kept up to date at once; more are refused. Each takes a thread.
 const MOST_PAGES: usize = 8;
 /// Requests that are answered at once. One that does not come to its end takes a thread.
 const MOST_REQUESTS: usize = 64;
@@ -169,8 +169,8 @@ impl Drop for Page {
     fn drop(&mut self) {
         self.shared.news().is_over = true;
         self.shared.has_news.notify_all();
-        // The last words are on their way.
-        for _ in 0..50 {
+        // The last words are on their way, for two seconds at most.
+        for _ in 0..200 {
             if self.shared.pages.load(Ordering::Relaxed) == 0 {
                 break;
             }
@@ -183,14 +183,11 @@ impl Drop for Page {
 fn told(bench: &Bench, reports: u64) -> Value {
     let left_out = bench.taps.len().saturating_sub(MOST_TAPS);
     let taps = bench.taps.iter().skip(left_out).map(|tap| {
-        let remedy = tap
-            .remedy
-            .map_or(String::new(), |remedy| format!(". {remedy}"));
         json!({
             "time": tap.time,
             "accepted": tap.rejection.is_none(),
             "overruled": tap.overruled.is_some(),
-            "words": format!("{tap}{remedy}"),
+            "words": tap.to_string(),
         })
     });
     json!({
@@ -210,19 +207,8 @@ fn told(bench: &Bench, reports: u64) -> Value {
 
 /// Time and movement of the channels for the page.
 fn pulse(bench: &Bench) -> Value {
-    let levels = bench.levels.iter().map(|level| {
-        // Three digits: the page draws a strip 20 units high.
-        let largest = level
-            .recent
-            .iter()
-            .copied()
-            .fold(f64::MIN_POSITIVE, f64::max);
-        let recent = level
-            .recent
-            .iter()
-            .map(|swing| (1000.0 * swing / largest).round());
-        json!({ "name": level.name, "recent": recent.collect::<Vec<_>>() })
-    });
+    let levels = bench.levels.iter();
+    let levels = levels.map(|level| json!({ "name": level.name, "recent": level.heights() }));
     json!({ "seconds": bench.seconds, "levels": levels.collect::<Vec<_>>() })
 }
 
@@ -297,8 +283,8 @@ fn permitted(request: &Request, shared: &Shared) -> Option<String> {
 /// Returns what the body of a request asks for.
 fn action_in(request: &mut Request) -> Option<Action> {
     let mut body = Vec::new();
-    let reader = request.as_reader().take(LONGEST_BODY + 1);
-    io::BufReader::new(reader).read_to_end(&mut body).ok()?;
+    let reader = request.as_reader();
+    reader.take(LONGEST_BODY + 1).read_to_end(&mut body).ok()?;
     action_of(&body)
 }
 

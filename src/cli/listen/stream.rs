@@ -257,12 +257,19 @@ impl Stream {
         let mut recorder: Option<Recorder> = None;
         let (mut total, start) = (0_u64, Instant::now());
         let mut arrival = Arrival::new(f64::from(layout.sample_rate));
-        let mut is_turning = false;
+        let (mut is_turning, mut fault) = (false, None);
         loop {
             let is_there = bytes.len() as u64 >= left;
             let count = match is_there {
-                true => 0,
-                false => read(&mut self.input, &mut piece)?,
+                true => Ok(0),
+                false => read(&mut self.input, &mut piece),
+            };
+            let count = match count {
+                Ok(count) => count,
+                Err(cause) => {
+                    fault = Some(cause);
+                    break;
+                }
             };
             total += count as u64;
             if let Some(speed) = self.speed {
@@ -303,7 +310,13 @@ impl Stream {
                     }
                 }
                 let is_first = recorder.bytes() == 0;
-                let is_next = recorder.write(&bytes)?;
+                let is_next = match recorder.write(&bytes) {
+                    Ok(is_next) => is_next,
+                    Err(cause) => {
+                        fault = Some(cause);
+                        break;
+                    }
+                };
                 if is_turning && recorder.bytes() >= enough as u64 {
                     is_turning = false;
                     let _ = report.send(Event::Turned(recorder.path().to_owned()));
@@ -324,6 +337,9 @@ impl Stream {
                 0 => fs::remove_file(path)?,
                 _ => drop(report.send(Event::Turned(path))),
             }
+        }
+        if let Some(fault) = fault {
+            return Err(fault);
         }
         if destination.stop.load(Ordering::Relaxed) {
             return Ok(End::default());

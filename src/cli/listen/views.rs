@@ -120,7 +120,7 @@ impl<'a> Views<'a> {
     }
 
     /// Shows the bench at once.
-    pub(super) fn show_now(&mut self) {
+    fn show_now(&mut self) {
         self.shown = Some(Instant::now());
         let bench = &self.bench;
         self.live.retain_mut(|view| view.show(bench).is_ok());

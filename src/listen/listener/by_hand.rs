@@ -6,8 +6,7 @@ use tapjoint_signal::taps::{REACH, TapsByHand};
 
 /// Decisions by hand that can be taken back. 1000: more than anybody takes, and a bound on memory.
 const MOST_UNDONE: usize = 1000;
-/// Steps in a second to which the time of a tap is rounded that is named by hand. A tenth of a millisecond: far less than
-/// [`REACH`], within which a time names a tap.
+/// Times by hand are rounded to this many steps in a second. 1e4: a tenth of a millisecond is far less than [`REACH`].
 const PER_SECOND: f64 = 1e4;
 
 impl Listener<'_> {

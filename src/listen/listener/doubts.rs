@@ -19,8 +19,7 @@ impl Listener<'_> {
         };
         let swings = responses.iter().map(|response| self.swings[*response]);
         let rises = self.answers.hears(&swings.collect::<Vec<_>>());
-        let is_moving = self.swings[*channel] > 0.0;
-        if !rises || !self.silence.rises_without(*channel, is_moving) {
+        if !rises || !self.silence.rises_without(*channel) {
             return Vec::new();
         }
         let number = channel + 1;

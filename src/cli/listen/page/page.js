@@ -36,7 +36,9 @@
 
   function showTaps() {
     const taps = bench.taps;
-    if (!taps.some((tap) => tap.time === chosen)) chosen = null;
+    // The trigger of a tap may move a little: 50 ms name it.
+    const own = taps.find((tap) => chosen !== null && Math.abs(tap.time - chosen) <= 0.05);
+    chosen = own ? own.time : null;
     byId("taps").replaceChildren(...taps.map((tap) => {
       const item = document.createElement("li");
       item.className = tap.accepted ? (tap.overruled ? "overruled" : "") : "rejected";
@@ -71,20 +73,19 @@
     items(byId("notes"), bench.notes.slice().reverse());
     byId("notes-head").hidden = bench.notes.length === 0;
     showTaps();
+    byId("report").hidden = !bench.report;
     if (bench.report !== report && bench.report > 0) {
-      byId("report").hidden = false;
       byId("report").src = "report?" + bench.report;
     }
     for (const button of document.querySelectorAll("#actions button")) button.disabled = Boolean(bench.ended);
   }
 
-  // Swings of a channel as steps, the newest on the right, over the largest of them.
+  // Swings of a channel in thousandths of the largest, as steps, the newest on the right.
   function outline(swings) {
-    const largest = Math.max(...swings, Number.MIN_VALUE);
     const first = 200 - swings.length;
     let path = "M" + first + " 20";
     swings.forEach((swing, place) => {
-      const height = (20 - 19 * swing / largest).toFixed(1);
+      const height = (20 - 19 * swing / 1000).toFixed(1);
       path += "V" + height + "H" + (first + place + 1);
     });
     return path + "V20Z";

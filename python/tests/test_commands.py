@@ -227,7 +227,10 @@ def regress_a_forked_process_has_threads_of_its_own(bar, records, window):
 def limit_ctrl_c_ends_a_long_call_and_nothing_is_written(cantilever, tmp_path):
     test, out = str(cantilever / "test.toml"), tmp_path / "report"
     code = (
+        "import signal\n"
         "import tapjoint\n"
+        # A job in the background inherits that the signal is ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"test, out = {test!r}, {str(out)!r}\n"
         "tapjoint.identify(test)\n"
         "print('ready', flush=True)\n"

@@ -43,7 +43,7 @@ use target::{Target, asked_for, bare_target, described_target};
 use tempfile::TempDir;
 use views::Views;
 
-/// Record a stream of samples, and judge each tap while you go on tapping.
+/// Record a stream of samples, and judge each tap at once.
 ///
 /// Reads WAV from standard input, or raw samples with --rate, --channels and --format. FILE is the WAV file to be written, or a
 /// test description (.toml). Of a description the first [[recording]] without a file is written. Says after each tap

@@ -61,6 +61,7 @@ fn prop_help_lists_every_command_once_under_a_task() {
     assert!(longest.clone().count() > 10, "the list was found");
     for line in longest {
         assert!(line.chars().count() <= 80, "wider than 80 columns: {line}");
+        assert!(!line.ends_with("..."), "cut off: {line}");
     }
 }
 

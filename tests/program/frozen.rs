@@ -5,7 +5,7 @@
 //! Long lists are shortened to their length and their ends, lists of objects to the details of one. `INSTA_UPDATE=always cargo test --test program frozen` writes the snapshots anew.
 
 use super::golden::assert_snapshot;
-use super::program;
+use super::{commands, program};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
@@ -500,34 +500,10 @@ fn frozen_change_check() {
 #[test]
 fn frozen_help() {
     let folder = tempfile::tempdir().unwrap();
-    let commands = [
-        "",
-        "init",
-        "run",
-        "watch",
-        "inspect",
-        "spectrum",
-        "frf",
-        "identify",
-        "predict",
-        "perturb",
-        "resolution",
-        "export",
-        "plan",
-        "diagnose",
-        "compare",
-        "simulate",
-        "blind-check",
-        "reproduce",
-        "completions",
-        "man",
-    ];
     let mut text = String::new();
-    for command in commands {
-        let arguments: Vec<&str> = [command, "--help"]
-            .into_iter()
-            .filter(|word| !word.is_empty())
-            .collect();
+    let names = commands(folder.path());
+    let of_commands = names.iter().map(|name| vec![name.as_str(), "--help"]);
+    for arguments in std::iter::once(vec!["--help"]).chain(of_commands) {
         writeln!(text, "=== tapjoint {}", arguments.join(" ")).unwrap();
         text.push_str(&put_out(folder.path(), &arguments));
         text.push('\n');

@@ -66,3 +66,15 @@ fn tapjoint(folder: &Path, arguments: &[&str], code: i32) -> String {
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
     String::from_utf8(output.stdout).unwrap()
 }
+
+/// Names of all commands, in the order of the help.
+fn commands(folder: &Path) -> Vec<String> {
+    let help = tapjoint(folder, &["help"], 0);
+    let list = help
+        .lines()
+        .filter_map(|line| line.strip_prefix("  ")?.split_once("  "));
+    let names = list.map(|(name, _)| name);
+    let names = names.filter(|name| !name.is_empty() && !name.starts_with([' ', '-']));
+    let names = names.filter(|name| *name != "help");
+    names.map(str::to_owned).collect()
+}

@@ -1,6 +1,6 @@
 //! No command replaces a file that it reads, a file twice, or a file that somebody else made.
 
-use super::{program, samples, tapjoint};
+use super::{commands, program, samples, tapjoint};
 use assert_cmd::Command;
 use std::collections::BTreeSet;
 use std::fs;
@@ -700,21 +700,14 @@ fn limit_empty_files_devices_and_pipes_are_written_to() {
 
 /// Names of options with a file or a folder, of all commands.
 fn options(place: &Path) -> BTreeSet<(String, String)> {
-    let help = tapjoint(place, &["help"], 0);
-    let commands = help
-        .lines()
-        .filter_map(|line| line.strip_prefix("  ")?.split_once("  "));
-    let commands = commands
-        .map(|(name, _)| name)
-        .filter(|name| !name.is_empty() && !name.starts_with([' ', '-']) && *name != "help");
     let mut found = BTreeSet::new();
-    for command in commands {
-        let help = tapjoint(place, &[command, "--help"], 0);
+    for command in commands(place) {
+        let help = tapjoint(place, &[&command, "--help"], 0);
         for line in help.lines().map(str::trim) {
             let named = line.split_once(" <FILE>").or(line.split_once(" <DIR>"));
             let option = named.and_then(|(option, _)| option.split_whitespace().next_back());
             for option in option.into_iter().filter(|option| option.starts_with("--")) {
-                found.insert((command.to_owned(), option.to_owned()));
+                found.insert((command.clone(), option.to_owned()));
             }
         }
     }

@@ -131,8 +131,15 @@ fn open_joined(
     folder: &Path,
     read: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
+    let whole = ReadSettings {
+        frames: None,
+        ..read.clone()
+    };
     let mut parts = Vec::new();
-    for file in description.files() {
+    for (number, file) in description.files().enumerate() {
+        // The last one may go on growing.
+        let is_last = number == description.more_files.len();
+        let read = if is_last { read } else { &whole };
         let opened = Recording::open(&folder.join(file), read)?;
         parts.push(opened.renamed(file.display().to_string()));
     }
@@ -146,6 +153,7 @@ pub fn described_reading(description: &RecordingDescription) -> ReadSettings {
         time_unit: description.time_unit,
         values: description.values,
         variables: description.variables.clone(),
+        frames: description.frames,
     }
 }
 

@@ -227,6 +227,7 @@ impl RecordingArguments {
             time_unit: self.time_unit,
             values: self.values,
             variables,
+            frames: None,
         }
     }
 

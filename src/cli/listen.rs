@@ -266,7 +266,7 @@ pub(super) fn run(
     let stream = Running::begin(begun.source, begun.names);
     ledger().stop = Some(stream.stopper());
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
-    let mut failed = None;
+    let (mut failed, mut stream_doubts) = (None, Vec::new());
     let (heard, end) = loop {
         let bare = arguments.run.bare();
         let plan = plan_of(described.as_ref(), &target, &bare);
@@ -286,6 +286,9 @@ pub(super) fn run(
             hearing.with_states();
         }
         let mut heard = hearing.listen(&stream, first.take());
+        let file = file_name(&target.file);
+        let doubts = heard.stream_doubts.drain(..);
+        stream_doubts.extend(doubts.map(|doubt| format!("{file}, while it was recorded: {doubt}")));
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
         let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
@@ -299,11 +302,15 @@ pub(super) fn run(
             described.test.recordings[table].by_hand = by_hand;
         }
         (target, first) = (next, Some(file));
+        // They are about the last recording.
+        views.bench.notes.clear();
         views.say(&introduction(arguments, described.as_ref(), &target));
     };
     views.end_screen();
     ledger().restore = None;
-    let end = failed.map_or(end, Err)?;
+    let end = failed.map_or(end, Err).inspect_err(|cause| {
+        views.finish(&format!("The recording has ended with a fault: {cause:#}"));
+    })?;
     if end.rest > 0 {
         terminal.warn(&format!(
             "the stream ended within a frame; its last {} bytes are left out",
@@ -320,8 +327,13 @@ pub(super) fn run(
     if heard.files.len() == target.earlier.len() {
         bail!("{name}: nothing was recorded");
     }
+    // Where there is no report, whoever waits for JSON is told so.
+    let tell = |words: &str| match common.json {
+        Some(_) => terminal.seal(words),
+        None => terminal.say(words),
+    };
     if let Some(words) = split {
-        terminal.say(&words)?;
+        tell(&words)?;
         views.finish(&words);
         return Ok(Outcome::of(heard.accepted > 0));
     }
@@ -329,10 +341,12 @@ pub(super) fn run(
         && let Ok(next) = described_target(file, None, false, None)
     {
         let words = match heard.accepted {
-            0 => format!("no tap of {name} counts: remove the file and record it again\n"),
-            _ => format!("next: {}; start `listen` again\n", asked_for(file, &next)),
+            0 => format!(
+                "no tap of {name} counts, for the reasons above: remove the file and record it again\n"
+            ),
+            _ => format!("next: {}; start listen again\n", asked_for(file, &next)),
         };
-        terminal.say(&words)?;
+        tell(&words)?;
         views.finish(&words);
         return Ok(Outcome::of(heard.accepted > 0));
     }
@@ -350,6 +364,10 @@ pub(super) fn run(
     terminal.say("")?;
     views.finish("The recording has ended, and the test is run.");
     let outcome = once();
+    // The file does not show them, and the answer is only as good as the stream was.
+    for doubt in stream_doubts {
+        terminal.warn(&doubt);
+    }
     views.finish(match outcome {
         Ok(_) => "The recording has ended. The report is written; the terminal names its folder.",
         Err(_) => "The recording has ended. The run has failed; the terminal says why.",

@@ -277,6 +277,8 @@ pub struct RecordingDescription {
     pub poles: Option<Vec<f64>>,
     /// Further files of the same set-up, which follow it.
     pub more_files: Vec<PathBuf>,
+    /// Frames of the last file that are read, while it goes on growing; `None` = all. No key gives it.
+    pub frames: Option<u64>,
     /// Line of the description that names the file.
     pub line: usize,
     /// Free length (m) of the beam in this recording, where the clamp was moved; `None` where it is that of the beam.

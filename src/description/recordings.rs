@@ -349,6 +349,7 @@ pub(super) fn read_recording(
         poles: table.optional("poles", read_poles)?,
         file: files.remove(0),
         more_files: files,
+        frames: None,
         line: named.line,
         // To the micrometre, so that 35 cm and 0.35 m are one length.
         length: length

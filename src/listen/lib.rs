@@ -13,6 +13,6 @@ mod news;
 mod precision;
 mod silence;
 
-pub use listener::{ListenError, ListenSettings, Listener};
+pub use listener::{ListenError, ListenSettings, Listener, Settled};
 pub use news::{JudgedTap, News};
 pub use precision::Precision;

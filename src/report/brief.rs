@@ -77,7 +77,12 @@ pub fn render_progress(document: &Document) -> Vec<String> {
     }
     let mut values = Vec::new();
     for value in &answer.values {
-        values.push(format!("{} {} {}", value.symbol, value.first(), value.unit));
+        values.push(format!(
+            "{} {}\u{a0}{}",
+            value.symbol,
+            value.first(),
+            value.unit
+        ));
     }
     if !values.is_empty() {
         let model = answer.model.as_deref();

@@ -134,6 +134,10 @@ pub(super) struct Progress<'a> {
     pub(super) apart: usize,
     /// Taps that are wanted at least.
     pub(super) wanted: usize,
+    /// Time for which the recording has to go on for the last tap to count in the end (s).
+    pub(super) missing: f64,
+    /// The recording that can follow.
+    pub(super) next: Option<&'a str>,
     /// Half width of the intervals that is wanted (1).
     pub(super) accuracy: Option<f64>,
     /// How narrow the intervals are; `None` where it is not known.
@@ -153,6 +157,13 @@ impl Progress<'_> {
             more => count.push_str(&format!(", {more} do not agree with the others")),
         }
         let (is_enough, why) = match self.wanted.saturating_sub(self.accepted) {
+            0 if self.missing > 0.0 => (
+                false,
+                format!(
+                    "do not end yet: the last record needs {:.1} s more",
+                    self.missing
+                ),
+            ),
             0 => self.why(),
             1 => (false, "1 more is wanted".to_owned()),
             missing => (false, format!("{missing} more are wanted")),
@@ -187,12 +198,14 @@ impl Progress<'_> {
         };
         match precision.can_reach(accuracy) {
             true => (false, format!("go on: {now}, and {wanted} is wanted")),
-            false => (
-                false,
-                format!(
-                    "more taps do not help: {now}, and {wanted} is wanted; the report says what does"
-                ),
-            ),
+            false => {
+                let what = match self.next {
+                    Some(next) => format!("go on with {next}"),
+                    None => "the report says what does".to_owned(),
+                };
+                let why = format!("more taps do not help: {now}, and {wanted} is wanted; {what}");
+                (false, why)
+            }
         }
     }
 }
@@ -213,7 +226,10 @@ pub(super) fn precision_words(precision: &Precision) -> String {
 
 /// "2.3 %".
 fn percent(share: f64) -> String {
-    format!("{} %", crate::report::format::significant(100.0 * share, 2))
+    format!(
+        "{}\u{a0}%",
+        crate::report::format::significant(100.0 * share, 2)
+    )
 }
 
 #[cfg(test)]
@@ -248,18 +264,22 @@ mod tests {
 
     #[test]
     fn regress_words_of_the_advice() {
-        let with_apart = |accepted, apart, accuracy, precision: Option<Precision>| {
+        let with_all = |accepted, apart, missing, next, accuracy, precision: Option<Precision>| {
             let progress = Progress {
                 accepted,
                 apart,
                 wanted: 3,
+                missing,
+                next,
                 accuracy,
                 precision: precision.as_ref(),
             };
             let (is_enough, words) = progress.words();
             format!("{is_enough}: {words}")
         };
-        let words = |accepted, accuracy, precision| with_apart(accepted, 0, accuracy, precision);
+        let words =
+            |accepted, accuracy, precision| with_all(accepted, 0, 0.0, None, accuracy, precision);
+        let next = Some("high.wav");
         let scattered = || precision(1.6, 0.1, true);
         let stuck = || precision(0.1, 1.6, true);
         let open = || precision(0.1, 1.6, false);
@@ -275,14 +295,17 @@ mod tests {
             words(4, Some(0.01), Some(scattered())),
             words(4, Some(0.01), Some(stuck())),
             words(4, Some(0.01), Some(open())),
-            with_apart(2, 1, None, None),
-            with_apart(4, 2, None, None),
+            with_all(2, 1, 0.0, None, None, None),
+            with_all(4, 2, 0.0, None, None, None),
+            with_all(4, 0, 2.34, None, None, None),
+            with_all(2, 0, 2.34, None, None, None),
+            with_all(4, 0, 0.0, next, Some(0.01), Some(stuck())),
             precision_words(&scattered()),
             precision_words(&stuck()),
             precision_words(&open()),
         ];
         assert_eq!(
-            all.join("\n"),
+            all.join("\n").replace('\u{a0}', " "),
             "false: 0 taps count; 3 more are wanted\n\
              false: 1 tap counts; 2 more are wanted\n\
              false: 2 taps count; 1 more is wanted\n\
@@ -298,6 +321,9 @@ mod tests {
              what does\n\
              false: 2 taps count, 1 does not agree with the others; 1 more is wanted\n\
              true: 4 taps count, 2 do not agree with the others; enough\n\
+             false: 4 taps count; do not end yet: the last record needs 2.3 s more\n\
+             false: 2 taps count; 1 more is wanted\n\
+             false: 4 taps count; more taps do not help: Kt is known within 3.1 %, and 1.0 % is wanted; go on with high.wav\n\
              least certain: Kt, within 3.1 %; the next tap makes it about 4.6 % narrower\n\
              least certain: Kt, within 3.1 %; the next tap would bring nothing\n\
              least certain: Kt, whose interval has no end"

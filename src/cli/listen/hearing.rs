@@ -14,7 +14,8 @@ use super::views::Views;
 use crate::listen::{ListenError, ListenSettings, Listener, News, Precision};
 use crate::pipeline::RecordingPlan;
 use crate::recording::GrowingRecording;
-use crate::taps::TapsByHand;
+use crate::taps::{REACH, Rejection, TapsByHand};
+use anyhow::anyhow;
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
@@ -36,6 +37,8 @@ pub(super) struct Heard {
     pub(super) by_hand: Option<TapsByHand>,
     /// True where a decision by hand could not be written into the description.
     pub(super) is_unwritten: bool,
+    /// Doubts about the stream itself, which its file does not show.
+    pub(super) stream_doubts: Vec<String>,
     /// How the stream ended.
     pub(super) ended: anyhow::Result<End>,
     /// The recording that follows in the same stream, and its first file.
@@ -58,8 +61,12 @@ pub(super) struct Hearing<'a, 'v> {
     listener: Option<Listener<'a>>,
     /// How narrow the intervals are by the last state.
     precision: Option<Precision>,
-    /// Taps that do not agree with the others, by the last state.
-    apart: usize,
+    /// Times (s) of the taps that do not agree with the others, by the last state.
+    apart: Vec<f64>,
+    /// Taps that stood, whatever comes, when the results were last asked for.
+    settled: usize,
+    /// Doubts about the stream itself.
+    stream_doubts: Vec<String>,
     files: Vec<PathBuf>,
     /// Why taps are no longer judged.
     fault: Option<ListenError>,
@@ -90,7 +97,9 @@ impl<'a, 'v> Hearing<'a, 'v> {
             views,
             listener: None,
             precision: None,
-            apart: 0,
+            apart: Vec::new(),
+            settled: 0,
+            stream_doubts: Vec::new(),
             files: target.earlier.clone(),
             fault: None,
             is_unwritten: false,
@@ -129,6 +138,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 }
             }
             is_behind = self.catch_up(stream);
+            self.settle();
             // Results meet no fault of the file before the taps do.
             if !is_behind {
                 self.report();
@@ -170,7 +180,10 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 self.turns_to = None;
                 self.views.warn(&words);
             }
-            Event::Doubt(text) => self.take(Ok(vec![News::Doubt(text)])),
+            Event::Doubt(text) => {
+                self.stream_doubts.push(text.clone());
+                self.take(Ok(vec![News::Doubt(text)]));
+            }
             Event::Ended(how) => *ended = Some(how),
         }
         None
@@ -195,7 +208,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             (Ok(growing), Some(listener)) => {
                 // Time and memory of a result grow with the recording.
                 if self.states.take().is_some() {
-                    (self.precision, self.apart) = (None, 0);
+                    (self.precision, self.apart) = (None, Vec::new());
                     let bench = &mut self.views.bench;
                     bench.precision.clear();
                     bench.result.clear();
@@ -251,7 +264,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let mut lines = so_far.lines;
         lines.extend(Some(bench.precision.clone()).filter(|words| !words.is_empty()));
         self.precision = so_far.precision;
-        self.apart = so_far.apart;
+        self.tell_apart(so_far.apart);
         self.advise();
         if before != self.views.bench.advice {
             lines.push(self.views.bench.advice.clone());
@@ -259,6 +272,41 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let screen = self.views.terminal().screen();
         let lines = lines.iter().map(|line| screen.wrapped(line, 2));
         self.views.say(&lines.collect::<String>());
+    }
+
+    /// Names the taps that do not agree with the others, once each.
+    fn tell_apart(&mut self, apart: Vec<(f64, Rejection)>) {
+        let mut news = Vec::new();
+        for (time, why) in &apart {
+            let mut known = self.apart.iter();
+            if !known.any(|other| (other - time).abs() <= REACH) {
+                let text = format!("tap at {time:.2} s is left out of the results: {why}");
+                news.push(News::Doubt(text));
+            }
+        }
+        self.apart = apart.into_iter().map(|(time, _)| time).collect();
+        self.take(Ok(news));
+    }
+
+    /// Follows the record of the last tap until it is long enough to stand when the recording ends.
+    fn settle(&mut self) {
+        let Some(listener) = self.listener.as_ref().filter(|_| self.fault.is_none()) else {
+            return;
+        };
+        let settled = listener.settled();
+        if settled.missing > 0.0 {
+            return self.advise();
+        }
+        if settled.accepted == self.settled {
+            return;
+        }
+        let before = self.views.bench.advice.clone();
+        self.advise();
+        if before != self.views.bench.advice {
+            let text = self.advice_in_lines();
+            self.views.say(&text);
+        }
+        self.ask();
     }
 
     /// Shows, prints and logs what is new. A fault ends the judging, and not the recording.
@@ -269,6 +317,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 let words = "taps are not judged any more, and the recording goes on";
                 let warning = format!("{fault}; {words}");
                 self.fault = Some(fault);
+                self.advise();
                 // The results would meet the same fault.
                 self.states = None;
                 if !self.is_refused() {
@@ -288,7 +337,6 @@ impl<'a, 'v> Hearing<'a, 'v> {
         if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
             self.advise();
             text.push_str(&self.advice_in_lines());
-            self.ask();
         }
         if !text.is_empty() {
             self.views.say(&text);
@@ -308,11 +356,18 @@ impl<'a, 'v> Hearing<'a, 'v> {
 
     /// Renews the advice by the taps so far.
     fn advise(&mut self) {
+        if let Some(fault) = &self.fault {
+            self.views.bench.advice = format!("taps are not judged any more: {fault}");
+            self.views.bench.is_enough = false;
+            return;
+        }
         let listener = self.listener.as_ref();
         let accepted = listener.map_or(0, Listener::accepted);
         let progress = Progress {
-            accepted: accepted.saturating_sub(self.apart),
-            apart: self.apart,
+            accepted: accepted.saturating_sub(self.apart.len()),
+            apart: self.apart.len(),
+            missing: listener.map_or(0.0, |listener| listener.settled().missing),
+            next: self.views.bench.next.as_deref(),
             wanted: self.arguments.taps,
             accuracy: self.arguments.accuracy.filter(|_| self.states.is_some()),
             precision: self.precision.as_ref(),
@@ -338,10 +393,16 @@ impl<'a, 'v> Hearing<'a, 'v> {
 
     /// Asks for the results so far.
     fn ask(&mut self) {
-        if let (Some(states), Some(listener)) = (&mut self.states, &self.listener) {
+        let Some(listener) = &self.listener else {
+            return;
+        };
+        let settled = listener.settled();
+        self.settled = settled.accepted;
+        if let Some(states) = &mut self.states {
             states.ask(Question {
                 files: self.files.clone(),
-                accepted: listener.accepted(),
+                frames: settled.frames,
+                accepted: settled.accepted,
                 by_hand: listener.by_hand().clone(),
                 wants_page: self.views.shows_report(),
             });
@@ -461,8 +522,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
         if let Some(listener) = self.listener.as_ref().filter(|_| !is_refused) {
             accepted = listener.accepted();
             by_hand = Some(listener.by_hand().clone()).filter(|own| *own != self.plan.by_hand());
+            let heard = match self.fault {
+                Some(_) => "judged up to ",
+                None => "",
+            };
             self.views.say(&format!(
-                "{}: {:.1} s, {accepted} of {} taps count\n",
+                "{}: {heard}{:.1} s, taps that count: {accepted} of {}\n",
                 file_name(&self.target.file),
                 listener.seconds(),
                 listener.taps(),
@@ -473,8 +538,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
             accepted,
             by_hand,
             is_unwritten: self.is_unwritten,
+            stream_doubts: self.stream_doubts,
             ended: match self.fault {
-                Some(fault) => Err(fault.into()),
+                Some(fault) if is_refused => Err(fault.into()),
+                Some(fault) => Err(anyhow!(
+                    "{fault}; the recording is kept: rename or remove its file, and record it again"
+                )),
                 None => ended,
             },
             turned,

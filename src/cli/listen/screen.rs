@@ -9,7 +9,7 @@ use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, pol
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::{Line, Span, Text};
-use ratatui::widgets::{Block, List, ListItem, ListState, Paragraph, Sparkline, Wrap};
+use ratatui::widgets::{Block, Borders, List, ListItem, ListState, Paragraph, Sparkline};
 use ratatui::{DefaultTerminal, Frame};
 use std::io;
 use std::time::Duration;
@@ -18,8 +18,16 @@ use std::time::Duration;
 const MOST_LEVELS: usize = 4;
 /// Width of the names of channels (characters).
 const NAME: u16 = 12;
-/// Rows of a channel's movement.
+/// Rows of a channel's movement, on a terminal that is tall.
 const LEVEL_ROWS: u16 = 2;
+/// Rows from which a terminal is tall.
+const TALL: u16 = 30;
+/// Rows for taps and results, at least.
+const LEAST_MIDDLE: u16 = 6;
+/// Rows of the advice, and of the newest doubt, at most.
+const MOST_WORDS: usize = 3;
+/// Rows to which a long sentence is cut before others are left out.
+const LEAST_LINES: usize = 2;
 /// Width from which results stand beside the taps (characters); below they stand under them.
 const WIDE: u16 = 110;
 
@@ -152,32 +160,54 @@ impl Chosen {
     }
 }
 
-/// Draws the bench.
+/// Draws the bench. What a small terminal cannot hold is marked; advice, the newest doubt and keys always stand.
 fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
+    let area = frame.area();
     let shown = bench.levels.len().min(MOST_LEVELS) as u16;
-    let [head, levels, middle, advice, keys] = Layout::vertical([
+    let level_rows = if area.height < TALL { 1 } else { LEVEL_ROWS };
+    let screen = Screen::of(usize::from(area.width));
+    let newest = bench.notes.back().map(|note| format!("! {note}"));
+    let note = fitted(screen, newest.as_slice(), MOST_WORDS);
+    let advice = fitted(screen, std::slice::from_ref(&bench.advice), MOST_WORDS);
+    let page = bench.address.as_ref();
+    let page = page.map(|address| format!("page: {address}"));
+    let [
+        head,
+        levels,
+        middle,
+        note_area,
+        advice_area,
+        page_area,
+        keys,
+    ] = Layout::vertical([
         Constraint::Length(1),
-        Constraint::Length(LEVEL_ROWS * shown),
-        Constraint::Min(6),
-        Constraint::Length(3),
+        Constraint::Length(level_rows * shown),
+        Constraint::Min(LEAST_MIDDLE),
+        Constraint::Length(note.len() as u16),
+        Constraint::Length(advice.len() as u16),
+        Constraint::Length(u16::from(page.is_some())),
         Constraint::Length(1),
     ])
-    .areas(frame.area());
+    .areas(area);
     draw_head(frame, head, bench);
     for (row, level) in bench.levels.iter().take(MOST_LEVELS).enumerate() {
         let area = Rect {
-            y: levels.y + LEVEL_ROWS * row as u16,
-            height: LEVEL_ROWS,
+            y: levels.y + level_rows * row as u16,
+            height: level_rows,
             ..levels
         };
         draw_level(frame, area.intersection(levels), level);
     }
-    let beside = Constraint::Percentage(50);
-    let parts = match middle.width >= WIDE {
-        true => Layout::horizontal([beside, beside]),
-        false => Layout::vertical([beside, beside]),
+    let [taps, results] = match middle.width >= WIDE {
+        true => Layout::horizontal([Constraint::Percentage(50); 2]).areas(middle),
+        // With few taps the results get more.
+        false => {
+            let lines = bench.taps.iter().map(|tap| tap_text(tap, screen).len() + 1);
+            let rows = lines.sum::<usize>().min(usize::from(middle.height) / 2);
+            let taps = Constraint::Length((rows as u16).max(3));
+            Layout::vertical([taps, Constraint::Min(0)]).areas(middle)
+        }
     };
-    let [taps, results] = parts.areas(middle);
     draw_taps(frame, taps, bench, chosen);
     draw_results(frame, results, bench);
     let colour = if bench.is_enough {
@@ -185,14 +215,48 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     } else {
         Color::Yellow
     };
-    let page = bench.address.as_ref();
-    let page = page.map_or(String::new(), |address| format!("page: {address}"));
-    let words = Text::from(vec![Line::from(bench.advice.as_str()), Line::from(page)]);
-    let words = Paragraph::new(words)
-        .style(Style::new().fg(colour).add_modifier(Modifier::BOLD))
-        .wrap(Wrap { trim: true });
-    frame.render_widget(words, advice);
+    let words = Style::new().fg(colour).add_modifier(Modifier::BOLD);
+    frame.render_widget(Paragraph::new(text_of(note)).yellow(), note_area);
+    frame.render_widget(Paragraph::new(text_of(advice)).style(words), advice_area);
+    frame.render_widget(Line::from(page.unwrap_or_default()), page_area);
     frame.render_widget(key_line(bench), keys);
+}
+
+/// The lines of sentences, so many at most. Long sentences are cut first, and the last line says that something is missing.
+fn fitted(screen: Screen, sentences: &[String], rows: usize) -> Vec<String> {
+    let wrapped = sentences.iter().map(|text| screen.wrapped(text, 2));
+    let mut all: Vec<Vec<String>> = wrapped
+        .map(|text| text.lines().map(str::to_owned).collect())
+        .collect();
+    while all.iter().map(Vec::len).sum::<usize>() > rows
+        && let Some(longest) = all.iter_mut().max_by_key(|lines| lines.len())
+        && longest.len() > LEAST_LINES
+    {
+        longest.pop();
+        if let Some(last) = longest.last_mut() {
+            mark(last, screen.columns());
+        }
+    }
+    let mut lines = all.concat();
+    if lines.len() > rows {
+        lines.truncate(rows);
+        if let Some(last) = lines.last_mut() {
+            mark(last, screen.columns());
+        }
+    }
+    lines
+}
+
+/// Ends a line of at most so many columns with an ellipsis.
+fn mark(line: &mut String, columns: usize) {
+    if !line.ends_with('\u{2026}') {
+        let most = columns.saturating_sub(2);
+        *line = line.chars().take(most).collect::<String>() + " \u{2026}";
+    }
+}
+
+fn text_of(lines: Vec<String>) -> Text<'static> {
+    Text::from(lines.into_iter().map(Line::from).collect::<Vec<_>>())
 }
 
 fn draw_head(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
@@ -218,7 +282,7 @@ fn draw_level(frame: &mut Frame<'_>, area: Rect, level: &Level) {
 }
 
 fn draw_taps(frame: &mut Frame<'_>, area: Rect, bench: &Bench, chosen: &Chosen) {
-    let block = Block::bordered().title(" taps ");
+    let block = Block::new().borders(Borders::TOP).title(" taps ");
     let columns = usize::from(block.inner(area).width).saturating_sub(2);
     // Of many taps those about the chosen one: laying out all of them takes long.
     let place = chosen.place(bench).unwrap_or_default();
@@ -228,63 +292,66 @@ fn draw_taps(frame: &mut Frame<'_>, area: Rect, bench: &Bench, chosen: &Chosen) 
         .iter()
         .skip(first)
         .take(2 * usize::from(area.height));
-    let items = shown.map(|tap| ListItem::new(tap_text(tap, columns)));
+    let items = shown.map(|tap| {
+        let colour = match (&tap.rejection, &tap.overruled) {
+            (Some(_), _) => Color::Red,
+            (None, Some(_)) => Color::Yellow,
+            (None, None) => Color::Green,
+        };
+        ListItem::new(text_of(tap_text(tap, Screen::of(columns))).fg(colour))
+    });
     let list = List::new(items).block(block).highlight_symbol("> ");
     let mut state =
         ListState::default().with_selected(chosen.place(bench).map(|place| place - first));
     frame.render_stateful_widget(list, area, &mut state);
 }
 
-/// A tap in lines of so many columns.
-fn tap_text(tap: &JudgedTap, columns: usize) -> Text<'static> {
-    let words = format!("{:.2} s {tap}", tap.time);
-    let colour = match (&tap.rejection, &tap.overruled) {
-        (Some(_), _) => Color::Red,
-        (None, Some(_)) => Color::Yellow,
-        (None, None) => Color::Green,
-    };
-    let lines = Screen::of(columns).wrapped(&words, 2);
-    let lines = lines
-        .lines()
-        .map(|line| Line::from(line.to_owned()).fg(colour));
-    Text::from(lines.collect::<Vec<_>>())
+/// A tap in lines.
+fn tap_text(tap: &JudgedTap, screen: Screen) -> Vec<String> {
+    let words = screen.wrapped(&format!("{:.2} s {tap}", tap.time), 2);
+    words.lines().map(str::to_owned).collect()
 }
 
 fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
-    let block = Block::bordered().title(" so far ");
-    let screen = Screen::of(usize::from(block.inner(area).width));
-    let mut lines = Vec::new();
-    if bench.result.is_empty() {
-        lines.push(Line::from("no result yet").dim());
+    let block = Block::new().borders(Borders::TOP).title(" results ");
+    let inner = block.inner(area);
+    let (screen, rows) = (
+        Screen::of(usize::from(inner.width)),
+        usize::from(inner.height),
+    );
+    let mut sentences = bench.result.clone();
+    if sentences.is_empty() {
+        sentences.push("none yet".to_owned());
     }
-    let precision = Some(&bench.precision).filter(|words| !words.is_empty());
-    for sentence in bench.result.iter().chain(precision) {
-        let wrapped = screen.wrapped(sentence, 2);
-        lines.extend(wrapped.lines().map(|line| Line::from(line.to_owned())));
+    if !bench.precision.is_empty() {
+        sentences.push(bench.precision.clone());
     }
-    // The newest doubt first: the area may be too small for all.
-    for note in bench.notes.iter().rev() {
-        let wrapped = screen.wrapped(&format!("! {note}"), 2);
-        lines.extend(
-            wrapped
-                .lines()
-                .map(|line| Line::from(line.to_owned()).yellow()),
-        );
-    }
-    frame.render_widget(Paragraph::new(lines).block(block), area);
+    let results = fitted(screen, &sentences, rows);
+    // The newest doubt stands above the advice.
+    let earlier = bench.notes.iter().rev().skip(1);
+    let earlier: Vec<String> = earlier.map(|note| format!("! {note}")).collect();
+    let doubts = match rows.saturating_sub(results.len()) {
+        0 => Vec::new(),
+        rest => fitted(screen, &earlier, rest),
+    };
+    let mut text = text_of(results);
+    text.extend(doubts.into_iter().map(|line| Line::from(line).yellow()));
+    frame.render_widget(Paragraph::new(text).block(block), area);
 }
 
 fn key_line(bench: &Bench) -> Line<'static> {
     let mut keys = vec![
-        ("up/down", "choose".to_owned()),
         ("a", "accept".to_owned()),
         ("r", "reject".to_owned()),
         ("u", "undo".to_owned()),
         ("s", "stop".to_owned()),
     ];
     if let Some(next) = &bench.next {
-        keys.push(("n", format!("next: {next}")));
+        // Its place is in the advice of the terminal's lines and in the title to come.
+        let name = next.split(", ").next().unwrap_or(next);
+        keys.push(("n", format!("next: {name}")));
     }
+    keys.push(("up/down", "choose".to_owned()));
     let spans = keys.into_iter().flat_map(|(key, what)| {
         [
             Span::from(format!(" {key} ")).reversed(),

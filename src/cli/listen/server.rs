@@ -215,7 +215,10 @@ fn pulse(bench: &Bench) -> Value {
 /// Answers a request. One that comes from elsewhere, or without the token, learns nothing.
 fn answer(mut request: Request, shared: &Arc<Shared>) {
     let Some(path) = permitted(&request, shared) else {
-        let _ = request.respond(plain(403, "This page belongs to another address."));
+        let _ = request.respond(plain(
+            403,
+            "The address is not complete, or it belongs to another recording: copy all of it.",
+        ));
         return;
     };
     let path = path.split('?').next().unwrap_or_default().to_owned();

@@ -9,7 +9,7 @@ use crate::pipeline::{
     BareSettings, IdentifySettings, analysis_of_bare, diagnose_test, measure_bare_file,
 };
 use crate::report::{document_of, gap_section, render_first_screen, render_progress};
-use crate::taps::{Rejection, Tap, TapsByHand};
+use crate::taps::{Rejection, TapsByHand};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -82,6 +82,7 @@ impl Subject {
                 }
                 recording.more_files = files.collect::<Result<_, _>>()?;
                 recording.by_hand = question.by_hand.clone();
+                recording.frames = Some(question.frames);
                 let mut analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
                 // By the name that the description gives it.
                 if let Some(own) = analysis.recordings.get_mut(*table) {
@@ -95,7 +96,10 @@ impl Subject {
             Self::Bare(settings) => {
                 settings.by_hand = question.by_hand.clone();
                 let mut measured = Vec::new();
-                for file in &question.files {
+                for (number, file) in (1..).zip(&question.files) {
+                    // Only the last one goes on growing.
+                    let is_last = number == question.files.len();
+                    settings.read.frames = Some(question.frames).filter(|_| is_last);
                     measured.push(measure_bare_file(file, settings, &())?);
                 }
                 let analysis = analysis_of_bare(measured[0].file.clone(), measured);
@@ -105,16 +109,19 @@ impl Subject {
                 )
             }
         };
-        let taps = recording.iter().flat_map(|own| &own.measurement.taps.taps);
-        let is_apart = |tap: &&Tap| matches!(tap.rejection, Some(Rejection::Inconsistent { .. }));
-        let apart = taps.filter(is_apart).count();
+        let mut apart = Vec::new();
+        for tap in recording.iter().flat_map(|own| &own.measurement.taps.taps) {
+            if let Some(why @ Rejection::Inconsistent { .. }) = &tap.rejection {
+                apart.push((tap.time, why.clone()));
+            }
+        }
         // With the picture of the recording that goes on.
         let recording = recording.filter(|_| question.wants_page);
         let first_screen = recording.map(|own| render_first_screen(&document, &[own]));
         Ok(SoFar {
             lines: render_progress(&document),
+            precision: Precision::of(&document, question.accepted.saturating_sub(apart.len())),
             apart,
-            precision: Precision::of(&document, question.accepted.saturating_sub(apart)),
             first_screen: first_screen.transpose()?,
         })
     }
@@ -124,8 +131,8 @@ impl Subject {
 pub(super) struct SoFar {
     /// In a few sentences.
     pub(super) lines: Vec<String>,
-    /// Taps of the recording that count by themselves, but do not agree with the others.
-    pub(super) apart: usize,
+    /// Taps of the recording that count by themselves, but do not agree with the others: times (s) and reasons.
+    pub(super) apart: Vec<(f64, Rejection)>,
     /// How narrow the intervals are; `None` without any.
     pub(super) precision: Option<Precision>,
     /// The first screen of a report on it; `None` where no page is served.
@@ -137,7 +144,9 @@ pub(super) struct SoFar {
 pub(super) struct Question {
     /// Files of the recording.
     pub(super) files: Vec<PathBuf>,
-    /// Taps that count.
+    /// Frames of the last file that are looked at: what follows is not judged yet.
+    pub(super) frames: u64,
+    /// Taps that count in them.
     pub(super) accepted: usize,
     /// Taps that are accepted or rejected by hand.
     pub(super) by_hand: TapsByHand,

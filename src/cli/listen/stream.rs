@@ -364,16 +364,29 @@ impl Stream {
         bytes: &mut Vec<u8>,
         destination: &Destination,
     ) -> anyhow::Result<Option<(PcmLayout, Option<u64>)>> {
-        if let Some(layout) = self.layout.take() {
-            return Ok(Some((layout, None)));
-        }
-        let mut piece = vec![0; PIECE];
+        // "RIFF", the length, "WAVE".
+        const HEAD: usize = 12;
+        let mut piece = vec![0; if self.layout.is_some() { HEAD } else { PIECE }];
         loop {
             let count = read(&mut self.input, &mut piece)?;
             if destination.stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
             bytes.extend_from_slice(&piece[..count]);
+            if self.layout.is_some() && bytes.len() < HEAD && count > 0 {
+                continue;
+            }
+            if let Some(layout) = self.layout.take() {
+                let is_wav = matches!(bytes.get(..4), Some(b"RIFF" | b"RIFX" | b"RF64"))
+                    && bytes.get(8..HEAD) == Some(b"WAVE");
+                if is_wav {
+                    bail!(
+                        "the stream is WAV, and --rate, --channels and --format are for raw samples; leave them out, \
+                         or record raw samples (arecord -t raw)"
+                    );
+                }
+                return Ok(Some((layout, None)));
+            }
             if let Some(head) = PcmLayout::of_wav(bytes)? {
                 bytes.drain(..head.length);
                 return Ok(Some((head.layout, head.data_bytes)));

@@ -115,7 +115,9 @@ pub(super) fn bare_target(
     match (path.exists(), is_resumed) {
         (true, true) if !is_played => resumed(None, vec![path.to_owned()], Vec::new()),
         (true, false) if !is_played => {
-            bail!("{shown}: is there already; give another name, or go on with it by --resume")
+            bail!(
+                "{shown}: is there already, and no recording is replaced, not even with --force; give another name, or go on with it by --resume"
+            )
         }
         _ => Ok(Target {
             table: None,

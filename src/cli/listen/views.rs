@@ -154,6 +154,9 @@ impl<'a> Views<'a> {
     /// Says on all views what became of the recording.
     pub(super) fn finish(&mut self, words: &str) {
         self.bench.ended = Some(words.to_owned());
+        if let Some(what) = self.bench.title.strip_prefix("recording ") {
+            self.bench.title = format!("recorded {what}");
+        }
         self.show_now();
     }
 }

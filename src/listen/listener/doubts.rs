@@ -48,12 +48,16 @@ impl Listener<'_> {
         news
     }
 
-    /// Returns the doubts about a recording and its taps of a kind that was not reported yet.
+    /// Returns the doubts about a recording, its channels in use and its taps of a kind that was not reported yet.
     pub(super) fn new_doubts(&mut self, found: &TapsSoFar, is_growing: bool) -> Vec<News> {
         let mut news = Vec::new();
         let recording = &found.recording;
         let parts = recording.parts().map(|(_, part)| part.warnings());
         for warning in recording.warnings().into_iter().chain(parts.flatten()) {
+            let is_used = |channel| found.names.iter().any(|(used, _)| used + 1 == channel);
+            if !warning.channel().is_none_or(is_used) {
+                continue;
+            }
             // Its numbers move from look to look.
             let kind = (warning.code(), warning.channel());
             if !self.doubts.contains(&kind) {

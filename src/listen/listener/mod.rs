@@ -49,6 +49,17 @@ pub struct ListenSettings {
     pub earlier: Vec<Recording>,
 }
 
+/// What stands of a recording that goes on. It changes where later taps show that earlier ones were too weak or too close.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settled {
+    /// Taps that count, even if the recording ended now.
+    pub accepted: usize,
+    /// Frames of the file that grows which hold their records.
+    pub frames: u64,
+    /// Time for which the recording has to go on for the last tap to count as well (s).
+    pub missing: f64,
+}
+
 /// A tap that was reported.
 #[derive(Debug, Clone, PartialEq)]
 struct Reported {
@@ -89,6 +100,8 @@ pub struct Listener<'a> {
     swings: Vec<f64>,
     /// Frame at which the record of the last tap has ended, if no other tap comes first.
     due: Option<u64>,
+    /// Frame before which that record has not begun, until a look has found it.
+    begun: Option<u64>,
     reported: Vec<Reported>,
     /// Code and channel of the doubts that were reported.
     doubts: Vec<(&'static str, Option<usize>)>,
@@ -120,6 +133,7 @@ impl<'a> Listener<'a> {
             silence: Silence::default(),
             memo: TapMemo::default(),
             due: None,
+            begun: None,
             reported: Vec::new(),
             doubts: Vec::new(),
             remarks: Vec::new(),
@@ -157,13 +171,15 @@ impl<'a> Listener<'a> {
         let mut news = self.silent_hammer(now);
         // The next tap ends the record of the one before.
         if is_over || hears && self.due.is_some() {
-            self.due = None;
+            (self.due, self.begun) = (None, None);
             news.extend(self.look(true)?);
             news.extend(self.still_responses());
         }
         if hears {
             self.silence.begin();
             self.due = Some(now + self.record_frames());
+            // The alarm comes up to two steps after the trigger; the record begins a little before it.
+            self.begun = Some(now.saturating_sub(3 * self.step));
         }
         Ok(Some(news))
     }
@@ -196,6 +212,7 @@ impl<'a> Listener<'a> {
         self.growing = next;
         // The record of a tap may end in the next file.
         self.due = self.due.map(|_| self.record_frames());
+        self.begun = self.begun.map(|_| 0);
         Ok(news)
     }
 
@@ -209,6 +226,37 @@ impl<'a> Listener<'a> {
             (name.as_str(), swing.unwrap_or_default())
         });
         levels.collect()
+    }
+
+    /// Returns how much of the recording stands, even if it ended now.
+    pub fn settled(&self) -> Settled {
+        let mut settled = Settled {
+            accepted: self.accepted(),
+            frames: self.begun.unwrap_or(self.growing.frames()),
+            missing: 0.0,
+        };
+        let Some((found, last)) = self
+            .latest
+            .as_ref()
+            .and_then(|found| found.taps.taps.last().map(|last| (found, last)))
+        else {
+            return settled;
+        };
+        let rate = self.growing.sample_rate();
+        let reported = self.reported.last();
+        let reported = reported.filter(|reported| reported.time == last.time);
+        let ends = last.record.start as f64 / rate + found.taps.last_needs;
+        settled.missing = match reported {
+            Some(reported) if reported.rejection.is_some() => 0.0,
+            Some(_) => (ends - self.start() - settled.frames as f64 / rate).max(0.0),
+            None => 0.0,
+        };
+        if reported.is_none() || settled.missing > 0.0 {
+            let earlier = self.settings.earlier.iter().map(Recording::frames);
+            settled.frames = last.record.start.saturating_sub(earlier.sum());
+            settled.accepted -= usize::from(reported.is_some());
+        }
+        settled
     }
 
     /// Returns how far the taps excite the structure in the mean, and the end of the stated band (Hz), where they do not reach
@@ -301,10 +349,10 @@ impl<'a> Listener<'a> {
             }
             let has_ended = !(is_growing && is_last);
             match before {
-                None => news.push(News::Tap(judged(&found, tap, has_ended)?)),
+                None => news.push(News::Tap(self.judged(&found, tap, has_ended)?)),
                 // Numbers in the reason move with every tap.
                 Some(before) if before.rejection.is_none() != tap.accepted() => {
-                    news.push(News::Revised(judged(&found, tap, has_ended)?));
+                    news.push(News::Revised(self.judged(&found, tap, has_ended)?));
                 }
                 Some(_) => {}
             }
@@ -344,26 +392,35 @@ impl<'a> Listener<'a> {
         // The alarm comes up to two steps after the trigger.
         found.recording.duration() - tap.time >= record - 2.0 * STEP
     }
-}
 
-/// A tap in the words of a listener.
-fn judged(found: &TapsSoFar, tap: &Tap, has_ended: bool) -> Result<JudgedTap, RecordingError> {
-    let remaining = match tap.accepted() {
-        true => remaining(found, tap)?,
-        false => None,
-    };
-    Ok(JudgedTap {
-        seconds: tap.frames() as f64 / found.recording.sample_rate(),
-        has_ended,
-        time: tap.time,
-        peak: tap.peak,
-        unit: found.peak_unit.clone(),
-        pulse: tap.pulse,
-        remaining,
-        rejection: tap.rejection.clone(),
-        overruled: tap.overruled.clone(),
-        remedy: tap.rejection.as_ref().and_then(remedy_of),
-    })
+    /// A tap in the words of a listener.
+    fn judged(
+        &self,
+        found: &TapsSoFar,
+        tap: &Tap,
+        has_ended: bool,
+    ) -> Result<JudgedTap, RecordingError> {
+        let remaining = match tap.accepted() {
+            true => remaining(found, tap)?,
+            false => None,
+        };
+        let mut by_hand = self.by_hand.accept.iter();
+        let is_by_hand = by_hand.any(|time| (time - tap.time).abs() <= REACH);
+        let overload = tap.overload.filter(|_| tap.accepted() && is_by_hand);
+        let overruled = tap.overruled.clone();
+        Ok(JudgedTap {
+            seconds: tap.frames() as f64 / found.recording.sample_rate(),
+            has_ended,
+            time: tap.time,
+            peak: tap.peak,
+            unit: found.peak_unit.clone(),
+            pulse: tap.pulse,
+            remaining,
+            rejection: tap.rejection.clone(),
+            overruled: overruled.or(overload.map(Rejection::Overload)),
+            remedy: tap.rejection.as_ref().and_then(remedy_of),
+        })
+    }
 }
 
 /// Amplitude at the end of a tap's record over the largest one (1), of the response that keeps most; `None` where all have

@@ -288,6 +288,63 @@ fn prop_decisions_by_hand_change_their_own_tap_and_can_be_taken_back() {
 }
 
 #[test]
+fn prop_what_is_settled_stands_if_the_recording_ends_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("taps.wav");
+    let bare = bare(1);
+    // The third ends the record of the second a little early, and the fourth is a double hit.
+    let hits = [
+        (0.8, 1.0),
+        (3.0, 1.1),
+        (4.9, 1.0),
+        (6.5, 1.0),
+        (6.55, 0.4),
+        (9.0, 0.9),
+    ];
+    let (listener, _) = listened(&samples(12.0, &hits), &path, &bare);
+    drop(listener);
+    let growing = GrowingRecording::open(&path).unwrap();
+    let mut listener = Listener::new(growing, RecordingPlan::Bare(&bare), settings());
+    let mut waits = Vec::new();
+    while listener.step().unwrap().is_some() {
+        let settled = listener.settled();
+        if settled.missing > 0.0 {
+            waits.push(settled.missing);
+        }
+        if listener.taps() == 0 {
+            continue;
+        }
+        let read = ReadSettings {
+            frames: Some(settled.frames),
+            ..ReadSettings::default()
+        };
+        let ended = Recording::open(&path, &read).unwrap();
+        assert_eq!(ended.frames(), settled.frames);
+        let found = taps_so_far(
+            ended,
+            &RecordingPlan::Bare(&bare),
+            &TapsByHand::default(),
+            false,
+            &mut TapMemo::default(),
+        );
+        let taps = found.unwrap().taps.taps;
+        let accepted = taps.iter().filter(|tap| tap.accepted()).count();
+        assert_eq!(
+            accepted,
+            settled.accepted,
+            "{settled:?}, {:.2} s",
+            listener.seconds()
+        );
+    }
+    // From its verdict after 1 s to four fifths of the shortest record before it, of 1.7 to 2.2 s.
+    assert!(!waits.is_empty());
+    assert!(
+        waits.iter().all(|missing| (0.0..0.8).contains(missing)),
+        "{waits:?}"
+    );
+}
+
+#[test]
 fn recover_channels_from_which_nothing_comes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("taps.wav");

@@ -212,7 +212,9 @@ pub fn remedy_of(rejection: &Rejection) -> Option<&'static str> {
         Rejection::DoubleHit { .. } => Some(Check::DoubleHit.remedy()),
         Rejection::Overload(_) => Some(Check::Overload.remedy()),
         Rejection::TooWeak { .. } => Some(Check::WeakTap.remedy()),
-        Rejection::NextTooSoon { .. } => Some(Check::Decay.remedy()),
+        Rejection::NextTooSoon { .. } => {
+            Some("Leave more time between taps, or give a smaller block.")
+        }
         Rejection::NoResponse => {
             Some("If it was no tap, do nothing. Otherwise check the sensors and their cables.")
         }

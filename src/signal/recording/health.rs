@@ -268,14 +268,15 @@ impl ChannelHealth {
         let (mean, peak) = (self.mean, self.peak);
         if self.constant {
             let problem = format!(
-                "every sample is {mean}; probably nothing was connected; check the cable and the channel numbers"
+                "every sample is {}; probably nothing was connected; check the cable and the channel numbers",
+                short(mean)
             );
             return vec![("constant-channel", problem)];
         }
         let mut doubts = Vec::new();
         if let Some(first) = self.first_full_scale {
             let problem = format!(
-                "{} samples at full scale, the first at {:.6} s; the input was probably overloaded; lower the gain or tap more softly",
+                "samples at full scale: {}, the first at {:.6} s; the input was probably overloaded; lower the gain or tap more softly",
                 self.full_scale_samples,
                 first as f64 / sample_rate
             );
@@ -283,9 +284,10 @@ impl ChannelHealth {
         }
         if let Some(EqualRun { start, len, value }) = self.flat_tops.first() {
             let problem = format!(
-                "{} flat tops at its extreme level, the first at {:.6} s ({len} equal samples at {value}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
+                "flat tops at its extreme level: {}, the first at {:.6} s ({len} equal samples at {}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
                 self.flat_top_count,
-                *start as f64 / sample_rate
+                *start as f64 / sample_rate,
+                short(*value)
             );
             doubts.push(("flat-tops", problem));
         }
@@ -293,21 +295,22 @@ impl ChannelHealth {
             .rails
             .iter()
             .flatten()
-            .map(|rail| format!("{rail:.4e}"))
+            .map(|rail| short(*rail).to_string())
             .collect();
         if self.flat_tops.is_empty() && self.first_full_scale.is_none() && !rails.is_empty() {
             let problem = format!(
-                "single samples pile up at its extreme level {}; an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
+                "many of its extreme samples are exactly {}; an amplifier or sensor was probably overloaded; lower the gain or tap more softly",
                 rails.join(" and ")
             );
             doubts.push(("flat-tops", problem));
         }
         if let Some(EqualRun { start, len, value }) = self.dropped.first() {
             let problem = format!(
-                "{} runs of repeated samples inside the moving signal, {} samples in all, the first at {:.6} s ({len} samples of {value}); the recorder probably lost data; leave these taps out or record again",
+                "runs of repeated samples inside the moving signal: {} with {} samples in all, the first at {:.6} s ({len} samples of {}); the recorder probably lost data; leave these taps out or record again",
                 self.dropout_count,
                 self.dropped_samples,
-                *start as f64 / sample_rate
+                *start as f64 / sample_rate,
+                short(*value)
             );
             doubts.push(("dropped-samples", problem));
         }

@@ -86,6 +86,8 @@ pub struct ReadSettings {
     pub values: Option<ValueColumns>,
     /// Variables of a MATLAB file. Without them opening it is an error that lists what there is.
     pub variables: Variables,
+    /// Frames of a WAV file that are read, so that one that goes on growing has an end. Default: all.
+    pub frames: Option<u64>,
 }
 
 impl ReadSettings {

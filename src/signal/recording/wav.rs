@@ -37,7 +37,8 @@ pub(super) fn open_wav(
     settings: &ReadSettings,
 ) -> Result<Recording, RecordingError> {
     let mut warnings = Vec::new();
-    let source = WavSource::open(path, &file, &mut warnings)?;
+    let mut source = WavSource::open(path, &file, &mut warnings)?;
+    source.frames = settings.frames.unwrap_or(u64::MAX).min(source.frames);
     let (sample_rate, frames) = (f64::from(source.sample_rate), source.frames);
     warnings.extend(settings.ignored_rate(sample_rate));
     let format = source.format();

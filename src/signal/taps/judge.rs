@@ -217,23 +217,24 @@ fn overload(
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
 /// record sets its length. `lasts` are the last taps of the files, which may be cut off. The record of the tap `going_on`
-/// has not ended.
+/// has not ended. Returns the length (s) from which on it counts; 0 without such a tap.
 pub(super) fn reject_short(
     taps: &mut [Tap],
     lasts: &[usize],
     going_on: Option<usize>,
     rate: f64,
     wanted: Option<f64>,
-) {
+) -> f64 {
     let ended = taps.iter().enumerate();
     let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
     let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
     let typical = median(&mut lengths);
     let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
+    let mut least = SHORT_OF_MEDIAN * needed;
     for (index, tap) in taps.iter_mut().enumerate() {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
+        if tap.accepted() && Some(index) != going_on && available <= least {
             tap.rejection = Some(if let Some(overload) = tap.overload {
                 Rejection::Overload(overload)
             } else if lasts.contains(&index) {
@@ -251,6 +252,9 @@ pub(super) fn reject_short(
         .map(|(_, tap)| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
+    if shortest.is_finite() {
+        least = least.max(CUT_OF_SHORTEST * needed);
+    }
     for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
         let tap = &mut taps[last];
         let available = tap.frames() as f64 / rate;
@@ -261,5 +265,9 @@ pub(super) fn reject_short(
         {
             tap.rejection = Some(Rejection::CutOff { available, needed });
         }
+    }
+    match going_on {
+        Some(_) if least.is_finite() => least,
+        _ => 0.0,
     }
 }

@@ -159,7 +159,8 @@ impl fmt::Display for Overload {
         let Overload {
             channel, samples, ..
         } = self;
-        write!(f, "channel {channel} is at its limit for {samples} samples")
+        let unit = if *samples == 1 { "sample" } else { "samples" };
+        write!(f, "channel {channel} is at its limit for {samples} {unit}")
     }
 }
 
@@ -361,7 +362,7 @@ impl fmt::Display for TapRemark {
             ),
             TapRemark::OverloadKept { count } => write!(
                 f,
-                "{count} tap(s) drove a channel to its limit; their decays are used after the last sample that was cut off; \
+                "taps that drove a channel to its limit: {count}; their decays are used after the last sample that was cut off; \
                  they give frequencies and damping, and enter no frequency response function; lower the gain or tap \
                  more softly"
             ),
@@ -411,6 +412,8 @@ pub struct Taps {
     /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up. Of several files those of the
     /// longest such stretch.
     pub quiet: Range<u64>,
+    /// Length of record (s) from which on the last tap counts when the recording ends; 0 unless it goes on.
+    pub last_needs: f64,
     /// Oddities.
     pub remarks: Vec<TapRemark>,
 }
@@ -553,7 +556,7 @@ pub fn find_taps_again(
     }
     remarks.extend(settings.by_hand.reject(&mut taps));
     let going_on = taps.len().checked_sub(1).filter(|_| settings.is_growing);
-    reject_short(&mut taps, &lasts, going_on, rate, settings.wanted);
+    let last_needs = reject_short(&mut taps, &lasts, going_on, rate, settings.wanted);
     remarks.extend(settings.by_hand.still_rejected(&taps));
     let mut noise = 0.0_f64;
     for (_, file, found) in searched {
@@ -585,6 +588,7 @@ pub fn find_taps_again(
         taps,
         noise,
         quiet,
+        last_needs,
         remarks,
     })
 }

@@ -68,16 +68,30 @@
     byId("next").textContent = "Next: " + bench.next;
     // The report says the same and more.
     items(byId("result"), bench.result.length ? bench.result : ["no result yet"]);
-    byId("result").hidden = bench.report > 0;
     byId("precision").textContent = bench.precision;
     items(byId("notes"), bench.notes.slice().reverse());
     byId("notes-head").hidden = bench.notes.length === 0;
     showTaps();
-    byId("report").hidden = !bench.report;
-    if (bench.report !== report && bench.report > 0) {
-      byId("report").src = "report?" + bench.report;
-    }
+    if (!bench.report) byId("report").hidden = true;
+    byId("result").hidden = !byId("report").hidden;
+    if (bench.report !== report && bench.report > 0) showReport(bench.report);
     for (const button of document.querySelectorAll("#actions button")) button.disabled = Boolean(bench.ended);
+  }
+
+  // Shows a report in place of the last one, once it is there.
+  function showReport(number) {
+    const frame = byId("report").cloneNode();
+    frame.removeAttribute("id");
+    frame.hidden = true;
+    frame.src = "report?" + number;
+    frame.addEventListener("load", () => {
+      if (number !== bench.report) return frame.remove();
+      byId("report").remove();
+      frame.id = "report";
+      frame.hidden = false;
+      byId("result").hidden = true;
+    });
+    byId("report").after(frame);
   }
 
   // Swings of a channel in thousandths of the largest, as steps, the newest on the right.

@@ -69,7 +69,7 @@ def main():
         ended = wide.text_content("#advice")
         browser.close()
         described = (test / "test.toml").read_text()
-    agrees = code == 0 and "4 of 5 taps count" in printed and "reject_taps = [" in described and "has ended" in ended
+    agrees = code == 0 and "taps that count: 4 of 5" in printed and "reject_taps = [" in described and "has ended" in ended
     print(f"messages of the browser: {len(messages)}")
     print("\n".join(messages))
     print(f"the run agrees with the page: {agrees}")

@@ -24,6 +24,9 @@ fn expanded(value: &str) -> String {
 /// What is wrong with a run; `None` where it keeps to the table.
 fn fault(command: &str, argument: &str, rest: &str, value: &str, accepted: bool) -> Option<String> {
     let folder = samples();
+    // Samples without a header.
+    let low = std::fs::read(folder.path().join("recordings/cantilever/low.wav")).unwrap();
+    std::fs::write(folder.path().join("low.raw"), &low[100..]).unwrap();
     let mut words: Vec<&str> = rest.split_whitespace().collect();
     if command != "*" {
         words.insert(0, command);

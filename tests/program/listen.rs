@@ -273,7 +273,7 @@ fn recover_a_played_table_with_names_and_a_refused_description() {
     let printed = String::from_utf8(run.stdout).unwrap();
     let error = String::from_utf8(run.stderr).unwrap();
     assert!(
-        printed.contains("taps.csv: 10.0 s, 3 of 4 taps count"),
+        printed.contains("taps.csv: 10.0 s, taps that count: 3 of 4"),
         "{printed}{error}"
     );
     assert!(!error.contains("no result so far"), "{error}");
@@ -349,7 +349,7 @@ fn regress_a_description_names_the_next_recording() {
         "{first}"
     );
     let last = first.lines().last().unwrap();
-    assert_eq!(last, "next: high.wav, tap at 0.385 m; start `listen` again");
+    assert_eq!(last, "next: high.wav, tap at 0.385 m; start listen again");
     assert!(!place.join("report").exists());
     let second = fed(place, &given, &both[1]);
     assert_eq!(second.status.code(), Some(0));
@@ -414,6 +414,8 @@ fn regress_broken_streams_are_named_and_nothing_is_lost() {
         refused(place, &["a.wav"], &low[..20]),
         refused(place, &["a.wav"], &low[..44]),
         refused(place, &with("a.wav"), b""),
+        // Raw samples are expected, and WAV comes.
+        refused(place, &with("a.wav"), &low),
     ];
     assert!(!place.join("a.wav").exists());
     errors.push(refused(place, &["a.csv"], &low));

@@ -138,7 +138,6 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 }
             }
             is_behind = self.catch_up(stream);
-            self.settle();
             // Results meet no fault of the file before the taps do.
             if !is_behind {
                 self.report();
@@ -239,6 +238,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             let (seconds, levels) = (listener.seconds(), listener.levels());
             self.views.bench.hear(seconds, &levels);
             self.take(news);
+            self.settle();
             if begin.elapsed() > SLICE {
                 return true;
             }
@@ -526,8 +526,13 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 Some(_) => "judged up to ",
                 None => "",
             };
+            let apart = match self.apart.len() {
+                0 => String::new(),
+                1 => "; 1 of them does not agree with the others".to_owned(),
+                more => format!("; {more} of them do not agree with the others"),
+            };
             self.views.say(&format!(
-                "{}: {heard}{:.1} s, taps that count: {accepted} of {}\n",
+                "{}: {heard}{:.1} s, taps that count: {accepted} of {}{apart}\n",
                 file_name(&self.target.file),
                 listener.seconds(),
                 listener.taps(),

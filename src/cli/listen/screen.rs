@@ -436,31 +436,62 @@ mod tests {
     fn regress_the_screen_has_all_that_is_needed() {
         let wanted = "\
 recording low.wav, tap at 0.385 m                                          0.9 s
-hammer          █         █
-            ▂▂▂▂█▂▂▂▂▂▂▂▂▂█▂▂▂▂
-tip             █         █
-            ▂▂▂▂█▂▂▂▂▂▂▂▂▂█▂▂▂▂
-┌ taps ────────────────────────────────────────────────────────────────────────┐
-│  4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to│
-│    0.42 % in 5.0 s                                                           │
-│> 9.87 s REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit│
-│    10 %). Hit shorter.                                                       │
-│                                                                              │
-│                                                                              │
-└──────────────────────────────────────────────────────────────────────────────┘
-┌ so far ──────────────────────────────────────────────────────────────────────┐
-│so far good                                                                   │
-│modes 118.20 ± 0.04 Hz                                                        │
-│! tip (channel 2): no sample has changed since the last tap.                  │
-│                                                                              │
-│                                                                              │
-└──────────────────────────────────────────────────────────────────────────────┘
+hammer      ▁▁▁▁█▁▁▁▁▁▁▁▁▁█▁▁▁▁
+tip         ▁▁▁▁█▁▁▁▁▁▁▁▁▁█▁▁▁▁
+ taps ──────────────────────────────────────────────────────────────────────────
+  4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to
+    0.42 % in 5.0 s
+> 9.87 s REJECTED: double hit: a second excursion of 34 % after 31.2 ms (limit
+    10 %). Hit shorter.
+
+ results ───────────────────────────────────────────────────────────────────────
+so far good
+modes 118.20 ± 0.04 Hz
+
+
+
+
+
+
+
+
+! tip (channel 2): no sample has changed since the last tap.
 1 tap counts; 4 more are wanted
 page: http://127.0.0.1:8000/0f/
-
- up/down  choose   a  accept   r  reject   u  undo   s  stop   n  next: high.wav,
+ a  accept   r  reject   u  undo   s  stop   n  next: high.wav   up/down  choose
 ";
         assert_eq!(drawn(80, 24, &bench()), wanted);
+    }
+
+    #[test]
+    fn limit_a_full_screen_keeps_every_sentence_and_marks_what_it_cuts() {
+        let mut bench = bench();
+        for place in 2..9 {
+            bench.take(&News::Tap(tap(5.0 * f64::from(place), None)));
+        }
+        let long = |name: &str| format!("{name} {}", "118.20 \u{b1} 0.04; ".repeat(12));
+        bench.result = ["modes", "Kt", "cause", "remedy"].map(long).to_vec();
+        bench.advice = long("advice");
+        let drawn = drawn(80, 24, &bench);
+        for begin in [
+            "> 40.00 s",
+            "modes",
+            "Kt",
+            "cause",
+            "remedy",
+            "! tip",
+            "advice",
+            "page",
+            " a ",
+        ] {
+            let mut lines = drawn.lines();
+            assert!(
+                lines.any(|line| line.starts_with(begin)),
+                "{begin} in:\n{drawn}"
+            );
+        }
+        let cut = drawn.lines().filter(|line| line.ends_with('\u{2026}'));
+        assert!(cut.count() >= 4, "{drawn}");
     }
 
     #[test]

@@ -87,9 +87,12 @@ impl Recording {
         let other = &first.name;
         let (own_count, count) = (self.channels.len(), first.channels.len());
         if own_count != count {
-            return Some(format!(
-                "number of channels {own_count}, and {other} has {count}"
-            ));
+            let channels = if own_count == 1 {
+                "channel"
+            } else {
+                "channels"
+            };
+            return Some(format!("{own_count} {channels}, and {other} has {count}"));
         }
         let (own_rate, rate) = (self.sample_rate, first.sample_rate);
         if (own_rate - rate).abs() > SAME_RATE * rate {

@@ -188,7 +188,7 @@ def killed(program, folder, kills):
     process = start(program, folder, "--resume")
     output, _ = process.communicate(piece)
     lost = most_lost / (RATE * CHANNELS * 2)
-    print(f"{kills} kills: most that was lost {1e3 * lost:.0f} ms, {bad} files with other samples; --resume goes on: {process.returncode}")
+    print(f"{kills} kills: most that was lost {1e3 * lost:.0f} ms, {bad} files with other samples; exit code of --resume: {process.returncode}")
     print(output.decode().strip().splitlines()[-1][:100])
     if bad or lost > 1.0 or process.returncode not in (0, 1):
         raise SystemExit(1)

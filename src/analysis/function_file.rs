@@ -123,7 +123,6 @@ pub(super) fn measure_functions(
                 taps: Vec::new(),
                 noise: 0.0,
                 quiet: 0..0,
-                last_needs: 0.0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),

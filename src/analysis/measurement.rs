@@ -257,11 +257,16 @@ fn select_taps(
         let own = compared.iter().copied().skip(part).step_by(parts);
         let own: Vec<usize> = own.collect();
         let Some(choice) = inputs.choice(&own)? else {
-            return Ok(vec![Warning::select_without_force(file)]);
+            return Ok(vec![Warning::select_without_response(file)]);
         };
-        // The parts are alike, and one warning is enough.
-        if doubts.is_empty() {
-            doubts = Warning::of_selection(file, &choice, own.len(), compared.len());
+        // Of each kind one warning is enough.
+        for doubt in Warning::of_selection(file, &choice, own.len(), compared.len()) {
+            if !doubts
+                .iter()
+                .any(|other: &Warning| other.code == doubt.code)
+            {
+                doubts.push(doubt);
+            }
         }
         for one in choice.departing {
             rejections.push((

@@ -276,7 +276,6 @@ mod tests {
             ],
             noise: 0.0,
             quiet: 0..0,
-            last_needs: 0.0,
             remarks: Vec::new(),
         };
         let source = TapSource::Hammer {

@@ -51,7 +51,7 @@ use views::Views;
 ///
 /// Keys of the live screen: up and down choose a tap, at first the last one. a accepts it, r rejects it, u undoes. n goes on
 /// with the next recording, s stops. Ctrl-C ends the recording (on Windows: end the recorder). Once no recording is missing,
-/// the test is run as by `tapjoint run`. It takes the options of `run`, such as --json.
+/// the test is run as by `tapjoint run`. `listen` takes the options of `run`, such as --json.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("file", |file| file.help("Test description (.toml), or the WAV file to be written").long_help(None)),
@@ -287,8 +287,9 @@ pub(super) fn run(
         }
         let mut heard = hearing.listen(&stream, first.take());
         let file = file_name(&target.file);
-        let doubts = heard.stream_doubts.drain(..);
-        stream_doubts.extend(doubts.map(|doubt| format!("{file}, while it was recorded: {doubt}")));
+        for doubt in std::mem::take(&mut heard.stream_doubts) {
+            stream_doubts.push(format!("{file}, while it was recorded: {doubt}"));
+        }
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
         let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
@@ -325,28 +326,26 @@ pub(super) fn run(
     }
     let name = file_name(&target.file);
     if heard.files.len() == target.earlier.len() {
-        bail!("{name}: nothing was recorded");
-    }
-    // Where there is no report, whoever waits for JSON is told so.
-    let tell = |words: &str| match common.json {
-        Some(_) => terminal.seal(words),
-        None => terminal.say(words),
-    };
-    if let Some(words) = split {
-        tell(&words)?;
+        let words = format!("{name}: nothing was recorded");
         views.finish(&words);
-        return Ok(Outcome::of(heard.accepted > 0));
+        bail!(words);
     }
-    if let Some(file) = &described
-        && let Ok(next) = described_target(file, None, false, None)
-    {
-        let words = match heard.accepted {
+    let next = described.as_ref().and_then(|file| {
+        let next = described_target(file, None, false, None).ok()?;
+        Some(match heard.accepted {
             0 => format!(
                 "no tap of {name} counts, for the reasons above: remove the file and record it again\n"
             ),
             _ => format!("next: {}; start listen again\n", asked_for(file, &next)),
-        };
-        tell(&words)?;
+        })
+    });
+    if let Some(words) = split.or(next) {
+        // Where JSON is wanted, it is said that there is none.
+        match common.json {
+            Some(_) => terminal.seal(&words)?,
+            None => terminal.say(&words)?,
+        }
+        repeat(&terminal, &stream_doubts);
         views.finish(&words);
         return Ok(Outcome::of(heard.accepted > 0));
     }
@@ -364,15 +363,19 @@ pub(super) fn run(
     terminal.say("")?;
     views.finish("The recording has ended, and the test is run.");
     let outcome = once();
-    // The file does not show them, and the answer is only as good as the stream was.
-    for doubt in stream_doubts {
-        terminal.warn(&doubt);
-    }
+    repeat(&terminal, &stream_doubts);
     views.finish(match outcome {
         Ok(_) => "The recording has ended. The report is written; the terminal names its folder.",
         Err(_) => "The recording has ended. The run has failed; the terminal says why.",
     });
     outcome
+}
+
+/// Says doubts about the stream again: the file does not show them, and the answer is only as good as the stream was.
+fn repeat(terminal: &Terminal, stream_doubts: &[String]) {
+    for doubt in stream_doubts {
+        terminal.warn(doubt);
+    }
 }
 
 /// What is known before the stream begins.

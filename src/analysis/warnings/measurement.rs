@@ -54,6 +54,13 @@ impl Warning {
         Warning::about(file, "not-selected", text)
     }
 
+    /// Taps were to be chosen by their responses, and a tap has no pulse, or nothing answers.
+    pub(crate) fn select_without_response(file: &str) -> Self {
+        let text = "select = \"consistent\" compares the responses to the force, and a tap has no pulse or no sensor; all taps \
+                    are kept; look at the channels of the taps";
+        Warning::about(file, "not-selected", text)
+    }
+
     /// Taps were to be chosen by their responses, and there are too few.
     pub(crate) fn select_of_few(file: &str, taps: usize) -> Self {
         let text = format!(

@@ -128,9 +128,9 @@ impl Bench {
 
 /// Whether the taps are enough, and why.
 pub(super) struct Progress<'a> {
-    /// Taps that count.
+    /// Taps that count by themselves.
     pub(super) accepted: usize,
-    /// Taps that would count but do not agree with the others, by the last result.
+    /// Those of them that do not agree with the others, by the last result.
     pub(super) apart: usize,
     /// Taps that are wanted at least.
     pub(super) wanted: usize,
@@ -142,6 +142,8 @@ pub(super) struct Progress<'a> {
     pub(super) accuracy: Option<f64>,
     /// How narrow the intervals are; `None` where it is not known.
     pub(super) precision: Option<&'a Precision>,
+    /// True where results are worked out before the end.
+    pub(super) has_results: bool,
 }
 
 impl Progress<'_> {
@@ -153,15 +155,15 @@ impl Progress<'_> {
         };
         match self.apart {
             0 => {}
-            1 => count.push_str(", 1 does not agree with the others"),
-            more => count.push_str(&format!(", {more} do not agree with the others")),
+            1 => count.push_str(", 1 of them does not agree with the others"),
+            more => count.push_str(&format!(", {more} of them do not agree with the others")),
         }
-        let (is_enough, why) = match self.wanted.saturating_sub(self.accepted) {
+        let (is_enough, why) = match (self.wanted + self.apart).saturating_sub(self.accepted) {
             0 if self.missing > 0.0 => (
                 false,
                 format!(
-                    "do not end yet: the last record needs {:.1} s more",
-                    self.missing
+                    "do not end yet: the last record needs {:.0} s more",
+                    self.missing.ceil()
                 ),
             ),
             0 => self.why(),
@@ -182,6 +184,10 @@ impl Progress<'_> {
             return (true, why.to_owned());
         };
         let wanted = percent(accuracy);
+        if !self.has_results {
+            let why = format!("enough; whether {wanted} is reached shows in the end");
+            return (true, why);
+        }
         let Some(precision) = self.precision else {
             return (
                 false,
@@ -271,6 +277,7 @@ mod tests {
                 wanted: 3,
                 missing,
                 next,
+                has_results: true,
                 accuracy,
                 precision: precision.as_ref(),
             };
@@ -319,9 +326,9 @@ mod tests {
              does\n\
              false: 4 taps count; more taps do not help: the interval of Kt has no end, and 1.0 % is wanted; the report says \
              what does\n\
-             false: 2 taps count, 1 does not agree with the others; 1 more is wanted\n\
-             true: 4 taps count, 2 do not agree with the others; enough\n\
-             false: 4 taps count; do not end yet: the last record needs 2.3 s more\n\
+             false: 2 taps count, 1 of them does not agree with the others; 2 more are wanted\n\
+             false: 4 taps count, 2 of them do not agree with the others; 1 more is wanted\n\
+             false: 4 taps count; do not end yet: the last record needs 3 s more\n\
              false: 2 taps count; 1 more is wanted\n\
              false: 4 taps count; more taps do not help: Kt is known within 3.1 %, and 1.0 % is wanted; go on with high.wav\n\
              least certain: Kt, within 3.1 %; the next tap makes it about 4.6 % narrower\n\

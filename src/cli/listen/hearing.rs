@@ -63,8 +63,12 @@ pub(super) struct Hearing<'a, 'v> {
     precision: Option<Precision>,
     /// Times (s) of the taps that do not agree with the others, by the last state.
     apart: Vec<f64>,
-    /// Taps that stood, whatever comes, when the results were last asked for.
-    settled: usize,
+    /// Times (s) of all such taps that were named.
+    told_apart: Vec<f64>,
+    /// True where the taps have changed since the results were last asked for.
+    is_stale: bool,
+    /// Whole seconds for which the record of the last tap has to go on, or it is cut off in the end.
+    waits: u64,
     /// Doubts about the stream itself.
     stream_doubts: Vec<String>,
     files: Vec<PathBuf>,
@@ -98,7 +102,9 @@ impl<'a, 'v> Hearing<'a, 'v> {
             listener: None,
             precision: None,
             apart: Vec::new(),
-            settled: 0,
+            told_apart: Vec::new(),
+            is_stale: false,
+            waits: 0,
             stream_doubts: Vec::new(),
             files: target.earlier.clone(),
             fault: None,
@@ -278,28 +284,34 @@ impl<'a, 'v> Hearing<'a, 'v> {
     fn tell_apart(&mut self, apart: Vec<(f64, Rejection)>) {
         let mut news = Vec::new();
         for (time, why) in &apart {
-            let mut known = self.apart.iter();
-            if !known.any(|other| (other - time).abs() <= REACH) {
+            let mut told = self.told_apart.iter();
+            if !told.any(|other| (other - time).abs() <= REACH) {
                 let text = format!("tap at {time:.2} s is left out of the results: {why}");
                 news.push(News::Doubt(text));
+                self.told_apart.push(*time);
             }
         }
         self.apart = apart.into_iter().map(|(time, _)| time).collect();
         self.take(Ok(news));
     }
 
-    /// Follows the record of the last tap until it is long enough to stand when the recording ends.
+    /// Follows the record of the last tap until it would not be cut off in the end, and then asks for results.
     fn settle(&mut self) {
         let Some(listener) = self.listener.as_ref().filter(|_| self.fault.is_none()) else {
             return;
         };
-        let settled = listener.settled();
-        if settled.missing > 0.0 {
-            return self.advise();
-        }
-        if settled.accepted == self.settled {
+        let waits = listener.settled().missing.ceil() as u64;
+        let waited = std::mem::replace(&mut self.waits, waits);
+        if waits > 0 {
+            if waits != waited {
+                self.advise();
+            }
             return;
         }
+        if waited == 0 && !self.is_stale {
+            return;
+        }
+        self.is_stale = false;
         let before = self.views.bench.advice.clone();
         self.advise();
         if before != self.views.bench.advice {
@@ -335,6 +347,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             self.note(&line_of(heard, one));
         }
         if news.iter().any(|one| !matches!(one, News::Doubt(_))) {
+            self.is_stale = true;
             self.advise();
             text.push_str(&self.advice_in_lines());
         }
@@ -364,18 +377,28 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let listener = self.listener.as_ref();
         let accepted = listener.map_or(0, Listener::accepted);
         let progress = Progress {
-            accepted: accepted.saturating_sub(self.apart.len()),
+            accepted,
             apart: self.apart.len(),
             missing: listener.map_or(0.0, |listener| listener.settled().missing),
             next: self.views.bench.next.as_deref(),
             wanted: self.arguments.taps,
-            accuracy: self.arguments.accuracy.filter(|_| self.states.is_some()),
+            accuracy: self.arguments.accuracy,
+            has_results: self.states.is_some(),
             precision: self.precision.as_ref(),
         };
         let (is_enough, mut words) = progress.words();
         // A live view shows the key for the next recording.
         if is_enough && (self.views.bench.next.is_none() || !self.views.are_live()) {
             words.push_str("; Ctrl-C ends the recording");
+        }
+        if let Some(next) = self
+            .views
+            .bench
+            .next
+            .as_ref()
+            .filter(|_| is_enough && self.views.are_live())
+        {
+            words.push_str(&format!("; next: {next}"));
         }
         if let Some((reach, end)) = listener.and_then(Listener::reach) {
             words.push_str(&format!(
@@ -396,13 +419,11 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let Some(listener) = &self.listener else {
             return;
         };
-        let settled = listener.settled();
-        self.settled = settled.accepted;
         if let Some(states) = &mut self.states {
             states.ask(Question {
                 files: self.files.clone(),
-                frames: settled.frames,
-                accepted: settled.accepted,
+                frames: listener.settled().frames,
+                counting: listener.counting(),
                 by_hand: listener.by_hand().clone(),
                 wants_page: self.views.shows_report(),
             });
@@ -440,9 +461,9 @@ impl<'a, 'v> Hearing<'a, 'v> {
             (Ok(None), _) if decision == Action::Undo => {
                 "there is no decision by hand to take back"
             }
-            (Ok(None), Some(_)) => "this tap is there no more",
+            (Ok(None), Some(_)) => "this tap is gone",
             (Ok(None), None) => "there is no tap yet",
-            _ if before == after => "it is decided so already",
+            _ if before == after => "this is decided already",
             _ => "",
         };
         if !words.is_empty() {
@@ -450,8 +471,14 @@ impl<'a, 'v> Hearing<'a, 'v> {
         }
         self.note(&line_by_hand(heard, word, time));
         self.take(news.map(Option::unwrap_or_default));
+        match time {
+            Some(time) => self.apart.retain(|other| (other - time).abs() > REACH),
+            None => self.apart.clear(),
+        }
+        self.advise();
         // A tap may have counted before, and not have agreed with the others.
-        self.ask();
+        self.is_stale = true;
+        self.settle();
         self.write_decisions(&before, &after);
     }
 

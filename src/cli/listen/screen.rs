@@ -22,8 +22,8 @@ const NAME: u16 = 12;
 const LEVEL_ROWS: u16 = 2;
 /// Rows from which a terminal is tall.
 const TALL: u16 = 30;
-/// Rows for taps and results, at least.
-const LEAST_MIDDLE: u16 = 6;
+/// Rows below which a terminal shows neither movement nor the address of the page.
+const SHORT: u16 = 16;
 /// Rows of the advice, and of the newest doubt, at most.
 const MOST_WORDS: usize = 3;
 /// Rows to which a long sentence is cut before others are left out.
@@ -164,12 +164,16 @@ impl Chosen {
 fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let area = frame.area();
     let shown = bench.levels.len().min(MOST_LEVELS) as u16;
-    let level_rows = if area.height < TALL { 1 } else { LEVEL_ROWS };
+    let level_rows = match area.height {
+        0..SHORT => 0,
+        SHORT..TALL => 1,
+        _ => LEVEL_ROWS,
+    };
     let screen = Screen::of(usize::from(area.width));
     let newest = bench.notes.back().map(|note| format!("! {note}"));
     let note = fitted(screen, newest.as_slice(), MOST_WORDS);
     let advice = fitted(screen, std::slice::from_ref(&bench.advice), MOST_WORDS);
-    let page = bench.address.as_ref();
+    let page = bench.address.as_ref().filter(|_| area.height >= SHORT);
     let page = page.map(|address| format!("page: {address}"));
     let [
         head,
@@ -182,7 +186,7 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     ] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(level_rows * shown),
-        Constraint::Min(LEAST_MIDDLE),
+        Constraint::Min(0),
         Constraint::Length(note.len() as u16),
         Constraint::Length(advice.len() as u16),
         Constraint::Length(u16::from(page.is_some())),
@@ -202,7 +206,9 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
         true => Layout::horizontal([Constraint::Percentage(50); 2]).areas(middle),
         // With few taps the results get more.
         false => {
-            let lines = bench.taps.iter().map(|tap| tap_text(tap, screen).len() + 1);
+            // Of many taps as many as there is room for. One more row: the symbol of the chosen one takes columns.
+            let taps = bench.taps.iter().take(usize::from(middle.height));
+            let lines = taps.map(|tap| tap_text(tap, screen).len() + 1);
             let rows = lines.sum::<usize>().min(usize::from(middle.height) / 2);
             let taps = Constraint::Length((rows as u16).max(3));
             Layout::vertical([taps, Constraint::Min(0)]).areas(middle)
@@ -347,7 +353,7 @@ fn key_line(bench: &Bench) -> Line<'static> {
         ("s", "stop".to_owned()),
     ];
     if let Some(next) = &bench.next {
-        // Its place is in the advice of the terminal's lines and in the title to come.
+        // The advice names its place.
         let name = next.split(", ").next().unwrap_or(next);
         keys.push(("n", format!("next: {name}")));
     }
@@ -500,6 +506,14 @@ page: http://127.0.0.1:8000/0f/
             drawn(columns, rows, &bench());
         }
         drawn(80, 24, &Bench::default());
+        let short = drawn(80, 8, &bench());
+        for begin in ["! tip", "1 tap counts", " a  accept"] {
+            let mut lines = short.lines();
+            assert!(
+                lines.any(|line| line.starts_with(begin)),
+                "{begin} in:\n{short}"
+            );
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::pipeline::{
     BareSettings, IdentifySettings, analysis_of_bare, diagnose_test, measure_bare_file,
 };
 use crate::report::{document_of, gap_section, render_first_screen, render_progress};
-use crate::taps::{Rejection, TapsByHand};
+use crate::taps::{REACH, Rejection, TapsByHand};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -120,7 +120,10 @@ impl Subject {
         let first_screen = recording.map(|own| render_first_screen(&document, &[own]));
         Ok(SoFar {
             lines: render_progress(&document),
-            precision: Precision::of(&document, question.accepted.saturating_sub(apart.len())),
+            precision: Precision::of(
+                &document,
+                question.counting.len().saturating_sub(apart.len()),
+            ),
             apart,
             first_screen: first_screen.transpose()?,
         })
@@ -146,8 +149,8 @@ pub(super) struct Question {
     pub(super) files: Vec<PathBuf>,
     /// Frames of the last file that are looked at: what follows is not judged yet.
     pub(super) frames: u64,
-    /// Taps that count in them.
-    pub(super) accepted: usize,
+    /// Times of the taps that count in them (s).
+    pub(super) counting: Vec<f64>,
     /// Taps that are accepted or rejected by hand.
     pub(super) by_hand: TapsByHand,
     /// True where a page is served.
@@ -161,7 +164,7 @@ pub(super) struct States {
     is_busy: bool,
     waiting: Option<Question>,
     /// Taps that counted at the last question, and what was decided by hand.
-    last: (usize, TapsByHand),
+    last: (Vec<f64>, TapsByHand),
 }
 
 impl States {
@@ -190,22 +193,24 @@ impl States {
             answers,
             is_busy: false,
             waiting: None,
-            last: (0, by_hand),
+            last: (Vec::new(), by_hand),
         }
     }
 
-    /// Asks for the state, if the number of taps that count has changed enough, or what was decided by hand.
+    /// Asks for the state, if the taps that count have changed enough, or what was decided by hand.
     pub(super) fn ask(&mut self, question: Question) {
-        let (accepted, by_hand) = &self.last;
-        // The scatter of a mean falls with the square root of their number: among many one more says little.
-        let change = question.accepted.abs_diff(*accepted);
-        let least = match question.accepted {
-            0..=EACH => 1,
-            many => (many as f64 * CHANGE) as usize,
+        let (counting, by_hand) = &self.last;
+        let count = question.counting.len();
+        let has_changed = match count {
+            0..=EACH => {
+                let mut pairs = question.counting.iter().zip(counting);
+                count != counting.len() || pairs.any(|(one, other)| (one - other).abs() > REACH)
+            }
+            // The scatter of a mean falls with the square root of their number: among many one more says little.
+            many => many.abs_diff(counting.len()) >= (many as f64 * CHANGE) as usize,
         };
-        let has_changed = change >= least;
         if has_changed || *by_hand != question.by_hand {
-            self.last = (question.accepted, question.by_hand.clone());
+            self.last = (question.counting.clone(), question.by_hand.clone());
             self.waiting = Some(question);
         }
     }

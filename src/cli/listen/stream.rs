@@ -377,9 +377,7 @@ impl Stream {
                 continue;
             }
             if let Some(layout) = self.layout.take() {
-                let is_wav = matches!(bytes.get(..4), Some(b"RIFF" | b"RIFX" | b"RF64"))
-                    && bytes.get(8..HEAD) == Some(b"WAVE");
-                if is_wav {
+                if bytes.len() == HEAD && PcmLayout::may_be_wav(bytes) {
                     bail!(
                         "the stream is WAV, and --rate, --channels and --format are for raw samples; leave them out, \
                          or record raw samples (arecord -t raw)"

@@ -154,8 +154,8 @@ impl<'a> Views<'a> {
     /// Says on all views what became of the recording.
     pub(super) fn finish(&mut self, words: &str) {
         self.bench.ended = Some(words.to_owned());
-        if let Some(what) = self.bench.title.strip_prefix("recording ") {
-            self.bench.title = format!("recorded {what}");
+        if let Some((_, what)) = self.bench.title.split_once(' ') {
+            self.bench.title = format!("ended: {what}");
         }
         self.show_now();
     }

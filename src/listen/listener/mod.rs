@@ -60,6 +60,26 @@ pub struct Settled {
     pub missing: f64,
 }
 
+/// What a look says of the end of the recording.
+#[derive(Debug, Clone, Copy, Default)]
+struct Standing {
+    /// Reported taps that count, the last one among them.
+    accepted: usize,
+    /// The last reported tap, if it counts.
+    last: Option<LastTap>,
+    /// Frame of the file that grows at which a tap begins that is not reported yet.
+    unreported: Option<u64>,
+}
+
+/// The last tap, by frames of the file that grows.
+#[derive(Debug, Clone, Copy)]
+struct LastTap {
+    /// Its record begins here.
+    begin: u64,
+    /// If the recording ended before this, it would not count.
+    stands_at: u64,
+}
+
 /// A tap that was reported.
 #[derive(Debug, Clone, PartialEq)]
 struct Reported {
@@ -100,8 +120,11 @@ pub struct Listener<'a> {
     swings: Vec<f64>,
     /// Frame at which the record of the last tap has ended, if no other tap comes first.
     due: Option<u64>,
-    /// Frame before which that record has not begun, until a look has found it.
+    /// The record of the newest alarm begins at this frame or later. `None` once a look has found it.
     begun: Option<u64>,
+    standing: Standing,
+    /// How far the taps excite the structure, and the end of the band (Hz), where that is not enough.
+    reach: Option<(f64, f64)>,
     reported: Vec<Reported>,
     /// Code and channel of the doubts that were reported.
     doubts: Vec<(&'static str, Option<usize>)>,
@@ -134,6 +157,8 @@ impl<'a> Listener<'a> {
             memo: TapMemo::default(),
             due: None,
             begun: None,
+            standing: Standing::default(),
+            reach: None,
             reported: Vec::new(),
             doubts: Vec::new(),
             remarks: Vec::new(),
@@ -230,41 +255,42 @@ impl<'a> Listener<'a> {
 
     /// Returns how much of the recording stands, even if it ended now.
     pub fn settled(&self) -> Settled {
-        let mut settled = Settled {
-            accepted: self.accepted(),
-            frames: self.begun.unwrap_or(self.growing.frames()),
-            missing: 0.0,
-        };
-        let Some((found, last)) = self
-            .latest
-            .as_ref()
-            .and_then(|found| found.taps.taps.last().map(|last| (found, last)))
-        else {
-            return settled;
-        };
-        let rate = self.growing.sample_rate();
-        let reported = self.reported.last();
-        let reported = reported.filter(|reported| reported.time == last.time);
-        let ends = last.record.start as f64 / rate + found.taps.last_needs;
-        settled.missing = match reported {
-            Some(reported) if reported.rejection.is_some() => 0.0,
-            Some(_) => (ends - self.start() - settled.frames as f64 / rate).max(0.0),
-            None => 0.0,
-        };
-        if reported.is_none() || settled.missing > 0.0 {
-            let earlier = self.settings.earlier.iter().map(Recording::frames);
-            settled.frames = last.record.start.saturating_sub(earlier.sum());
-            settled.accepted -= usize::from(reported.is_some());
+        let standing = &self.standing;
+        let limits = [self.begun, standing.unreported].into_iter().flatten();
+        let frames = limits.fold(self.growing.frames(), u64::min);
+        match standing.last {
+            Some(last) if last.stands_at > frames => {
+                let missing = (last.stands_at - frames) as f64 / self.growing.sample_rate();
+                Settled {
+                    accepted: standing.accepted - 1,
+                    frames: last.begin,
+                    // The next tap has ended its record.
+                    missing: match standing.unreported {
+                        Some(_) => 0.0,
+                        None => missing,
+                    },
+                }
+            }
+            _ => Settled {
+                accepted: standing.accepted,
+                frames,
+                missing: 0.0,
+            },
         }
-        settled
+    }
+
+    /// Times of the taps that [`settled`](Self::settled) counts (s).
+    pub fn counting(&self) -> Vec<f64> {
+        let reported = self.reported.iter();
+        let accepted = reported.filter(|tap| tap.rejection.is_none());
+        let times = accepted.map(|tap| tap.time);
+        times.take(self.settled().accepted).collect()
     }
 
     /// Returns how far the taps excite the structure in the mean, and the end of the stated band (Hz), where they do not reach
     /// four fifths of it. `None` otherwise, and without a hammer.
     pub fn reach(&self) -> Option<(f64, f64)> {
-        let found = self.latest.as_ref()?;
-        let (pulse, end) = (found.taps.mean_pulse()?, found.band_end?);
-        (pulse.usable_to < ENOUGH_OF_BAND * end).then_some((pulse.usable_to, end))
+        self.reach
     }
 
     /// Returns false before the first look, which shows whether the recording fits what is known of it.
@@ -279,10 +305,7 @@ impl<'a> Listener<'a> {
 
     /// Number of taps that count.
     pub fn accepted(&self) -> usize {
-        self.reported
-            .iter()
-            .filter(|reported| reported.rejection.is_none())
-            .count()
+        self.standing.accepted
     }
 
     /// Length of what was heard, of all files (s).
@@ -364,9 +387,41 @@ impl<'a> Listener<'a> {
             let end = time + self.record(&found) - start;
             self.due = Some((end * self.growing.sample_rate()).ceil().max(0.0) as u64);
         }
+        self.standing = self.standing(&found, waiting.is_some(), is_growing);
+        let pulse = found.taps.mean_pulse().zip(found.band_end);
+        let reach = pulse.map(|(pulse, end)| (pulse.usable_to, end));
+        self.reach = reach.filter(|(usable_to, end)| *usable_to < ENOUGH_OF_BAND * end);
         self.reported = reported;
         self.latest = Some(found);
         Ok(news)
+    }
+
+    /// What taps say of the end of the recording. The last one of them may not be reported yet.
+    fn standing(&self, found: &TapsSoFar, is_last_unreported: bool, is_growing: bool) -> Standing {
+        let rate = self.growing.sample_rate();
+        let earlier = self.settings.earlier.iter().map(Recording::frames);
+        let first: u64 = earlier.sum();
+        let mut judged = found.taps.taps.as_slice();
+        let mut standing = Standing::default();
+        if let Some((last, before)) = judged.split_last().filter(|_| is_last_unreported) {
+            standing.unreported = Some(last.record.start.saturating_sub(first));
+            judged = before;
+        }
+        standing.accepted = judged.iter().filter(|tap| tap.accepted()).count();
+        if let Some(last) = judged.last()
+            && is_growing
+            && last.accepted()
+            && last.record.end > first
+        {
+            let place = judged.len() - 1;
+            let needed = found.taps.needed_of_last(place, rate, found.wanted);
+            let stands_at = last.usable_from() + (needed * rate).ceil() as u64;
+            standing.last = Some(LastTap {
+                begin: last.record.start.saturating_sub(first),
+                stands_at: stands_at.saturating_sub(first),
+            });
+        }
+        standing
     }
 
     /// Length of signal after which a tap is judged (s).
@@ -404,9 +459,8 @@ impl<'a> Listener<'a> {
             true => remaining(found, tap)?,
             false => None,
         };
-        let mut by_hand = self.by_hand.accept.iter();
-        let is_by_hand = by_hand.any(|time| (time - tap.time).abs() <= REACH);
-        let overload = tap.overload.filter(|_| tap.accepted() && is_by_hand);
+        let is_by_hand = tap.accepted() && self.by_hand.accepts(tap);
+        let overload = tap.overload.filter(|_| is_by_hand);
         let overruled = tap.overruled.clone();
         Ok(JudgedTap {
             seconds: tap.frames() as f64 / found.recording.sample_rate(),

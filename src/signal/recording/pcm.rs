@@ -121,18 +121,22 @@ impl PcmLayout {
         })
     }
 
+    /// Returns true where bytes begin as a WAV file does, as far as there are any.
+    pub fn may_be_wav(bytes: &[u8]) -> bool {
+        let mark = bytes.get(..4).unwrap_or(bytes);
+        let is_riff = [b"RIFF", b"RF64", b"BW64"]
+            .iter()
+            .any(|known| known.starts_with(mark));
+        is_riff && (bytes.len() < 12 || bytes.get(8..12) == Some(b"WAVE"))
+    }
+
     /// Reads the head of a WAV stream from its first bytes; `None` while more of them are needed.
     ///
     /// # Errors
     /// Bytes that are no WAV file, or a coding that is not read.
     pub fn of_wav(bytes: &[u8]) -> Result<Option<PcmHead>, RecordingError> {
         const NAME: &str = "the stream";
-        let mark = bytes.get(..4).unwrap_or(bytes);
-        let is_riff = [b"RIFF", b"RF64", b"BW64"]
-            .iter()
-            .any(|known| known.starts_with(mark));
-        let is_wave = bytes.len() < 12 || bytes.get(8..12) == Some(b"WAVE");
-        if !is_riff || !is_wave {
+        if !Self::may_be_wav(bytes) {
             let problem = "does not begin with the header of a WAV file; give --rate, --channels and --format for raw \
                            samples, or have the recorder write WAV";
             return Err(RecordingError::new(NAME, problem));

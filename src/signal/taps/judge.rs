@@ -215,26 +215,38 @@ fn overload(
     Ok(found)
 }
 
+/// Length of record (s) from which on a tap counts if the recording ends with it, by the taps `before` it. 0 for the first
+/// one. [`reject_short`] may ask for less: its median holds the tap itself.
+pub(super) fn needed_of_last(before: &[Tap], rate: f64, wanted: Option<f64>) -> f64 {
+    let accepted = before.iter().filter(|tap| tap.accepted());
+    let mut lengths: Vec<f64> = accepted.map(|tap| tap.frames() as f64 / rate).collect();
+    let Some(shortest) = lengths.iter().copied().reduce(f64::min) else {
+        return 0.0;
+    };
+    let wanted = wanted.unwrap_or(f64::INFINITY);
+    let by_median = SHORT_OF_MEDIAN * wanted.min(median(&mut lengths));
+    by_median.max(CUT_OF_SHORTEST * wanted.min(shortest))
+}
+
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
 /// record sets its length. `lasts` are the last taps of the files, which may be cut off. The record of the tap `going_on`
-/// has not ended. Returns the length (s) from which on it counts; 0 without such a tap.
+/// has not ended.
 pub(super) fn reject_short(
     taps: &mut [Tap],
     lasts: &[usize],
     going_on: Option<usize>,
     rate: f64,
     wanted: Option<f64>,
-) -> f64 {
+) {
     let ended = taps.iter().enumerate();
     let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
     let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
     let typical = median(&mut lengths);
     let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
-    let mut least = SHORT_OF_MEDIAN * needed;
     for (index, tap) in taps.iter_mut().enumerate() {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if tap.accepted() && Some(index) != going_on && available <= least {
+        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if let Some(overload) = tap.overload {
                 Rejection::Overload(overload)
             } else if lasts.contains(&index) {
@@ -252,9 +264,6 @@ pub(super) fn reject_short(
         .map(|(_, tap)| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
-    if shortest.is_finite() {
-        least = least.max(CUT_OF_SHORTEST * needed);
-    }
     for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
         let tap = &mut taps[last];
         let available = tap.frames() as f64 / rate;
@@ -265,9 +274,5 @@ pub(super) fn reject_short(
         {
             tap.rejection = Some(Rejection::CutOff { available, needed });
         }
-    }
-    match going_on {
-        Some(_) if least.is_finite() => least,
-        _ => 0.0,
     }
 }

@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
-use judge::reject_short;
+use judge::{needed_of_last, reject_short};
 use search::Survey;
 use tapjoint_numerics::stats::median;
 
@@ -412,13 +412,17 @@ pub struct Taps {
     /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up. Of several files those of the
     /// longest such stretch.
     pub quiet: Range<u64>,
-    /// Length of record (s) from which on the last tap counts when the recording ends; 0 unless it goes on.
-    pub last_needs: f64,
     /// Oddities.
     pub remarks: Vec<TapRemark>,
 }
 
 impl Taps {
+    /// Length of record (s) from which on the tap at this place counts if the recording ends with it, by those before it.
+    /// `wanted` is what the block needs (s), where one is given.
+    pub fn needed_of_last(&self, place: usize, rate: f64, wanted: Option<f64>) -> f64 {
+        needed_of_last(&self.taps[..place], rate, wanted)
+    }
+
     /// Those that enter the averages.
     pub fn accepted(&self) -> impl Iterator<Item = &Tap> {
         self.taps.iter().filter(|tap| tap.accepted())
@@ -555,8 +559,11 @@ pub fn find_taps_again(
         }
     }
     remarks.extend(settings.by_hand.reject(&mut taps));
-    let going_on = taps.len().checked_sub(1).filter(|_| settings.is_growing);
-    let last_needs = reject_short(&mut taps, &lasts, going_on, rate, settings.wanted);
+    // A record does not go on in the next file.
+    let last_file = searched.last().map_or(0, |(start, ..)| *start);
+    let last = taps.len().checked_sub(1).filter(|_| settings.is_growing);
+    let going_on = last.filter(|last| taps[*last].record.end > last_file);
+    reject_short(&mut taps, &lasts, going_on, rate, settings.wanted);
     remarks.extend(settings.by_hand.still_rejected(&taps));
     let mut noise = 0.0_f64;
     for (_, file, found) in searched {
@@ -588,7 +595,6 @@ pub fn find_taps_again(
         taps,
         noise,
         quiet,
-        last_needs,
         remarks,
     })
 }

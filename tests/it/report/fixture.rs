@@ -384,7 +384,6 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
                 taps: measured_taps(),
                 noise: 0.01,
                 quiet: 0..0,
-                last_needs: 0.0,
                 remarks: Vec::new(),
             },
             spectra: Some(spectra),

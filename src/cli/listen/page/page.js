@@ -4,6 +4,7 @@
   const byId = (id) => document.getElementById(id);
   let chosen = null;
   let bench = { taps: [] };
+  const shown = {};
 
   // The tap that is chosen, or the last one that is shown.
   function act(action) {
@@ -27,6 +28,14 @@
       item.textContent = text;
       return item;
     }));
+  }
+
+  // True where a part differs from what was shown last.
+  function changed(part, value) {
+    const text = JSON.stringify(value);
+    if (shown[part] === text) return false;
+    shown[part] = text;
+    return true;
   }
 
   function choose(time) {
@@ -69,9 +78,10 @@
     // The report says the same and more.
     items(byId("result"), bench.result.length ? bench.result : ["no result yet"]);
     byId("precision").textContent = bench.precision;
-    items(byId("notes"), bench.notes.slice().reverse());
+    // A button that is made anew between two clicks, or has the focus, would lose them.
+    if (changed("notes", bench.notes)) items(byId("notes"), bench.notes.slice().reverse());
     byId("notes-head").hidden = bench.notes.length === 0;
-    showTaps();
+    if (changed("taps", bench.taps)) showTaps();
     if (!bench.report) byId("report").hidden = true;
     byId("result").hidden = !byId("report").hidden;
     if (bench.report !== report && bench.report > 0) showReport(bench.report);

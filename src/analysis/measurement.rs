@@ -252,22 +252,19 @@ fn select_taps(
     let by_memory = by_memory.min(compared.len() / LEAST_COMPARED);
     let parts = compared.len().div_ceil(MOST_COMPARED).max(by_memory);
     let inputs = Inputs::new(recording, settings, taps, lines);
-    let (mut doubts, mut rejections) = (Vec::new(), Vec::new());
+    let (mut doubts, mut rejections, mut has_whole) = (Vec::new(), Vec::new(), false);
     for part in 0..parts {
         let own = compared.iter().copied().skip(part).step_by(parts);
         let own: Vec<usize> = own.collect();
         let Some(choice) = inputs.choice(&own)? else {
             return Ok(vec![Warning::select_without_response(file)]);
         };
-        // Of each kind one warning is enough.
-        for doubt in Warning::of_selection(file, &choice, own.len(), compared.len()) {
-            if !doubts
-                .iter()
-                .any(|other: &Warning| other.code == doubt.code)
-            {
-                doubts.push(doubt);
-            }
+        // The parts are alike. One in which all taps are kept tells more.
+        let is_kept_whole = choice.disagreement.is_some();
+        if doubts.is_empty() || (is_kept_whole && !has_whole) {
+            doubts = Warning::of_selection(file, &choice, own.len(), compared.len());
         }
+        has_whole |= is_kept_whole;
         for one in choice.departing {
             rejections.push((
                 own[one.tap],

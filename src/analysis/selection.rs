@@ -9,18 +9,18 @@ use tapjoint_numerics::stats::median;
 
 /// Fewest taps among which one can be chosen. 4: of three, two that agree by chance would make the third a fault.
 pub(super) const LEAST_TAPS: usize = 4;
-/// One tap in so many is taken out at most. 3: two thirds that agree are a clear majority, and of four taps three are left.
+/// At most one tap in so many is taken out. 3: two thirds that agree are a clear majority, and of four taps three are left.
 const ONE_IN: usize = 3;
 /// A departure up to this (1) rejects no tap. 12 %, chosen: small scatter of the places is then no fault.
 const FLOOR: f64 = 0.12;
-/// A tap departs from so many times the median departure of the others on, where there are many. 5: of many normal values 1 in
+/// Limit of a departure over the median departure of the others, where there are many taps. 5: of many normal values 1 in
 /// 1000 is that far from their median; of 20, 4 in 1000 are beyond the limit for 20.
 const TIMES: f64 = 5.0;
 /// Added to [`TIMES`] over the number of taps less two. 12: the median departure of few taps is itself uncertain. The
 /// study `examples/tap_selection` then sees no right tap rejected among four or six, at any scatter up to 5 mm.
 const TIMES_OF_FEW: f64 = 12.0;
-/// Two groups are apart by so many times as much as the taps within them, at least, where there are many; among n taps
-/// n/(n - 3) times as much. 4: of four or more normal values, fewer than 1 % of all draws have such a gap in their middle.
+/// Least distance of two groups over the distances within them, where there are many taps. Among n taps it is n/(n - 3) times
+/// that. 4: of four or more normal values, fewer than 1 % of all draws have such a gap in their middle.
 const TIMES_OF_GROUPS: f64 = 4.0;
 /// Times the disturbance before a tap that its departure may have (1). 1.5: what rings on is less than what came before it,
 /// and noise differs from one stretch to the next.

@@ -310,6 +310,7 @@ pub(super) fn run(
     views.end_screen();
     ledger().restore = None;
     let end = failed.map_or(end, Err).inspect_err(|cause| {
+        repeat(&terminal, &stream_doubts);
         views.finish(&format!("The recording has ended with a fault: {cause:#}"));
     })?;
     if end.rest > 0 {
@@ -340,9 +341,9 @@ pub(super) fn run(
         })
     });
     if let Some(words) = split.or(next) {
-        // Where JSON is wanted, it is said that there is none.
+        // A file of JSON that was asked for does not come, or standard output is for JSON alone.
         match common.json {
-            Some(_) => terminal.seal(&words)?,
+            Some(_) => terminal.seal(words.trim_end())?,
             None => terminal.say(&words)?,
         }
         repeat(&terminal, &stream_doubts);
@@ -413,6 +414,8 @@ impl Begun {
         let is_whole = headers
             .as_ref()
             .is_none_or(|recording| is_plain(recording.format()));
+        // Files of a bare recording are measured one by one, and decisions hold for all of them together.
+        let is_one = described.is_some() || target.earlier.is_empty();
         // A recording that is there already is played into a folder that is removed.
         let aside = target.is_played.then(|| {
             let folder = tempfile::Builder::new().prefix("tapjoint-").tempdir();
@@ -433,7 +436,7 @@ impl Begun {
                 reserved: target.reserved.clone(),
             },
             headers,
-            has_states: arguments.speed.is_some() && is_whole,
+            has_states: arguments.speed.is_some() && is_whole && is_one,
             aside,
         })
     }

@@ -77,7 +77,7 @@ fn prop_clean_tests_keep_their_taps() {
         rejected += inconsistent(&chosen).len();
         assert!(!warns(&chosen, "taps-disagree"), "seed {seed}");
     }
-    // The study in the examples finds less than 1 of 1000: of some 180 taps two are then rejected in 2 of 100 draws.
+    // The study in the examples finds less than 1 of 1000. Two of some 180 taps are then rejected in 2 of 100 draws.
     assert!(100 * rejected <= count, "{rejected} of {count}");
 }
 

@@ -185,7 +185,7 @@ impl Progress<'_> {
         };
         let wanted = percent(accuracy);
         if !self.has_results {
-            let why = format!("enough; whether {wanted} is reached shows in the end");
+            let why = format!("enough; the end shows whether {wanted} is reached");
             return (true, why);
         }
         let Some(precision) = self.precision else {
@@ -311,6 +311,20 @@ mod tests {
             precision_words(&stuck()),
             precision_words(&open()),
         ];
+        let without_results = Progress {
+            accepted: 4,
+            apart: 0,
+            wanted: 3,
+            missing: 0.0,
+            next: None,
+            accuracy: Some(0.05),
+            precision: None,
+            has_results: false,
+        };
+        assert_eq!(
+            without_results.words().1.replace('\u{a0}', " "),
+            "4 taps count; enough; the end shows whether 5.0 % is reached"
+        );
         assert_eq!(
             all.join("\n").replace('\u{a0}', " "),
             "false: 0 taps count; 3 more are wanted\n\

@@ -103,7 +103,8 @@ impl<'a, 'v> Hearing<'a, 'v> {
             precision: None,
             apart: Vec::new(),
             told_apart: Vec::new(),
-            is_stale: false,
+            // Taps of earlier files are there before any news.
+            is_stale: true,
             waits: 0,
             stream_doubts: Vec::new(),
             files: target.earlier.clone(),
@@ -300,25 +301,23 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let Some(listener) = self.listener.as_ref().filter(|_| self.fault.is_none()) else {
             return;
         };
-        let waits = listener.settled().missing.ceil() as u64;
+        let settled = listener.settled();
+        let waits = settled.missing.ceil() as u64;
         let waited = std::mem::replace(&mut self.waits, waits);
-        if waits > 0 {
-            if waits != waited {
-                self.advise();
-            }
+        let asks = self.is_stale && settled.frames.is_some();
+        if waits == waited && !asks {
             return;
         }
-        if waited == 0 && !self.is_stale {
-            return;
-        }
-        self.is_stale = false;
         let before = self.views.bench.advice.clone();
         self.advise();
-        if before != self.views.bench.advice {
+        // Lines do not count the seconds.
+        if waits == 0 && before != self.views.bench.advice {
             let text = self.advice_in_lines();
             self.views.say(&text);
         }
-        self.ask();
+        if asks {
+            self.ask();
+        }
     }
 
     /// Shows, prints and logs what is new. A fault ends the judging, and not the recording.
@@ -375,10 +374,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
             return;
         }
         let listener = self.listener.as_ref();
-        let accepted = listener.map_or(0, Listener::accepted);
+        let counting = listener.map_or(Vec::new(), Listener::counting);
+        // One of them may have been rejected since the last result.
+        let is_counted = |time: &&f64| counting.iter().any(|own| (own - **time).abs() <= REACH);
         let progress = Progress {
-            accepted,
-            apart: self.apart.len(),
+            accepted: counting.len(),
+            apart: self.apart.iter().filter(is_counted).count(),
             missing: listener.map_or(0.0, |listener| listener.settled().missing),
             next: self.views.bench.next.as_deref(),
             wanted: self.arguments.taps,
@@ -387,18 +388,11 @@ impl<'a, 'v> Hearing<'a, 'v> {
             precision: self.precision.as_ref(),
         };
         let (is_enough, mut words) = progress.words();
-        // A live view shows the key for the next recording.
-        if is_enough && (self.views.bench.next.is_none() || !self.views.are_live()) {
-            words.push_str("; Ctrl-C ends the recording");
-        }
-        if let Some(next) = self
-            .views
-            .bench
-            .next
-            .as_ref()
-            .filter(|_| is_enough && self.views.are_live())
-        {
-            words.push_str(&format!("; next: {next}"));
+        let next = self.views.bench.next.as_ref();
+        match next.filter(|_| self.views.are_live()) {
+            _ if !is_enough => {}
+            Some(next) => words.push_str(&format!("; next: {next}")),
+            None => words.push_str("; Ctrl-C ends the recording"),
         }
         if let Some((reach, end)) = listener.and_then(Listener::reach) {
             words.push_str(&format!(
@@ -416,13 +410,18 @@ impl<'a, 'v> Hearing<'a, 'v> {
 
     /// Asks for the results so far.
     fn ask(&mut self) {
-        let Some(listener) = &self.listener else {
+        let Some((listener, frames)) = self
+            .listener
+            .as_ref()
+            .and_then(|listener| Some(listener).zip(listener.settled().frames))
+        else {
             return;
         };
+        self.is_stale = false;
         if let Some(states) = &mut self.states {
             states.ask(Question {
                 files: self.files.clone(),
-                frames: listener.settled().frames,
+                frames,
                 counting: listener.counting(),
                 by_hand: listener.by_hand().clone(),
                 wants_page: self.views.shows_report(),
@@ -471,11 +470,6 @@ impl<'a, 'v> Hearing<'a, 'v> {
         }
         self.note(&line_by_hand(heard, word, time));
         self.take(news.map(Option::unwrap_or_default));
-        match time {
-            Some(time) => self.apart.retain(|other| (other - time).abs() > REACH),
-            None => self.apart.clear(),
-        }
-        self.advise();
         // A tap may have counted before, and not have agreed with the others.
         self.is_stale = true;
         self.settle();

@@ -22,7 +22,7 @@ const NAME: u16 = 12;
 const LEVEL_ROWS: u16 = 2;
 /// Rows from which a terminal is tall.
 const TALL: u16 = 30;
-/// Rows below which a terminal shows neither movement nor the address of the page.
+/// Rows below which a terminal shows no movement.
 const SHORT: u16 = 16;
 /// Rows of the advice, and of the newest doubt, at most.
 const MOST_WORDS: usize = 3;
@@ -160,7 +160,8 @@ impl Chosen {
     }
 }
 
-/// Draws the bench. What a small terminal cannot hold is marked; advice, the newest doubt and keys always stand.
+/// Draws the bench. What a small terminal cannot hold is marked; advice, the newest doubt and keys stand from nine
+/// rows on.
 fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let area = frame.area();
     let shown = bench.levels.len().min(MOST_LEVELS) as u16;
@@ -173,7 +174,7 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let newest = bench.notes.back().map(|note| format!("! {note}"));
     let note = fitted(screen, newest.as_slice(), MOST_WORDS);
     let advice = fitted(screen, std::slice::from_ref(&bench.advice), MOST_WORDS);
-    let page = bench.address.as_ref().filter(|_| area.height >= SHORT);
+    let page = bench.address.as_ref();
     let page = page.map(|address| format!("page: {address}"));
     let [
         head,

@@ -377,7 +377,7 @@ impl Stream {
                 continue;
             }
             if let Some(layout) = self.layout.take() {
-                if bytes.len() == HEAD && PcmLayout::may_be_wav(bytes) {
+                if bytes.len() >= HEAD && PcmLayout::may_be_wav(bytes) {
                     bail!(
                         "the stream is WAV, and --rate, --channels and --format are for raw samples; leave them out, \
                          or record raw samples (arecord -t raw)"

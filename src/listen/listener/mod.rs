@@ -52,32 +52,20 @@ pub struct ListenSettings {
 /// What stands of a recording that goes on. It changes where later taps show that earlier ones were too weak or too close.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settled {
-    /// Taps that count, even if the recording ended now.
-    pub accepted: usize,
-    /// Frames of the file that grows which hold their records.
-    pub frames: u64,
-    /// Time for which the recording has to go on for the last tap to count as well (s).
+    /// Frames of the file that grows in which all taps that count would count if it ended there. `None` while the last one
+    /// would be cut off.
+    pub frames: Option<u64>,
+    /// Time for which the recording has to go on, or the last tap is cut off (s).
     pub missing: f64,
 }
 
-/// What a look says of the end of the recording.
+/// What a look says of the end of the recording, in frames of the file that grows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Standing {
-    /// Reported taps that count, the last one among them.
-    accepted: usize,
-    /// The last reported tap, if it counts.
-    last: Option<LastTap>,
-    /// Frame of the file that grows at which a tap begins that is not reported yet.
+    /// If the recording ended before this frame, the last reported tap would not count; 0 where it does not count anyhow.
+    last_stands_at: u64,
+    /// Frame at which a tap begins that is not reported yet.
     unreported: Option<u64>,
-}
-
-/// The last tap, by frames of the file that grows.
-#[derive(Debug, Clone, Copy)]
-struct LastTap {
-    /// Its record begins here.
-    begin: u64,
-    /// If the recording ended before this, it would not count.
-    stands_at: u64,
 }
 
 /// A tap that was reported.
@@ -123,8 +111,6 @@ pub struct Listener<'a> {
     /// The record of the newest alarm begins at this frame or later. `None` once a look has found it.
     begun: Option<u64>,
     standing: Standing,
-    /// How far the taps excite the structure, and the end of the band (Hz), where that is not enough.
-    reach: Option<(f64, f64)>,
     reported: Vec<Reported>,
     /// Code and channel of the doubts that were reported.
     doubts: Vec<(&'static str, Option<usize>)>,
@@ -158,7 +144,6 @@ impl<'a> Listener<'a> {
             due: None,
             begun: None,
             standing: Standing::default(),
-            reach: None,
             reported: Vec::new(),
             doubts: Vec::new(),
             remarks: Vec::new(),
@@ -238,6 +223,7 @@ impl<'a> Listener<'a> {
         // The record of a tap may end in the next file.
         self.due = self.due.map(|_| self.record_frames());
         self.begun = self.begun.map(|_| 0);
+        self.standing = Standing::default();
         Ok(news)
     }
 
@@ -255,42 +241,37 @@ impl<'a> Listener<'a> {
 
     /// Returns how much of the recording stands, even if it ended now.
     pub fn settled(&self) -> Settled {
-        let standing = &self.standing;
-        let limits = [self.begun, standing.unreported].into_iter().flatten();
-        let frames = limits.fold(self.growing.frames(), u64::min);
-        match standing.last {
-            Some(last) if last.stands_at > frames => {
-                let missing = (last.stands_at - frames) as f64 / self.growing.sample_rate();
-                Settled {
-                    accepted: standing.accepted - 1,
-                    frames: last.begin,
-                    // The next tap has ended its record.
-                    missing: match standing.unreported {
-                        Some(_) => 0.0,
-                        None => missing,
-                    },
-                }
-            }
-            _ => Settled {
-                accepted: standing.accepted,
-                frames,
-                missing: 0.0,
-            },
+        let Standing {
+            last_stands_at,
+            unreported,
+        } = self.standing;
+        let now = self.growing.frames();
+        let begun = [self.begun, unreported].into_iter().flatten();
+        let frames = begun.fold(now, u64::min);
+        // Where the next tap has ended its record, nothing more comes.
+        let missing = match unreported {
+            Some(_) => 0,
+            None => last_stands_at.saturating_sub(now),
+        };
+        Settled {
+            frames: Some(frames).filter(|frames| last_stands_at <= *frames),
+            missing: missing as f64 / self.growing.sample_rate(),
         }
     }
 
-    /// Times of the taps that [`settled`](Self::settled) counts (s).
+    /// Times of the taps that count (s).
     pub fn counting(&self) -> Vec<f64> {
         let reported = self.reported.iter();
         let accepted = reported.filter(|tap| tap.rejection.is_none());
-        let times = accepted.map(|tap| tap.time);
-        times.take(self.settled().accepted).collect()
+        accepted.map(|tap| tap.time).collect()
     }
 
     /// Returns how far the taps excite the structure in the mean, and the end of the stated band (Hz), where they do not reach
     /// four fifths of it. `None` otherwise, and without a hammer.
     pub fn reach(&self) -> Option<(f64, f64)> {
-        self.reach
+        let found = self.latest.as_ref()?;
+        let (pulse, end) = (found.taps.mean_pulse()?, found.band_end?);
+        (pulse.usable_to < ENOUGH_OF_BAND * end).then_some((pulse.usable_to, end))
     }
 
     /// Returns false before the first look, which shows whether the recording fits what is known of it.
@@ -305,7 +286,8 @@ impl<'a> Listener<'a> {
 
     /// Number of taps that count.
     pub fn accepted(&self) -> usize {
-        self.standing.accepted
+        let reported = self.reported.iter();
+        reported.filter(|tap| tap.rejection.is_none()).count()
     }
 
     /// Length of what was heard, of all files (s).
@@ -388,9 +370,6 @@ impl<'a> Listener<'a> {
             self.due = Some((end * self.growing.sample_rate()).ceil().max(0.0) as u64);
         }
         self.standing = self.standing(&found, waiting.is_some(), is_growing);
-        let pulse = found.taps.mean_pulse().zip(found.band_end);
-        let reach = pulse.map(|(pulse, end)| (pulse.usable_to, end));
-        self.reach = reach.filter(|(usable_to, end)| *usable_to < ENOUGH_OF_BAND * end);
         self.reported = reported;
         self.latest = Some(found);
         Ok(news)
@@ -407,19 +386,16 @@ impl<'a> Listener<'a> {
             standing.unreported = Some(last.record.start.saturating_sub(first));
             judged = before;
         }
-        standing.accepted = judged.iter().filter(|tap| tap.accepted()).count();
         if let Some(last) = judged.last()
             && is_growing
             && last.accepted()
             && last.record.end > first
         {
-            let place = judged.len() - 1;
-            let needed = found.taps.needed_of_last(place, rate, found.wanted);
+            let needed = found
+                .taps
+                .needed_of_last(judged.len() - 1, rate, found.wanted);
             let stands_at = last.usable_from() + (needed * rate).ceil() as u64;
-            standing.last = Some(LastTap {
-                begin: last.record.start.saturating_sub(first),
-                stands_at: stands_at.saturating_sub(first),
-            });
+            standing.last_stands_at = stands_at.saturating_sub(first);
         }
         standing
     }

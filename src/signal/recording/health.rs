@@ -306,7 +306,7 @@ impl ChannelHealth {
         }
         if let Some(EqualRun { start, len, value }) = self.dropped.first() {
             let problem = format!(
-                "runs of repeated samples inside the moving signal: {} with {} samples in all, the first at {:.6} s ({len} samples of {}); the recorder probably lost data; leave these taps out or record again",
+                "runs of repeated samples inside the moving signal: {}; samples in them: {}, the first at {:.6} s ({len} samples of {}); the recorder probably lost data; leave these taps out or record again",
                 self.dropout_count,
                 self.dropped_samples,
                 *start as f64 / sample_rate,

@@ -9,12 +9,12 @@ use std::ops::Range;
 use tapjoint_numerics::stats::median;
 
 /// A record shorter than this share of the median one is not worth shortening all others for.
-const SHORT_OF_MEDIAN: f64 = 0.5;
+pub(super) const SHORT_OF_MEDIAN: f64 = 0.5;
 /// A second hit is looked for so long after the first (s): longer than records usually last, and a bound
 /// on memory.
 const SEARCHED: f64 = 10.0;
 /// The last record may be cut to this share of the shortest other one.
-const CUT_OF_SHORTEST: f64 = 0.8;
+pub(super) const CUT_OF_SHORTEST: f64 = 0.8;
 
 /// What is measured of one event, before it is judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -213,19 +213,6 @@ fn overload(
         }
     }
     Ok(found)
-}
-
-/// Length of record (s) from which on a tap counts if the recording ends with it, by the taps `before` it. 0 for the first
-/// one. [`reject_short`] may ask for less: its median holds the tap itself.
-pub(super) fn needed_of_last(before: &[Tap], rate: f64, wanted: Option<f64>) -> f64 {
-    let accepted = before.iter().filter(|tap| tap.accepted());
-    let mut lengths: Vec<f64> = accepted.map(|tap| tap.frames() as f64 / rate).collect();
-    let Some(shortest) = lengths.iter().copied().reduce(f64::min) else {
-        return 0.0;
-    };
-    let wanted = wanted.unwrap_or(f64::INFINITY);
-    let by_median = SHORT_OF_MEDIAN * wanted.min(median(&mut lengths));
-    by_median.max(CUT_OF_SHORTEST * wanted.min(shortest))
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest

@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
-use judge::{needed_of_last, reject_short};
+use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, reject_short};
 use search::Survey;
 use tapjoint_numerics::stats::median;
 
@@ -417,10 +417,30 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Length of record (s) from which on the tap at this place counts if the recording ends with it, by those before it.
-    /// `wanted` is what the block needs (s), where one is given.
+    /// Length of record (s) from which on the tap at this place counts if the recording ends with it, by those before it; 0 of
+    /// the first one. `rate` is the sample rate (Hz), and `wanted` what the block needs (s), where one is given. The judge
+    /// may ask for less: its median holds the tap itself.
     pub fn needed_of_last(&self, place: usize, rate: f64, wanted: Option<f64>) -> f64 {
-        needed_of_last(&self.taps[..place], rate, wanted)
+        let pairs = self.taps.iter().zip(self.taps.iter().skip(1)).take(place);
+        let accepted = pairs.filter(|(tap, _)| tap.accepted());
+        // The last one of a file may be cut off.
+        let (mut all, mut shortest) = (Vec::new(), f64::INFINITY);
+        for (tap, next) in accepted {
+            let length = tap.frames() as f64 / rate;
+            all.push(length);
+            if tap.file == next.file {
+                shortest = shortest.min(length);
+            }
+        }
+        if all.is_empty() {
+            return 0.0;
+        }
+        let wanted = wanted.unwrap_or(f64::INFINITY);
+        let by_median = SHORT_OF_MEDIAN * wanted.min(median(&mut all));
+        match shortest.is_finite() {
+            true => by_median.max(CUT_OF_SHORTEST * wanted.min(shortest)),
+            false => by_median,
+        }
     }
 
     /// Those that enter the averages.

@@ -4,7 +4,7 @@
   const byId = (id) => document.getElementById(id);
   let chosen = null;
   let bench = { taps: [] };
-  const shown = {};
+  let shown = "";
 
   // The tap that is chosen, or the last one that is shown.
   function act(action) {
@@ -30,12 +30,11 @@
     }));
   }
 
-  // True where a part differs from what was shown last.
-  function changed(part, value) {
-    const text = JSON.stringify(value);
-    if (shown[part] === text) return false;
-    shown[part] = text;
-    return true;
+  // True where the taps differ from those that were shown last.
+  function changed(taps) {
+    const before = shown;
+    shown = JSON.stringify(taps);
+    return shown !== before;
   }
 
   function choose(time) {
@@ -78,10 +77,10 @@
     // The report says the same and more.
     items(byId("result"), bench.result.length ? bench.result : ["no result yet"]);
     byId("precision").textContent = bench.precision;
-    // A button that is made anew between two clicks, or has the focus, would lose them.
-    if (changed("notes", bench.notes)) items(byId("notes"), bench.notes.slice().reverse());
+    items(byId("notes"), bench.notes.slice().reverse());
     byId("notes-head").hidden = bench.notes.length === 0;
-    if (changed("taps", bench.taps)) showTaps();
+    // Only then: a button that is made anew loses the focus, or half a click.
+    if (changed(bench.taps)) showTaps();
     if (!bench.report) byId("report").hidden = true;
     byId("result").hidden = !byId("report").hidden;
     if (bench.report !== report && bench.report > 0) showReport(bench.report);

@@ -159,7 +159,7 @@ fn prop_lost_samples_are_found_as_zeros_and_as_repeated_values() {
         assert_eq!(codes(&recording), ["dropped-samples"]);
         let text = recording.warnings()[0].to_string();
         assert!(
-            text.contains("moving signal: 2 with 104 samples") && text.contains("0.700000 s"),
+            text.contains("moving signal: 2; samples in them: 104") && text.contains("0.700000 s"),
             "{text}"
         );
     }

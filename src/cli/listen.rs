@@ -262,9 +262,10 @@ pub(super) fn run(
     };
     let begun = Begun::new(arguments, described.as_ref(), &target)?;
     let mut views = arguments.views(&terminal)?;
-    views.say(&introduction(arguments, described.as_ref(), &target));
     let stream = Running::begin(begun.source, begun.names);
+    // Who has read the first line may end the recording with a signal.
     ledger().stop = Some(stream.stopper());
+    views.say(&introduction(arguments, described.as_ref(), &target));
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
     let (mut failed, mut stream_doubts) = (None, Vec::new());
     let (heard, end) = loop {

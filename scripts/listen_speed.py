@@ -116,16 +116,17 @@ def live(program, folder, taps, gap):
 def long(program, folder, hours, gap):
     random = np.random.default_rng(1)
     dampings, shapes = random.uniform(0.008, 0.02, 5), random.uniform(0.3, 1.0, (3, 5))
-    some = [stretch(random, gap, dampings, shapes)[0] for _ in range(20)]
+    some = [stretch(random, gap, dampings, shapes) for _ in range(20)]
     count = int(hours * 3600 / gap)
     process = start(program, folder)
-    lines = []
+    hits, lines = [], []
     reader = threading.Thread(target=lambda: lines.extend(process.stdout))
     reader.start()
     given = hashlib.sha256()
     begin = time.perf_counter()
     for number in range(count):
-        piece = some[int(random.integers(0, len(some)))]
+        piece, hit = some[int(random.integers(0, len(some)))]
+        hits.append(number * gap + hit)
         given.update(piece)
         process.stdin.write(piece)
         if number + 1 in (count // 4, count // 2):
@@ -138,8 +139,13 @@ def long(program, folder, hours, gap):
         time.sleep(0.05)
     reader.join()
     passed = time.perf_counter() - begin
-    reported = sum(line.startswith(b"tap at") for line in lines)
-    print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, {reported} of {count} taps reported, peak memory {peak:.0f} MB")
+    times = np.array([float(line.split()[2]) for line in lines if line.startswith(b"tap at")])
+    # A line says a tap for the first time, or revises it. The words have two decimals.
+    nearest = [int(np.argmin(np.abs(np.array(hits) - time_))) for time_ in times]
+    right = [number for number, time_ in zip(nearest, times) if abs(hits[number] - time_) < 0.02]
+    found = len(set(right))
+    print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, peak memory {peak:.0f} MB")
+    print(f"{found} of {count} taps reported, {len(right) - found} lines that revise one, {len(times) - len(right)} without a hit")
     print(lines[-1].decode().strip() if lines else "no answer")
     written = hashlib.sha256()
     files = sorted(folder.glob("taps*.wav"), key=lambda file: (len(file.name), file.name))

@@ -263,7 +263,7 @@ pub(super) fn run(
     let begun = Begun::new(arguments, described.as_ref(), &target)?;
     let mut views = arguments.views(&terminal)?;
     let stream = Running::begin(begun.source, begun.names);
-    // Who has read the first line may end the recording with a signal.
+    // A user who has read the first line may send a signal: it ends the recording.
     ledger().stop = Some(stream.stopper());
     views.say(&introduction(arguments, described.as_ref(), &target));
     let (mut headers, mut first, mut split) = (begun.headers, None, None);

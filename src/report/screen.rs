@@ -33,6 +33,11 @@ const NARROWEST: usize = 8;
 const READABLE: usize = 24;
 /// So many ways to shorten names leave out only what all of them share: these come before a column goes.
 const GENTLE: usize = 3;
+/// Units that stay in the line of their number.
+const UNITS: &str =
+    "% Hz kHz s ms min h m mm \u{b5}m m/s2 m/s\u{b2} N kN N/m MN/m g kg dB GPa kB MB GB bit";
+/// Signs that stay in the line of the numbers on both sides.
+const SIGNS: [&str; 2] = ["\u{b1}", "\u{d7}"];
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
@@ -300,10 +305,8 @@ fn row(table: &Table, shown: &[Shown], cells: &[Vec<String>]) -> String {
 
 /// Returns a text in lines of at most `width` characters, broken between words where that is possible.
 fn broken(text: &str, width: usize) -> Vec<String> {
-    // A number stays with its unit: "mains 50 Hz".
-    let text = text.replace(" Hz", "\u{a0}Hz");
     let mut lines = vec![String::new()];
-    for word in text.split(' ') {
+    for word in words(text) {
         let mut rest: Vec<char> = word.chars().collect();
         let used = lines.last().map_or(0, |line| length(line));
         if used > 0 && used + 1 + rest.len() <= width {
@@ -324,13 +327,32 @@ fn broken(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
+/// Returns what a line is not broken in: words, held together by no-break spaces, and numbers with their
+/// sign and unit.
+fn words(text: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let pieces = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
+    for piece in pieces.filter(|piece| !piece.is_empty()) {
+        let unit = piece.trim_end_matches(['.', ',', ';', ':', ')', '\u{2026}']);
+        let follows_number = SIGNS.contains(&piece) || UNITS.split(' ').any(|one| one == unit);
+        match words.last_mut() {
+            Some(last)
+                if SIGNS.iter().any(|sign| last.ends_with(sign))
+                    || (follows_number && last.ends_with(|c: char| c.is_ascii_digit())) =>
+            {
+                last.push(' ');
+                last.push_str(piece);
+            }
+            _ => words.push(piece.to_owned()),
+        }
+    }
+    words
+}
+
 /// Returns a text in lines of at most `width` characters; lines after the first are indented.
 pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
-    // Lines are not broken at no-break spaces.
-    let words = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
-    for word in words.filter(|word| !word.is_empty()) {
-        let mut word = word.to_owned();
+    for mut word in words(text) {
         let room = width.saturating_sub(indent);
         if length(&word) > room {
             word = word.chars().take(room.saturating_sub(1)).collect();
@@ -351,6 +373,17 @@ pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[test]
+    fn prop_a_number_stays_in_the_line_of_its_unit() {
+        let text = "tap at 26.04 s accepted: peak 12.5 N, pulse 0.592 ms, still 2.5 \u{b1} 0.1 % (1000 Hz).";
+        for width in 24..80 {
+            let lines = lines_of(text, width, 2);
+            let pieces: Vec<&str> = lines.iter().map(|line| line.trim_start()).collect();
+            assert_eq!(pieces.join(" "), text);
+            let is_cut = |line: &str| line.ends_with(|c: char| c.is_ascii_digit() || c == '\u{b1}');
+            assert!(!lines.iter().any(|line| is_cut(line)), "{lines:?}");
+        }
+    }
     #[test]
     fn regress_numbers_are_never_cut() {
         let column = |index: usize| Column {

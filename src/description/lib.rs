@@ -275,6 +275,9 @@ pub struct RecordingDescription {
     pub file: PathBuf,
     /// Frequencies (Hz) of the modes that were chosen by hand for this recording, ascending; `None` = those of the analysis.
     pub poles: Option<Vec<f64>>,
+    /// Name for tables in place of the files, where a recording is played into others; `None` = that of the files. No key
+    /// gives it.
+    pub shown_as: Option<String>,
     /// Further files of the same set-up, which follow it.
     pub more_files: Vec<PathBuf>,
     /// Frames of the last file that are read, while it goes on growing; `None` = all. No key gives it.

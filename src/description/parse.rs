@@ -368,6 +368,9 @@ impl RecordingDescription {
 
     /// Name for tables: the file, or "1.wav + 2 more".
     pub fn name(&self) -> String {
+        if let Some(name) = &self.shown_as {
+            return name.clone();
+        }
         let first = self.file.display();
         match self.more_files.len() {
             0 => first.to_string(),

@@ -348,6 +348,7 @@ pub(super) fn read_recording(
     Ok(RecordingDescription {
         poles: table.optional("poles", read_poles)?,
         file: files.remove(0),
+        shown_as: None,
         more_files: files,
         frames: None,
         line: named.line,

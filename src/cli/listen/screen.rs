@@ -254,12 +254,17 @@ fn fitted(screen: Screen, sentences: &[String], rows: usize) -> Vec<String> {
     lines
 }
 
-/// Ends a line of at most so many columns with an ellipsis.
+/// Ends a line of at most so many columns with an ellipsis. Words are not cut: a number would become another one.
 fn mark(line: &mut String, columns: usize) {
-    if !line.ends_with('\u{2026}') {
-        let most = columns.saturating_sub(2);
-        *line = line.chars().take(most).collect::<String>() + " \u{2026}";
+    let most = columns.saturating_sub(2);
+    if line.ends_with('\u{2026}') {
+        return;
     }
+    if line.chars().count() > most {
+        *line = line.chars().take(most + 1).collect();
+        line.truncate(line.rfind(' ').unwrap_or(line.len()));
+    }
+    line.push_str(" \u{2026}");
 }
 
 fn text_of(lines: Vec<String>) -> Text<'static> {

@@ -81,13 +81,10 @@ impl Subject {
                     recording.file = first?;
                 }
                 recording.more_files = files.collect::<Result<_, _>>()?;
+                recording.shown_as = Some(name.clone());
                 recording.by_hand = question.by_hand.clone();
                 recording.frames = Some(question.frames);
-                let mut analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
-                // By the name that the description gives it.
-                if let Some(own) = analysis.recordings.get_mut(*table) {
-                    own.file.clone_from(name);
-                }
+                let analysis = file.analyse(&IdentifySettings::unperturbed(), &())?;
                 let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
                 let mut document = document_of(&analysis);
                 document.add_gap(gap_section(diagnosis.as_ref()));

@@ -229,11 +229,11 @@ pub(super) fn reject_short(
     let ended = ended.filter(|(index, tap)| tap.accepted() && Some(*index) != going_on);
     let mut lengths: Vec<f64> = ended.map(|(_, tap)| tap.frames() as f64 / rate).collect();
     let typical = median(&mut lengths);
-    let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
+    let needed = SHORT_OF_MEDIAN * wanted.map_or(typical, |wanted| wanted.min(typical));
     for (index, tap) in taps.iter_mut().enumerate() {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if tap.accepted() && Some(index) != going_on && available <= SHORT_OF_MEDIAN * needed {
+        if tap.accepted() && Some(index) != going_on && available <= needed {
             tap.rejection = Some(if let Some(overload) = tap.overload {
                 Rejection::Overload(overload)
             } else if lasts.contains(&index) {
@@ -250,15 +250,11 @@ pub(super) fn reject_short(
     let shortest = others
         .map(|(_, tap)| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
-    let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
+    let needed = CUT_OF_SHORTEST * wanted.map_or(shortest, |wanted| wanted.min(shortest));
     for &last in lasts.iter().filter(|last| Some(**last) != going_on) {
         let tap = &mut taps[last];
         let available = tap.frames() as f64 / rate;
-        if tap.accepted()
-            && tap.is_whole()
-            && needed.is_finite()
-            && available < CUT_OF_SHORTEST * needed
-        {
+        if tap.accepted() && tap.is_whole() && needed.is_finite() && available < needed {
             tap.rejection = Some(Rejection::CutOff { available, needed });
         }
     }

@@ -224,14 +224,14 @@ pub enum Rejection {
     CutOff {
         /// Length recorded (s).
         available: f64,
-        /// Length of the others (s).
+        /// Least length (s).
         needed: f64,
     },
     /// The next tap comes before the record is long enough.
     NextTooSoon {
         /// Length recorded (s).
         available: f64,
-        /// Length of the others (s).
+        /// Least length (s).
         needed: f64,
     },
     /// Its response departs from that of the other taps.

@@ -964,7 +964,7 @@ fn regress_short_records_say_what_cut_them() {
         // 0.6 s and the 10 ms before the trigger.
         Rejection::CutOff { available, needed } => {
             assert!(
-                near(*available, 0.61) && near(*needed, 2.0),
+                near(*available, 0.61) && near(*needed, 1.0),
                 "{available} {needed}"
             );
         }
@@ -975,7 +975,7 @@ fn regress_short_records_say_what_cut_them() {
     match only_rejected(&taps, 5, 1, "the next tap comes") {
         Rejection::NextTooSoon { available, needed } => {
             assert!(
-                near(*available, 0.6) && near(*needed, 2.0),
+                near(*available, 0.6) && near(*needed, 1.0),
                 "{available} {needed}"
             );
         }

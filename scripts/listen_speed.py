@@ -139,9 +139,10 @@ def long(program, folder, hours, gap):
         time.sleep(0.05)
     reader.join()
     passed = time.perf_counter() - begin
+    hits = np.array(hits)
     times = np.array([float(line.split()[2]) for line in lines if line.startswith(b"tap at")])
     # A line says a tap for the first time, or revises it. The words have two decimals.
-    nearest = [int(np.argmin(np.abs(np.array(hits) - time_))) for time_ in times]
+    nearest = [int(np.argmin(np.abs(hits - time_))) for time_ in times]
     right = [number for number, time_ in zip(nearest, times) if abs(hits[number] - time_) < 0.02]
     found = len(set(right))
     print(f"{count * gap / 3600:.2f} h in {passed:.0f} s, peak memory {peak:.0f} MB")

@@ -456,9 +456,12 @@ fn files_beside(described: Option<&TestFile>, target: &Target, heard: &Heard) ->
         format!("\"{}\"", name.display())
     });
     let names = names.collect::<Vec<_>>().join(", ");
-    let place = match described {
-        Some(_) => "the description",
-        None => "a description (`tapjoint init` prints one)",
+    let (place, others) = match described {
+        Some(_) => (
+            "the description in place of its file",
+            ", or start listen again where recordings are missing",
+        ),
+        None => ("a description (`tapjoint init` prints one)", ""),
     };
     let by_hand = match (described, &heard.by_hand) {
         (None, Some(by_hand)) => by_hand_lists(by_hand)
@@ -467,7 +470,7 @@ fn files_beside(described: Option<&TestFile>, target: &Target, heard: &Heard) ->
         _ => String::new(),
     };
     Some(format!(
-        "one recording in {} files, no report yet: write files = [{names}]{by_hand} in {place}, then run the test\n",
+        "one recording in {} files, no report yet: write files = [{names}]{by_hand} in {place}, then run the test{others}\n",
         heard.files.len()
     ))
 }

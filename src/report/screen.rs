@@ -306,7 +306,7 @@ fn row(table: &Table, shown: &[Shown], cells: &[Vec<String>]) -> String {
 /// Returns a text in lines of at most `width` characters, broken between words where that is possible.
 fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
-    for word in words(text) {
+    for word in words(text, width) {
         let mut rest: Vec<char> = word.chars().collect();
         let used = lines.last().map_or(0, |line| length(line));
         if used > 0 && used + 1 + rest.len() <= width {
@@ -327,23 +327,25 @@ fn broken(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Returns what a line is not broken in: words, held together by no-break spaces, and numbers with their
-/// sign and unit.
-fn words(text: &str) -> Vec<String> {
+/// Returns the pieces between which a line may be broken: words, words joined by no-break spaces, and numbers with
+/// their sign and unit where these fit into `width` characters.
+fn words(text: &str, width: usize) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let pieces = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
     for piece in pieces.filter(|piece| !piece.is_empty()) {
         let unit = piece.trim_end_matches(['.', ',', ';', ':', ')', '\u{2026}']);
         let follows_number = SIGNS.contains(&piece) || UNITS.split(' ').any(|one| one == unit);
-        match words.last_mut() {
-            Some(last)
-                if SIGNS.iter().any(|sign| last.ends_with(sign))
-                    || (follows_number && last.ends_with(|c: char| c.is_ascii_digit())) =>
-            {
+        let joined = words.last_mut().filter(|last| {
+            let is_sign = SIGNS.iter().any(|sign| last.ends_with(sign));
+            let is_number = last.ends_with(|c: char| c.is_ascii_digit());
+            (is_sign || (is_number && follows_number)) && length(last) + 1 + length(piece) <= width
+        });
+        match joined {
+            Some(last) => {
                 last.push(' ');
                 last.push_str(piece);
             }
-            _ => words.push(piece.to_owned()),
+            None => words.push(piece.to_owned()),
         }
     }
     words
@@ -352,8 +354,8 @@ fn words(text: &str) -> Vec<String> {
 /// Returns a text in lines of at most `width` characters; lines after the first are indented.
 pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
-    for mut word in words(text) {
-        let room = width.saturating_sub(indent);
+    let room = width.saturating_sub(indent);
+    for mut word in words(text, room) {
         if length(&word) > room {
             word = word.chars().take(room.saturating_sub(1)).collect();
             word.push('\u{2026}');
@@ -383,6 +385,11 @@ mod tests {
             let is_cut = |line: &str| line.ends_with(|c: char| c.is_ascii_digit() || c == '\u{b1}');
             assert!(!lines.iter().any(|line| is_cut(line)), "{lines:?}");
         }
+        // Where a number with its unit is too long, it is broken beside the number.
+        assert_eq!(
+            broken("position 344.7 \u{b1} 6.1 mm", 8),
+            ["position", "344.7 \u{b1}", "6.1 mm"]
+        );
     }
     #[test]
     fn regress_numbers_are_never_cut() {

@@ -359,6 +359,36 @@ fn regress_a_description_names_the_next_recording() {
 }
 
 #[test]
+fn recover_a_resumed_recording_as_the_last_line_says() {
+    let folder = samples();
+    let place = folder.path();
+    let test = place.join("recordings/cantilever");
+    let high = fs::read(test.join("high.wav")).unwrap();
+    let low = fs::read(place.join(LOW)).unwrap();
+    fs::remove_file(test.join("high.wav")).unwrap();
+    let given = ["recordings/cantilever/test.toml", "--out", "report"];
+    let ended = fed(place, &[given[0], "--resume"], &low);
+    let printed = String::from_utf8(ended.stdout).unwrap();
+    assert!(
+        printed.ends_with(
+            "one recording in 2 files, no report yet: write files = [\"low.wav\", \"low-2.wav\"] in the description in place of its file, then run the test, or start listen again where recordings are missing\n"
+        ),
+        "{printed}"
+    );
+    let text = fs::read_to_string(test.join("test.toml")).unwrap();
+    let files = "files = [\"low.wav\", \"low-2.wav\"]";
+    assert!(text.contains("file = \"low.wav\""), "{text}");
+    fs::write(
+        test.join("test.toml"),
+        text.replacen("file = \"low.wav\"", files, 1),
+    )
+    .unwrap();
+    let ended = fed(place, &given, &high);
+    assert_eq!(ended.status.code(), Some(0));
+    assert!(place.join("report/report.html").is_file());
+}
+
+#[test]
 fn regress_a_resumed_recording_takes_its_own_next_file() {
     let folder = samples();
     let place = folder.path();

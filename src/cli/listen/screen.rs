@@ -445,6 +445,21 @@ mod tests {
     }
 
     #[test]
+    fn limit_a_line_that_is_cut_ends_between_words() {
+        let text = "620.4509 \u{b1} 0.0002; 975";
+        for columns in 12..40 {
+            let mut line = text.to_owned();
+            mark(&mut line, columns);
+            assert!(line.chars().count() <= columns, "{line}");
+            let kept = line.strip_suffix(" \u{2026}").unwrap();
+            assert!(
+                format!("{text} ").starts_with(&format!("{kept} ")),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
     fn regress_the_screen_has_all_that_is_needed() {
         let wanted = "\
 recording low.wav, tap at 0.385 m                                          0.9 s

@@ -229,3 +229,54 @@ impl States {
         ready
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn prop_a_recording_that_is_played_elsewhere_gives_the_lines_of_the_test() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/cantilever/test.toml");
+        let file = TestFile::of(&path, std::fs::read_to_string(&path).unwrap()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let (own, played) = (path.with_file_name("high.wav"), folder.path().join("a.wav"));
+        std::fs::copy(&own, &played).unwrap();
+        let table = file
+            .test
+            .recordings
+            .iter()
+            .position(|one| one.name() == "high.wav");
+        let table = table.unwrap();
+        let mut lines = Vec::new();
+        for name in [own, played] {
+            let file = TestFile {
+                test: file.test.clone(),
+                name: file.name.clone(),
+                folder: file.folder.clone(),
+            };
+            let mut subject = Subject::Described {
+                file: Box::new(file),
+                table,
+                name: "high.wav".to_owned(),
+            };
+            let question = Question {
+                files: vec![name],
+                // More than the file has.
+                frames: u64::MAX,
+                counting: Vec::new(),
+                by_hand: TapsByHand::default(),
+                wants_page: false,
+            };
+            lines.push(subject.answer(&question).unwrap().lines);
+        }
+        assert_eq!(lines[0], lines[1]);
+        // Its fifth mode, which only this recording reaches, has the lowest coherence of the test.
+        assert!(
+            lines[1]
+                .iter()
+                .any(|line| line.contains("lowest coherence 0.572 (mode 5)")),
+            "{lines:?}"
+        );
+    }
+}

@@ -6,7 +6,7 @@ use tapjoint_description::{FoundChannel, FoundContent, FoundRecording, FunctionF
 use tapjoint_signal::recording::{
     FrequencyResponses, ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
+use tapjoint_signal::taps::{TapSettings, TapSource, Taps, find_taps};
 
 /// Samples of each channel by which a hammer is recognised.
 const LOOKED_AT: u64 = 4_000_000;
@@ -107,20 +107,46 @@ fn hammer(recording: &Recording) -> Result<Option<(usize, &'static str)>, Record
     if let Some(channel) = in_newton {
         return Ok(Some((channel, "by its unit")));
     }
-    let mut sharpness = Vec::with_capacity(channels.len());
-    for channel in 0..channels.len() {
+    let sharpest = channel_of_pulses(recording)?;
+    Ok(sharpest.map(|channel| (channel, "by its short pulses; check it")))
+}
+
+/// Returns a doubt where most taps are rejected, and another channel has the short pulses of a hammer.
+pub fn hammer_doubt(recording: &Recording, source: &TapSource, taps: &Taps) -> Option<String> {
+    let TapSource::Hammer { channel, .. } = source else {
+        return None;
+    };
+    let (total, accepted) = (taps.taps.len(), taps.accepted().count());
+    if 2 * accepted >= total {
+        return None;
+    }
+    // Without an answer there is no doubt; a file that cannot be read is an error elsewhere.
+    let other = channel_of_pulses(recording).ok().flatten()?;
+    let (number, other) = (channel + 1, other + 1);
+    (number != other).then(|| {
+        format!(
+            "{} of {total} taps are rejected with channel {number} as the hammer's, and channel {other} has the short pulses of a \
+             hammer; if so, say --hammer {other}, or correct the `channel` of the hammer in the description",
+            total - accepted
+        )
+    })
+}
+
+/// Returns the channel (0-based) whose pulses are far shorter than those of the others; `None` where there is none.
+fn channel_of_pulses(recording: &Recording) -> Result<Option<usize>, RecordingError> {
+    let channels = recording.channels().len();
+    let mut sharpness = Vec::with_capacity(channels);
+    for channel in 0..channels {
         sharpness.push(kurtosis(&recording.read(channel, 0..LOOKED_AT)?));
     }
-    let sharpest = (0..channels.len()).max_by(|a, b| sharpness[*a].total_cmp(&sharpness[*b]));
+    let sharpest = (0..channels).max_by(|a, b| sharpness[*a].total_cmp(&sharpness[*b]));
     let is_hammer = |channel: &usize| {
         let mut others = (0..sharpness.len()).filter(|other| other != channel);
         sharpness[*channel] >= PULSES
             && sharpness.len() > 1
             && others.all(|other| sharpness[*channel] >= SHORTER * sharpness[other])
     };
-    Ok(sharpest
-        .filter(is_hammer)
-        .map(|channel| (channel, "by its short pulses; check it")))
+    Ok(sharpest.filter(is_hammer))
 }
 
 /// Returns the fourth moment over the square of the second, about the mean; 0 for a constant.

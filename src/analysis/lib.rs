@@ -50,7 +50,7 @@ pub use bare::{
 use checks::judge;
 pub use compared::{compared_items, compared_test};
 pub use explained::{FittedCurves, STRONG_PEAK, UnlistedPeak};
-pub use found::look_at;
+pub use found::{hammer_doubt, look_at};
 pub use free_test::{FreeTest, FreeTestError, measure_free_test};
 pub use frf::{FittedCurve, Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use function_file::{FunctionSettings, measure_functions_watched};

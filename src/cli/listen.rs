@@ -268,6 +268,7 @@ pub(super) fn run(
     views.say(&introduction(arguments, described.as_ref(), &target));
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
     let (mut failed, mut stream_doubts) = (None, Vec::new());
+    let mut has_wrong_rate = false;
     let (heard, end) = loop {
         let bare = arguments.run.bare();
         let plan = plan_of(described.as_ref(), &target, &bare);
@@ -283,7 +284,8 @@ pub(super) fn run(
         if begun.aside.is_none() {
             hearing.log = Some(Log::beside(&target.file));
         }
-        if begun.has_states {
+        hearing.has_wrong_rate = has_wrong_rate;
+        if begun.has_states && !has_wrong_rate {
             hearing.with_states();
         }
         let mut heard = hearing.listen(&stream, first.take());
@@ -291,6 +293,7 @@ pub(super) fn run(
         for doubt in std::mem::take(&mut heard.stream_doubts) {
             stream_doubts.push(format!("{file}, while it was recorded: {doubt}"));
         }
+        has_wrong_rate |= heard.has_wrong_rate;
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
         let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
@@ -341,7 +344,14 @@ pub(super) fn run(
             _ => format!("next: {}; start listen again\n", asked_for(file, &next)),
         })
     });
-    if let Some(words) = split.or(next) {
+    // Every frequency would be wrong.
+    let refused = has_wrong_rate.then(|| {
+        format!(
+            "no report: samples came at another rate than stated. Remove {name} and record it again. If the stated rate is right, \
+             `tapjoint run` gives the report\n"
+        )
+    });
+    if let Some(words) = refused.or(split).or(next) {
         // A file of JSON that was asked for does not come, or standard output is for JSON alone.
         match common.json {
             Some(_) => terminal.seal(words.trim_end())?,
@@ -349,7 +359,7 @@ pub(super) fn run(
         }
         repeat(&terminal, &stream_doubts);
         views.finish(&words);
-        return Ok(Outcome::of(heard.accepted > 0));
+        return Ok(Outcome::of(heard.accepted > 0 && !has_wrong_rate));
     }
     if let Some(by_hand) = heard.by_hand {
         terminal.say(&by_hand_words(

@@ -19,6 +19,8 @@ pub struct JudgedTap {
     pub unit: Option<String>,
     /// Its force pulse; `None` without a hammer.
     pub pulse: Option<Pulse>,
+    /// True where the sample rate limits the band that it excites, and not the pulse.
+    pub excites_all: bool,
     /// Length of its record so far (s).
     pub seconds: f64,
     /// True where the next tap, or the end of the recording, has ended its record.
@@ -68,7 +70,10 @@ impl fmt::Display for JudgedTap {
         if let Some(pulse) = &self.pulse {
             let (width, end) = (1e3 * pulse.width, pulse.usable_to);
             let (width, end) = (significant(width, DIGITS), significant(end, DIGITS));
-            write!(f, ", pulse {width} ms, excites up to {end} Hz")?;
+            match self.excites_all {
+                true => write!(f, ", pulse {width} ms, excites the whole band ({end} Hz)")?,
+                false => write!(f, ", pulse {width} ms, excites up to {end} Hz")?,
+            }
         }
         let Some(remaining) = self.remaining else {
             return Ok(());
@@ -115,6 +120,7 @@ mod tests {
                 fall_20_db: None,
                 usable_to: 832.0,
             }),
+            excites_all: false,
             seconds: 4.96,
             has_ended: true,
             remaining: Some(0.0042),
@@ -147,12 +153,18 @@ mod tests {
             remaining: Some(0.1234),
             ..judged()
         };
+        let whole = JudgedTap {
+            excites_all: true,
+            remaining: None,
+            ..judged()
+        };
         let going_on = JudgedTap {
             has_ended: false,
             ..ringing.clone()
         };
         let words = [
             News::Tap(judged()),
+            News::Tap(whole),
             News::Tap(ringing),
             News::Tap(going_on),
             News::Tap(rejected.clone()),
@@ -165,6 +177,7 @@ mod tests {
         assert_eq!(
             words,
             "tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 0.42 % in 5.0 s\n\
+             tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites the whole band (832 Hz)\n\
              tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, decays to 12 % in 5.0 s. Wait \
              longer before the next tap.\n\
              tap at 4.91 s accepted: peak 18.2 N, pulse 1.21 ms, excites up to 832 Hz, still 12 % after 5.0 s\n\

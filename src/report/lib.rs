@@ -60,7 +60,7 @@ pub use run::{
     render_first_screen, render_frf_picture, render_json, render_run, render_schema,
     render_spectrum_picture, run_files, watched_files,
 };
-pub use screen::Screen;
+pub use screen::{Screen, joined};
 pub use text::{render_readings, render_reproduction, render_stages, render_text, render_timings};
 
 /// A finished file.

@@ -351,6 +351,13 @@ fn words(text: &str, width: usize) -> Vec<String> {
     words
 }
 
+/// Returns a text whose numbers are joined with their signs and units by no-break spaces, for a page.
+pub fn joined(text: &str) -> String {
+    let words = words(text, usize::MAX).into_iter();
+    let joined: Vec<String> = words.map(|word| word.replace(' ', "\u{a0}")).collect();
+    joined.join(" ")
+}
+
 /// Returns a text in lines of at most `width` characters; lines after the first are indented.
 pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];

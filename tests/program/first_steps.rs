@@ -141,6 +141,23 @@ fn regress_a_hammer_that_is_named_or_forgotten_is_suggested() {
     assert!(text.contains("say --hammer ch1_force_V"), "{text}");
     let (text, _) = told(folder.path(), &["spectrum", "x.csv", "--hammer", "1"], 0);
     assert!(!text.contains("may be the hammer"), "{text}");
+    // A sensor that is taken for the hammer.
+    let taps = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/cantilever/low.wav");
+    let (text, _) = told(folder.path(), &["run", taps, "--hammer", "2"], 1);
+    let wanted = "> low.wav: 34 of 34 taps are rejected with channel 2 as the hammer's, and\n  channel 1 has the short pulses of a \
+                  hammer; if so, say --hammer 1, or correct\n  the `channel` of the hammer in the description.\n";
+    assert!(text.contains(wanted), "{text}");
+    // Nothing but noise.
+    let mut noise = String::from("time,a\n");
+    for index in 0..8000_u32 {
+        let value = index.wrapping_mul(2_654_435_761) >> 16;
+        noise.push_str(&format!("{},{value}\n", f64::from(index) / 1e4));
+    }
+    std::fs::write(folder.path().join("noise.csv"), noise).unwrap();
+    let (text, _) = told(folder.path(), &["run", "noise.csv"], 1);
+    let wanted =
+        "> Check the cables, the gain, and the numbers of the channels, the hammer's\n  first.\n";
+    assert!(text.contains(wanted), "{text}");
 }
 
 #[test]

@@ -423,7 +423,7 @@ fn regress_a_resumed_recording_takes_its_own_next_file() {
     assert_eq!(ended.status.code(), Some(0), "{printed}");
     // What is still missing is said before the first new tap.
     let begun = "continuing more.wav, tap at 0.385 m; 5 taps are wanted; Ctrl-C ends\n\
-        5 taps count; enough; Ctrl-C ends the recording\n\
+        5 taps count; enough; end the recording\n\
         tap at 26.04 s accepted";
     assert!(printed.starts_with(begun), "{printed}");
     assert!(fs::read(test.join("more.wav")).unwrap() == high);

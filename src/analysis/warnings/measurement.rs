@@ -4,6 +4,7 @@
 use super::Warning;
 use crate::amplitude::{AmplitudeChanges, Way};
 use crate::explained::UnlistedPeak;
+use crate::found::hammer_doubt;
 use crate::selection::{Choice, Disagreement, LEAST_TAPS, OTHER_LEVEL};
 use std::fmt;
 use tapjoint_description::DescriptionError;
@@ -435,6 +436,9 @@ pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
     if accepted == 0 && by_hand > 0 {
         let text = format!("no tap is left; `reject_taps` names {by_hand} of {total}");
         warnings.push(Warning::about(file, "taps", text));
+    }
+    if let Some(text) = hammer_doubt(recording, source, taps) {
+        warnings.push(Warning::about(file, "hammer-channel", text));
     }
     if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
         warnings.push(Warning::single_tap(file));

@@ -12,7 +12,7 @@ use std::fmt;
 use std::mem::{swap, take};
 
 /// The code of every warning, and when it is given. docs/reference.md shows the same table.
-pub const WARNING_CODES: [(&str, &str); 79] = [
+pub const WARNING_CODES: [(&str, &str); 80] = [
     // Of the description and of files, by their readers.
     (
         "description",
@@ -94,6 +94,10 @@ pub const WARNING_CODES: [(&str, &str); 79] = [
         "dropped-samples",
         "samples are repeated inside the moving signal",
     ),
+    (
+        "stopped-channel",
+        "the samples of a channel no longer change up to the end",
+    ),
     ("offset", "the mean of a channel is large beside its peak"),
     (
         "header-length",
@@ -101,7 +105,7 @@ pub const WARNING_CODES: [(&str, &str); 79] = [
     ),
     (
         "hammer-channel",
-        "by its name a response may be the hammer's channel",
+        "by its name or its pulses another channel may be the hammer's",
     ),
     // Of taps and spectra.
     ("taps", "the search for taps has a remark"),

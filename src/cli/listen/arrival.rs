@@ -17,6 +17,24 @@ const WITHIN: f64 = 60.0;
 /// A loss has to last so long (s), or the samples are only late.
 const LATE: f64 = 5.0;
 
+/// Usual rates (Hz), of sound and of vibration.
+const USUAL_RATES: [f64; 24] = [
+    1000.0, 1024.0, 2000.0, 2048.0, 2560.0, 4096.0, 5120.0, 8000.0, 8192.0, 10_240.0, 11_025.0,
+    12_800.0, 16_000.0, 20_480.0, 22_050.0, 25_600.0, 32_000.0, 44_100.0, 48_000.0, 51_200.0,
+    65_536.0, 96_000.0, 102_400.0, 192_000.0,
+];
+/// A measured rate this near to a usual one is taken for it (1). 1 %: usual rates lie 2.4 % apart at least.
+const NEAR_USUAL: f64 = 0.01;
+
+/// Something wrong with the arrival of a stream.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ArrivalDoubt {
+    /// In sentences.
+    pub(super) text: String,
+    /// True where the rate is wrong, and with it every frequency; false of a loss.
+    pub(super) is_rate: bool,
+}
+
 /// Watches the arrival of a stream.
 #[derive(Debug, Clone)]
 pub(super) struct Arrival {
@@ -52,7 +70,7 @@ impl Arrival {
     }
 
     /// Takes the arrival of so many frames at this time. Returns what is wrong, once.
-    pub(super) fn takes(&mut self, now: Duration, frames: f64) -> Option<String> {
+    pub(super) fn takes(&mut self, now: Duration, frames: f64) -> Option<ArrivalDoubt> {
         let now = now.as_secs_f64();
         let Some((first, last)) = &mut self.times else {
             self.times = Some((now, now));
@@ -73,7 +91,7 @@ impl Arrival {
         self.judge_loss(elapsed)
     }
 
-    fn judge_rate(&mut self, elapsed: f64) -> Option<String> {
+    fn judge_rate(&mut self, elapsed: f64) -> Option<ArrivalDoubt> {
         let speed = self.frames / elapsed / self.rate;
         let tolerance = RATE_TOLERANCE + self.longest_gap / elapsed;
         self.is_off = (speed - 1.0).abs() > tolerance;
@@ -81,13 +99,20 @@ impl Arrival {
             return None;
         }
         let (found, stated) = (speed * self.rate, self.rate);
-        Some(format!(
-            "{found:.0} samples a second arrive, and {stated:.0} Hz is stated. Check the rate and the channels, or whether the \
-             recorder drops samples: frequencies may be wrong by this factor"
-        ))
+        let is_near = |usual: &&f64| (found / *usual - 1.0).abs() <= NEAR_USUAL;
+        let rate = USUAL_RATES.iter().find(is_near).unwrap_or(&found);
+        Some(ArrivalDoubt {
+            text: format!(
+                "{found:.0} samples a second arrive, and {stated:.0} Hz is stated: every frequency is multiplied by {:.3}. Remove \
+                 the file, and record it again with the rate {rate:.0} Hz. If {stated:.0} Hz is right, check --channels and --format, \
+                 and whether the recorder drops samples",
+                stated / rate
+            ),
+            is_rate: true,
+        })
     }
 
-    fn judge_loss(&mut self, elapsed: f64) -> Option<String> {
+    fn judge_loss(&mut self, elapsed: f64) -> Option<ArrivalDoubt> {
         let behind = elapsed - self.frames / self.rate;
         self.behind.retain(|[then, _]| *then > elapsed - WITHIN);
         let earlier = self.behind.iter().map(|[_, behind]| *behind);
@@ -111,10 +136,13 @@ impl Arrival {
         }
         self.behind_since = None;
         self.behind.clear();
-        Some(format!(
-            "{lost:.1} s of samples are missing within the last minute: the recorder drops them. The taps of this minute may be \
-             wrong"
-        ))
+        Some(ArrivalDoubt {
+            text: format!(
+                "{lost:.1} s of samples are missing within the last minute: the recorder drops them. The taps of this minute may \
+                 be wrong"
+            ),
+            is_rate: false,
+        })
     }
 }
 
@@ -133,7 +161,7 @@ mod tests {
             let frames = 1000.0 * piece * speed;
             (!is_lost).then(|| arrival.takes(Duration::from_secs_f64(now), frames))?
         });
-        said.collect()
+        said.map(|doubt| doubt.text).collect()
     }
 
     #[test]
@@ -149,12 +177,21 @@ mod tests {
 
     #[test]
     fn recover_a_wrong_rate_and_a_loss() {
-        let words = "samples a second arrive, and 1000 Hz is stated. Check the rate and the channels, or whether the recorder \
-                     drops samples: frequencies may be wrong by this factor";
-        assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [format!("919 {words}")]);
-        assert_eq!(said(2.0, 0.1, 60.0, 0.0..0.0), [format!("2000 {words}")]);
+        let words = |found: &str, factor: &str, rate: &str| {
+            format!(
+                "{found} samples a second arrive, and 1000 Hz is stated: every frequency is multiplied by {factor}. Remove the \
+                 file, and record it again with the rate {rate} Hz. If 1000 Hz is right, check --channels and --format, and whether \
+                 the recorder drops samples"
+            )
+        };
+        let slow = words("919", "1.088", "919");
+        assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [slow]);
+        // Near a usual rate.
+        let twice = words("2010", "0.500", "2000");
+        assert_eq!(said(2.01, 0.1, 60.0, 0.0..0.0), [twice]);
         // Half of the channels that are stated.
-        assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), [format!("500 {words}")]);
+        let half = words("500", "2.000", "500");
+        assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), [half]);
         // Soon, or after an hour.
         for lost in [29.95, 3599.95] {
             assert_eq!(

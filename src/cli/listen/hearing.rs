@@ -39,6 +39,8 @@ pub(super) struct Heard {
     pub(super) is_unwritten: bool,
     /// Doubts about the stream itself, which its file does not show.
     pub(super) stream_doubts: Vec<String>,
+    /// True where samples came at another rate than stated.
+    pub(super) has_wrong_rate: bool,
     /// How the stream ended.
     pub(super) ended: anyhow::Result<End>,
     /// The recording that follows in the same stream, and its first file.
@@ -71,6 +73,8 @@ pub(super) struct Hearing<'a, 'v> {
     waits: u64,
     /// Doubts about the stream itself.
     stream_doubts: Vec<String>,
+    /// True where samples come at another rate than stated.
+    pub(super) has_wrong_rate: bool,
     files: Vec<PathBuf>,
     /// Why taps are no longer judged.
     fault: Option<ListenError>,
@@ -78,6 +82,8 @@ pub(super) struct Hearing<'a, 'v> {
     is_unwritten: bool,
     /// The recording that is to follow.
     turns_to: Option<Target>,
+    /// True once nothing more comes.
+    has_ended: bool,
 }
 
 impl<'a, 'v> Hearing<'a, 'v> {
@@ -107,10 +113,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
             is_stale: true,
             waits: 0,
             stream_doubts: Vec::new(),
+            has_wrong_rate: false,
             files: target.earlier.clone(),
             fault: None,
             is_unwritten: false,
             turns_to: None,
+            has_ended: false,
         }
     }
 
@@ -186,13 +194,33 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 self.turns_to = None;
                 self.views.warn(&words);
             }
-            Event::Doubt(text) => {
-                self.stream_doubts.push(text.clone());
-                self.take(Ok(vec![News::Doubt(text)]));
+            Event::Doubt(text) => self.doubt_stream(text),
+            Event::WrongRate(text) => {
+                self.has_wrong_rate = true;
+                // Each of its frequencies would be wrong.
+                self.end_results();
+                self.advise();
+                self.doubt_stream(text);
             }
             Event::Ended(how) => *ended = Some(how),
         }
         None
+    }
+
+    /// Works out no more results, and shows none. Returns true where there were some to come.
+    fn end_results(&mut self) -> bool {
+        (self.precision, self.apart) = (None, Vec::new());
+        let bench = &mut self.views.bench;
+        bench.precision.clear();
+        bench.result.clear();
+        bench.result_taps = 0;
+        bench.first_screen = None;
+        self.states.take().is_some()
+    }
+
+    fn doubt_stream(&mut self, text: String) {
+        self.stream_doubts.push(text.clone());
+        self.take(Ok(vec![News::Doubt(text)]));
     }
 
     /// Ends with this recording, and names the next one.
@@ -209,21 +237,14 @@ impl<'a, 'v> Hearing<'a, 'v> {
         if self.fault.is_some() {
             return;
         }
+        // Time and memory of a result grow with the recording.
+        if self.listener.is_some() && self.end_results() {
+            self.views
+                .say("the first file is full: results come at the end from here on\n");
+        }
         let news = match (opened, &mut self.listener) {
             (Err(fault), _) => Err(fault.into()),
-            (Ok(growing), Some(listener)) => {
-                // Time and memory of a result grow with the recording.
-                if self.states.take().is_some() {
-                    (self.precision, self.apart) = (None, Vec::new());
-                    let bench = &mut self.views.bench;
-                    bench.precision.clear();
-                    bench.result.clear();
-                    bench.first_screen = None;
-                    self.views
-                        .say("the first file is full: results come at the end from here on\n");
-                }
-                listener.go_on_in(growing)
-            }
+            (Ok(growing), Some(listener)) => listener.go_on_in(growing),
             (Ok(growing), None) => {
                 let settings = self.settings.clone();
                 self.listener = Some(Listener::new(growing, self.plan, settings));
@@ -268,6 +289,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
         bench.precision = precision.unwrap_or_default();
         bench.first_screen = so_far.first_screen;
         bench.result.clone_from(&so_far.lines);
+        bench.result_taps = so_far.taps;
         let mut lines = so_far.lines;
         lines.extend(Some(bench.precision.clone()).filter(|words| !words.is_empty()));
         self.precision = so_far.precision;
@@ -373,6 +395,13 @@ impl<'a, 'v> Hearing<'a, 'v> {
             self.views.bench.is_enough = false;
             return;
         }
+        if self.has_wrong_rate {
+            let file = file_name(&self.target.file);
+            self.views.bench.advice =
+                format!("the sample rate is wrong: end, remove {file}, and record it again");
+            self.views.bench.is_enough = false;
+            return;
+        }
         let listener = self.listener.as_ref();
         let counting = listener.map_or(Vec::new(), Listener::counting);
         // One of them may have been rejected since the last result.
@@ -390,9 +419,9 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let (is_enough, mut words) = progress.words();
         let next = self.views.bench.next.as_ref();
         match next.filter(|_| self.views.are_live()) {
-            _ if !is_enough => {}
+            _ if !is_enough || self.has_ended => {}
             Some(next) => words.push_str(&format!("; next: {next}")),
-            None => words.push_str("; Ctrl-C ends the recording"),
+            None => words.push_str("; end the recording"),
         }
         if let Some((reach, end)) = listener.and_then(Listener::reach) {
             words.push_str(&format!(
@@ -526,6 +555,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
     /// Judges all taps for good.
     fn end(mut self, ended: anyhow::Result<End>, turned: Option<(Target, PathBuf)>) -> Heard {
         self.states = None;
+        self.has_ended = true;
         if self.fault.is_none()
             && let Some(listener) = &mut self.listener
         {
@@ -552,8 +582,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 1 => "; 1 of them does not agree with the others".to_owned(),
                 more => format!("; {more} of them do not agree with the others"),
             };
+            let missing = match self.arguments.taps.saturating_sub(accepted) {
+                0 => String::new(),
+                missing => format!("; {missing} more were wanted"),
+            };
             self.views.say(&format!(
-                "{}: {heard}{:.1} s, taps that count: {accepted} of {}{apart}\n",
+                "{}: {heard}{:.1} s, taps that count: {accepted} of {}{apart}{missing}\n",
                 file_name(&self.target.file),
                 listener.seconds(),
                 listener.taps(),
@@ -565,6 +599,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             by_hand,
             is_unwritten: self.is_unwritten,
             stream_doubts: self.stream_doubts,
+            has_wrong_rate: self.has_wrong_rate,
             ended: match self.fault {
                 Some(fault) if is_refused => Err(fault.into()),
                 Some(fault) => Err(anyhow!(

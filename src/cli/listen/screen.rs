@@ -1,6 +1,6 @@
 //! The live screen: the bench in the whole terminal, and keys.
 
-use super::bench::{Action, Bench, Level};
+use super::bench::{Action, Bench, Level, tap_count};
 use super::views::View;
 use crate::listen::JudgedTap;
 use crate::report::Screen;
@@ -28,6 +28,8 @@ const SHORT: u16 = 16;
 const MOST_WORDS: usize = 3;
 /// Rows to which a long sentence is cut before others are left out.
 const LEAST_LINES: usize = 2;
+/// Rows of the taps at least, with their heading.
+const LEAST_TAP_ROWS: u16 = 4;
 /// Width from which results stand beside the taps (characters); below they stand under them.
 const WIDE: u16 = 110;
 
@@ -45,6 +47,8 @@ pub(super) struct LiveScreen {
 struct Chosen {
     /// Its time (s); `None` = the last one.
     time: Option<f64>,
+    /// Time of the last tap when it was chosen (s). The next tap takes the choice back.
+    last: f64,
 }
 
 impl LiveScreen {
@@ -103,7 +107,10 @@ impl Chosen {
     /// Returns the place of the tap among all.
     fn place(&self, bench: &Bench) -> Option<usize> {
         let last = bench.taps.len().checked_sub(1)?;
-        let found = self.time.and_then(|time| {
+        let time = self
+            .time
+            .filter(|_| bench.taps[last].time <= self.last + REACH);
+        let found = time.and_then(|time| {
             let mut taps = bench.taps.iter();
             taps.position(|tap| (tap.time - time).abs() <= REACH)
         });
@@ -126,6 +133,7 @@ impl Chosen {
             .get(place)
             .filter(|_| place + 1 < bench.taps.len());
         self.time = tap.map(|tap| tap.time);
+        self.last = bench.taps.last().map_or(0.0, |tap| tap.time);
     }
 
     /// Returns what a key asks for.
@@ -142,7 +150,8 @@ impl Chosen {
             KeyCode::Char('r') => Some(Action::Reject(self.shown_time(bench))),
             KeyCode::Char('u') => Some(Action::Undo),
             KeyCode::Char('n') => Some(Action::Next),
-            KeyCode::Char('s') => Some(Action::Stop),
+            // Other programs end with q.
+            KeyCode::Char('s' | 'q') => Some(Action::Stop),
             KeyCode::Up => {
                 self.move_by(-1, bench);
                 None
@@ -167,6 +176,8 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let shown = bench.levels.len().min(MOST_LEVELS) as u16;
     let level_rows = match area.height {
         0..SHORT => 0,
+        // Results and a doubt need the room more.
+        SHORT..TALL if !bench.notes.is_empty() && !bench.result.is_empty() => 0,
         SHORT..TALL => 1,
         _ => LEVEL_ROWS,
     };
@@ -205,13 +216,19 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     }
     let [taps, results] = match middle.width >= WIDE {
         true => Layout::horizontal([Constraint::Percentage(50); 2]).areas(middle),
-        // With few taps the results get more.
+        // The taps get up to half, and what the results leave.
         false => {
+            let height = usize::from(middle.height);
             // Of many taps as many as there is room for. One more row: the symbol of the chosen one takes columns.
-            let taps = bench.taps.iter().take(usize::from(middle.height));
+            let taps = bench.taps.iter().take(height);
             let lines = taps.map(|tap| tap_text(tap, screen).len() + 1);
-            let rows = lines.sum::<usize>().min(usize::from(middle.height) / 2);
-            let taps = Constraint::Length((rows as u16).max(3));
+            let results = result_sentences(bench);
+            let results = results
+                .iter()
+                .map(|text| screen.wrapped(text, 2).lines().count());
+            let left = height.saturating_sub(1 + results.sum::<usize>());
+            let rows = lines.sum::<usize>().min(left.min(height / 2));
+            let taps = Constraint::Length((rows as u16).max(LEAST_TAP_ROWS));
             Layout::vertical([taps, Constraint::Min(0)]).areas(middle)
         }
     };
@@ -324,13 +341,8 @@ fn tap_text(tap: &JudgedTap, screen: Screen) -> Vec<String> {
     words.lines().map(str::to_owned).collect()
 }
 
-fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
-    let block = Block::new().borders(Borders::TOP).title(" results ");
-    let inner = block.inner(area);
-    let (screen, rows) = (
-        Screen::of(usize::from(inner.width)),
-        usize::from(inner.height),
-    );
+/// The results, and how certain they are.
+fn result_sentences(bench: &Bench) -> Vec<String> {
     let mut sentences = bench.result.clone();
     if sentences.is_empty() {
         sentences.push("none yet".to_owned());
@@ -338,7 +350,21 @@ fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
     if !bench.precision.is_empty() {
         sentences.push(bench.precision.clone());
     }
-    let results = fitted(screen, &sentences, rows);
+    sentences
+}
+
+fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
+    let title = match bench.result_taps {
+        0 => " results ".to_owned(),
+        taps => format!(" results of {} ", tap_count(taps)),
+    };
+    let block = Block::new().borders(Borders::TOP).title(title);
+    let inner = block.inner(area);
+    let (screen, rows) = (
+        Screen::of(usize::from(inner.width)),
+        usize::from(inner.height),
+    );
+    let results = fitted(screen, &result_sentences(bench), rows);
     // The newest doubt stands above the advice.
     let earlier = bench.notes.iter().rev().skip(1);
     let earlier: Vec<String> = earlier.map(|note| format!("! {note}")).collect();
@@ -392,6 +418,7 @@ mod tests {
                 fall_20_db: None,
                 usable_to: 832.0,
             }),
+            excites_all: false,
             seconds: 4.96,
             has_ended: true,
             remaining: Some(0.0042),

@@ -1,7 +1,8 @@
 //! The live page: served to this machine alone, to whoever knows the token in its address.
 
-use super::bench::{Action, Bench};
+use super::bench::{Action, Bench, tap_count};
 use super::views::View;
+use crate::report::joined;
 use anyhow::anyhow;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -187,22 +188,30 @@ fn told(bench: &Bench, reports: u64) -> Value {
             "time": tap.time,
             "accepted": tap.rejection.is_none(),
             "overruled": tap.overruled.is_some(),
-            "words": tap.to_string(),
+            "words": joined(&tap.to_string()),
         })
     });
     json!({
         "title": bench.title,
-        "advice": bench.advice,
+        "advice": joined(&bench.advice),
         "is_enough": bench.is_enough,
         "taps": taps.collect::<Vec<_>>(),
         "left_out": left_out,
-        "result": bench.result,
-        "precision": bench.precision,
+        "result": all_joined(bench.result.iter()),
+        "result_head": match bench.result_taps {
+            0 => "So far".to_owned(),
+            taps => format!("So far, of {}", tap_count(taps)),
+        },
+        "precision": joined(&bench.precision),
         "report": reports,
-        "notes": bench.notes,
+        "notes": all_joined(bench.notes.iter()),
         "next": bench.next,
         "ended": bench.ended,
     })
+}
+
+fn all_joined<'a>(texts: impl Iterator<Item = &'a String>) -> Vec<String> {
+    texts.map(|text| joined(text)).collect()
 }
 
 /// Time and movement of the channels for the page.

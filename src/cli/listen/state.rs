@@ -115,12 +115,11 @@ impl Subject {
         // With the picture of the recording that goes on.
         let recording = recording.filter(|_| question.wants_page);
         let first_screen = recording.map(|own| render_first_screen(&document, &[own]));
+        let taps = question.counting.len().saturating_sub(apart.len());
         Ok(SoFar {
             lines: render_progress(&document),
-            precision: Precision::of(
-                &document,
-                question.counting.len().saturating_sub(apart.len()),
-            ),
+            taps,
+            precision: Precision::of(&document, taps),
             apart,
             first_screen: first_screen.transpose()?,
         })
@@ -131,6 +130,8 @@ impl Subject {
 pub(super) struct SoFar {
     /// In a few sentences.
     pub(super) lines: Vec<String>,
+    /// Taps of the recording that it rests on.
+    pub(super) taps: usize,
     /// Taps of the recording that count by themselves, but do not agree with the others: times (s) and reasons.
     pub(super) apart: Vec<(f64, Rejection)>,
     /// How narrow the intervals are; `None` without any.

@@ -50,6 +50,8 @@ pub(super) enum Event {
     NotTurned(String),
     /// Something is wrong with the stream, which goes on.
     Doubt(String),
+    /// Samples come at another rate than stated, in words. The stream goes on.
+    WrongRate(String),
     /// The stream has ended, or it cannot be read or written.
     Ended(anyhow::Result<End>),
 }
@@ -283,7 +285,11 @@ impl Stream {
                 && let frames = count as f64 / layout.frame_bytes as f64
                 && let Some(doubt) = arrival.takes(start.elapsed(), frames)
             {
-                let _ = report.send(Event::Doubt(doubt));
+                let event = match doubt.is_rate {
+                    true => Event::WrongRate(doubt.text),
+                    false => Event::Doubt(doubt.text),
+                };
+                let _ = report.send(event);
             }
             bytes.extend_from_slice(&piece[..count]);
             // Chunks behind the samples are no samples.

@@ -1,7 +1,7 @@
 //! The recording that is written next.
 
 use super::super::input::{TestFile, file_name};
-use super::super::place::{Place, is_description};
+use super::super::place::Place;
 use super::recorder::part;
 use crate::recording::MOST_FILES;
 use anyhow::bail;
@@ -59,7 +59,7 @@ pub(super) fn described_target(
             }
             if is_played || is_missing {
                 if !is_played {
-                    check_ending(&path, Some(recording.line), &file.name)?;
+                    check_file(&path, Some(recording.line), &file.name)?;
                 }
                 return Ok(Target {
                     table: Some(table),
@@ -110,7 +110,7 @@ pub(super) fn bare_target(
     let [own, played] = [Some(path), replayed].map(|path| path.and_then(Place::of));
     let is_played = own.zip(played).is_some_and(|(own, played)| own.is(&played));
     if !is_played {
-        check_ending(path, None, "")?;
+        check_file(path, None, "")?;
     }
     match (path.exists(), is_resumed) {
         (true, true) if !is_played => resumed(None, vec![path.to_owned()], Vec::new()),
@@ -186,19 +186,24 @@ pub(super) fn asked_for(file: &TestFile, target: &Target) -> String {
     words.join(", ")
 }
 
-fn check_ending(path: &Path, line: Option<usize>, test: &str) -> anyhow::Result<()> {
-    let is_wav = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("wav"));
-    if is_wav {
-        return Ok(());
+/// Checks that a file can be written there as WAV.
+fn check_file(path: &Path, line: Option<usize>, test: &str) -> anyhow::Result<()> {
+    let shown = match line {
+        Some(line) => format!("{test}:{line}: {}", path.display()),
+        None => path.display().to_string(),
+    };
+    let ending = path.extension();
+    if !ending.is_some_and(|ending| ending.eq_ignore_ascii_case("wav")) {
+        bail!("{shown}: the recording is written as WAV; end its name with .wav");
     }
-    let shown = path.display();
-    match line {
-        Some(line) => {
-            bail!("{test}:{line}: {shown}: the recording is written as WAV; end its name with .wav")
-        }
-        None if is_description(path) => Ok(()),
-        None => bail!("{shown}: the recording is written as WAV; end its name with .wav"),
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        bail!(
+            "{shown}: there is no folder {}; make it first",
+            folder.display()
+        );
     }
+    Ok(())
 }

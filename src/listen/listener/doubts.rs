@@ -3,8 +3,16 @@
 use super::Listener;
 use crate::news::News;
 use std::mem::discriminant;
-use tapjoint_analysis::TapsSoFar;
-use tapjoint_signal::taps::{TapRemark, TapSource};
+use tapjoint_analysis::{TapsSoFar, hammer_doubt};
+use tapjoint_signal::taps::{Rejection, TapRemark, TapSource};
+
+/// Time without a tap after which that is said (s). 20 s: longer than an engineer who has started the recorder waits.
+const NO_TAP: f64 = 20.0;
+/// Taps after which the channels are doubted if they are rejected. 3: the first ones may be bad by themselves.
+const FIRST_TAPS: usize = 3;
+/// Share of double hits and of taps without an answer from which on the channels are doubted. 80 %: who taps badly also has
+/// good taps.
+const MIXED: f64 = 0.8;
 
 impl Listener<'_> {
     /// Returns a doubt where the responses rise and the hammer shows nothing.
@@ -30,22 +38,48 @@ impl Listener<'_> {
         ))]
     }
 
-    /// Returns a doubt for each response that stands still since the last tap.
-    pub(super) fn still_responses(&mut self) -> Vec<News> {
-        let Some(found) = &self.latest else {
-            return Vec::new();
-        };
-        let (TapSource::Hammer { responses, .. } | TapSource::Responses(responses)) = &found.source;
-        let mut news = Vec::new();
-        for channel in self.silence.still(responses) {
-            let name = found.names.iter().find(|(other, _)| *other == channel);
-            let name = name.map_or("", |(_, name)| name);
-            news.push(News::Doubt(format!(
-                "{name} (channel {}): no sample has changed since the last tap. Check the sensor and its cable.",
-                channel + 1
-            )));
+    /// Returns a doubt, once, where no tap comes.
+    pub(super) fn no_tap(&mut self) -> Option<News> {
+        let is_quiet = self.reported.is_empty() && self.due.is_none();
+        if self.is_silence_said || !is_quiet || self.seconds() < NO_TAP {
+            return None;
         }
-        news
+        self.is_silence_said = true;
+        let whose = match self.latest.as_ref().map(|found| &found.source) {
+            Some(TapSource::Hammer { channel, .. }) => {
+                format!("the hammer's channel (number {})", channel + 1)
+            }
+            _ => "a response".to_owned(),
+        };
+        Some(News::Doubt(format!(
+            "no tap shows on {whose} in the first {NO_TAP:.0} s. If you have tapped, check the cables, the gain and the numbers of \
+             the channels."
+        )))
+    }
+
+    /// Returns a doubt, once, where most taps are rejected: channels may be mixed up.
+    pub(super) fn mixed_channels(&mut self, found: &TapsSoFar) -> Option<News> {
+        let taps = &found.taps;
+        let total = taps.taps.len();
+        if self.are_mixed || total < FIRST_TAPS.max(2 * self.checked_taps) {
+            return None;
+        }
+        // The whole recording is read for it.
+        self.checked_taps = total;
+        let doubt = hammer_doubt(&found.recording, &found.source, taps);
+        let odd = taps.taps.iter().filter(|tap| {
+            use Rejection::{DoubleHit, NoResponse};
+            matches!(tap.rejection, Some(DoubleHit { .. } | NoResponse))
+        });
+        if doubt.is_none() && (odd.count() as f64) < MIXED * total as f64 {
+            return None;
+        }
+        self.are_mixed = true;
+        Some(News::Doubt(doubt.unwrap_or_else(|| {
+            "most taps are rejected. Check the number of channels, the form of the samples and the hammer's channel: \
+             a wrong one mixes the channels"
+                .to_owned()
+        })))
     }
 
     /// Returns the doubts about a recording, its channels in use and its taps of a kind that was not reported yet.
@@ -58,12 +92,16 @@ impl Listener<'_> {
             if !warning.channel().is_none_or(is_used) {
                 continue;
             }
-            // Its numbers move from look to look.
+            // Its numbers move from look to look, and are said again at the end.
+            let text = warning.to_string();
             let kind = (warning.code(), warning.channel());
-            if !self.doubts.contains(&kind) {
-                news.push(News::Doubt(warning.to_string()));
-                self.doubts.push(kind);
+            let earlier = self.doubts.iter_mut().find(|(other, _)| *other == kind);
+            match earlier {
+                None => self.doubts.push((kind, text.clone())),
+                Some((_, said)) if !is_growing && *said != text => said.clone_from(&text),
+                Some(_) => continue,
             }
+            news.push(News::Doubt(text));
         }
         for remark in &found.taps.remarks {
             // What is missing so far may still come.

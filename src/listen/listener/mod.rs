@@ -11,7 +11,7 @@ use tapjoint_analysis::{PipelineError, RecordingPlan, TapsSoFar, taps_so_far};
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::quality::remedy_of;
 use tapjoint_signal::recording::{GrowingRecording, Recording, RecordingError};
-use tapjoint_signal::spectral::measure_decay;
+use tapjoint_signal::spectral::{DISPLAY_RATIO, measure_decay};
 use tapjoint_signal::taps::{REACH, Rejection, Tap, TapMemo, TapRemark, TapSource, TapsByHand};
 
 /// Length of a step (s). A verdict waits for the end of its step.
@@ -112,8 +112,14 @@ pub struct Listener<'a> {
     begun: Option<u64>,
     standing: Standing,
     reported: Vec<Reported>,
-    /// Code and channel of the doubts that were reported.
-    doubts: Vec<(&'static str, Option<usize>)>,
+    /// Code and channel of the doubts that were reported, and their words.
+    doubts: Vec<((&'static str, Option<usize>), String)>,
+    /// True once it was said that no tap comes.
+    is_silence_said: bool,
+    /// Taps at which the channels were checked last.
+    checked_taps: usize,
+    /// True once it was said that the channels may be mixed up.
+    are_mixed: bool,
     /// The remarks that were reported.
     remarks: Vec<TapRemark>,
     /// What the last look has found.
@@ -146,6 +152,9 @@ impl<'a> Listener<'a> {
             standing: Standing::default(),
             reported: Vec::new(),
             doubts: Vec::new(),
+            is_silence_said: false,
+            checked_taps: 0,
+            are_mixed: false,
             remarks: Vec::new(),
             latest: None,
         }
@@ -179,14 +188,13 @@ impl<'a> Listener<'a> {
         let hears = self.alarm.hears(&swings);
         let is_over = self.due.is_some_and(|due| due <= now);
         let mut news = self.silent_hammer(now);
+        news.extend(self.no_tap());
         // The next tap ends the record of the one before.
         if is_over || hears && self.due.is_some() {
             (self.due, self.begun) = (None, None);
             news.extend(self.look(true)?);
-            news.extend(self.still_responses());
         }
         if hears {
-            self.silence.begin();
             self.due = Some(now + self.record_frames());
             // The alarm comes up to two steps after the trigger; the record begins a little before it.
             self.begun = Some(now.saturating_sub(3 * self.step));
@@ -329,6 +337,7 @@ impl<'a> Listener<'a> {
         // Before the first tap a channel may rest, and nothing is strange about it.
         if self.latest.is_some() {
             news.extend(self.new_doubts(&found, is_growing));
+            news.extend(self.mixed_channels(&found));
         }
         let taps = &found.taps.taps;
         let mut reported = Vec::with_capacity(taps.len());
@@ -438,13 +447,16 @@ impl<'a> Listener<'a> {
         let is_by_hand = tap.accepted() && self.by_hand.accepts(tap);
         let overload = tap.overload.filter(|_| is_by_hand);
         let overruled = tap.overruled.clone();
+        let rate = found.recording.sample_rate();
+        let whole_band = rate / DISPLAY_RATIO;
         Ok(JudgedTap {
-            seconds: tap.frames() as f64 / found.recording.sample_rate(),
+            seconds: tap.frames() as f64 / rate,
             has_ended,
             time: tap.time,
             peak: tap.peak,
             unit: found.peak_unit.clone(),
             pulse: tap.pulse,
+            excites_all: tap.pulse.is_some_and(|pulse| pulse.usable_to >= whole_band),
             remaining,
             rejection: tap.rejection.clone(),
             overruled: overruled.or(overload.map(Rejection::Overload)),

@@ -218,7 +218,14 @@ fn action(document: &Document) -> Option<String> {
     }
     let mut warnings = document.warnings.iter();
     if let Some(forgotten) = warnings.find(|one| one.code == "hammer-channel") {
-        return Some(format!("{}.", capital(&forgotten.text)));
+        return Some(format!("{}.", forgotten.text));
+    }
+    let series = document.recordings.iter().flatten();
+    let mut series = series.filter(|one| one.sample_rate.is_some()).peekable();
+    if series.peek().is_some() && series.all(|one| one.taps.is_empty()) {
+        let text =
+            "Check the cables, the gain, and the numbers of the channels, the hammer's first.";
+        return Some(text.to_owned());
     }
     described(document)
 }

@@ -218,6 +218,7 @@ pub fn remedy_of(rejection: &Rejection) -> Option<&'static str> {
         Rejection::NoResponse => {
             Some("If it was no tap, do nothing. Otherwise check the sensors and their cables.")
         }
+        Rejection::Stopped { .. } => Some("Check the sensor and its cable, and record again."),
         Rejection::CutOff { .. } => {
             Some("Let the recording go on until the structure has come to rest.")
         }

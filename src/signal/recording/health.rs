@@ -49,16 +49,27 @@ const LOPSIDED_OF_PEAK: f64 = 1e-6;
 /// A peak beyond this multiple of the rms is no steady tone, which repeats its crest exactly.
 const PEAK_OF_TONE: f64 = 3.0;
 
-/// Shortest run of equal samples that counts as dropped. Recorders lose whole buffers, of 32
-/// samples at least; a moving signal does not repeat a value that often by chance.
-const MIN_DROPOUT: u64 = 32;
+/// Shortest run of equal samples that counts as dropped, however strongly the signal moves. 8: shorter ones do little harm.
+const MIN_DROPOUT: u64 = 8;
+
+/// Logarithm of the chance that a moving signal repeats a value so often, below which samples count as dropped. A signal that
+/// moves by n quantisation steps repeats a value with a chance of about 1/n. One in 10^12: 15 samples at 8 steps, 8 from 52 on.
+const MOST_CHANCE: f64 = -12.0 * std::f64::consts::LN_10;
 
 /// Before a dropout the signal must have moved by more than this many quantisation steps from
 /// sample to sample: a signal that fades into silence repeats its value without any loss.
 const MIN_ACTIVITY_QUANTA: f64 = 8.0;
 
-/// Weight of the newest step in the running mean of steps: a memory of about 16 samples, half of
-/// the shortest dropout.
+/// A signal that moved by more than this many quantisation steps before it came to rest has not faded into silence: the last
+/// steps of a decay are single ones, with pauses between them.
+const MIN_STOP_QUANTA: f64 = 1.0;
+
+/// Shortest run of equal samples at the end that counts as a stop where the signal moved by a few quantisation steps alone.
+/// 128: such noise repeats a value with a chance of a half at most.
+const MIN_STOP: u64 = 128;
+
+/// Weight of the newest step in the running mean of steps: a memory of about 16 samples. The mean before a run is used, so
+/// the length of the run does not count.
 const ACTIVITY_WEIGHT: f64 = 1.0 / 16.0;
 
 /// Samples that are added together where nothing about them is remarkable.
@@ -109,7 +120,7 @@ pub(super) fn check_finite(
     };
     let frame = start + at as u64;
     let problem = format!(
-        "channel {}, sample {frame} ({} s) is {}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again",
+        "channel {}, sample {frame} ({} s) is {}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again, or record again and check the form of the samples",
         channel + 1,
         short(frame as f64 / sample_rate),
         samples[at]
@@ -189,7 +200,7 @@ pub struct ChannelHealth {
     /// where none was.
     #[serde(skip)]
     pub rails: [Option<f64>; 2],
-    /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
+    /// Runs of at least 8 repeated samples inside the moving signal, the first 32.
     #[serde(skip)]
     pub dropped: Vec<EqualRun>,
     /// Number of dropouts, beyond the list too.
@@ -197,6 +208,9 @@ pub struct ChannelHealth {
     pub dropout_count: u64,
     /// Samples in all of them together.
     pub dropped_samples: u64,
+    /// The equal samples with which the recording ends, where the signal moved before them and never rested at their value.
+    #[serde(skip)]
+    pub stopped: Option<EqualRun>,
     /// All samples are equal: nothing was connected, or nothing was recorded.
     #[serde(skip)]
     pub constant: bool,
@@ -218,7 +232,8 @@ impl ChannelHealth {
         if factor < 0.0 {
             scaled.rails.reverse();
         }
-        for run in scaled.flat_tops.iter_mut().chain(&mut scaled.dropped) {
+        let runs = scaled.flat_tops.iter_mut().chain(&mut scaled.dropped);
+        for run in runs.chain(&mut scaled.stopped) {
             run.value *= factor;
         }
         scaled
@@ -255,6 +270,10 @@ impl ChannelHealth {
             runs.extend(moved);
             runs.truncate(2 * PLACES_KEPT);
         }
+        both.stopped = other.stopped.map(|run| EqualRun {
+            start: run.start + frames,
+            ..run
+        });
         // The nearer rail is the limit wherever both were reached.
         let [low, high] =
             [0, 1].map(|side| [self.rails[side], other.rails[side]].into_iter().flatten());
@@ -314,6 +333,14 @@ impl ChannelHealth {
             );
             doubts.push(("dropped-samples", problem));
         }
+        if let Some(EqualRun { start, value, .. }) = self.stopped {
+            let problem = format!(
+                "from {:.6} s on every sample is {}; its sensor or cable probably failed, or the file was filled up; check both, and record again",
+                start as f64 / sample_rate,
+                short(value)
+            );
+            doubts.push(("stopped-channel", problem));
+        }
         if mean.abs() > OFFSET_OF_PEAK * peak {
             let problem = format!(
                 "mean {mean:.4e} where the peak is {peak:.4e}; the sensor's supply or the amplifier's zero probably shifts it; couple it AC, or ignore this where the mean is removed"
@@ -341,6 +368,8 @@ pub(super) struct HealthMeter {
     low: Side,
     /// Samples in all runs that are long enough for a dropout.
     still_samples: u64,
+    /// Value at which the signal rested last, for [`MIN_STOP`] samples at least.
+    rest: Option<f64>,
     outline: Outline,
     /// Weights of the steps of a piece in the running mean at its end.
     weights: [f64; PIECE],
@@ -450,6 +479,7 @@ impl HealthMeter {
             high: Side::new(1.0),
             low: Side::new(-1.0),
             still_samples: 0,
+            rest: None,
             outline: Outline::default(),
             weights: std::array::from_fn(|place| {
                 ACTIVITY_WEIGHT * (1.0 - ACTIVITY_WEIGHT).powi((PIECE - 1 - place) as i32)
@@ -600,14 +630,31 @@ impl HealthMeter {
             return;
         }
         self.still_samples += len;
+        let rest = self.rest;
+        if len >= MIN_STOP {
+            self.rest = Some(value);
+        }
         // A long run at a limit is a flat top, whatever else it looks like.
         let at_limit = extreme && value.abs() >= MIN_LEVEL_OF_PEAK * peak;
-        if exit > 0.0 && !at_limit && activity > MIN_ACTIVITY_QUANTA * self.quantum {
-            self.health.dropout_count += 1;
-            self.health.dropped_samples += len;
-            if self.health.dropped.len() < PLACES_KEPT {
-                self.health.dropped.push(EqualRun { start, len, value });
-            }
+        if at_limit {
+            return;
+        }
+        let run = EqualRun { start, len, value };
+        let steps = activity / self.quantum;
+        let chance = -steps.ln() * (len - 1) as f64;
+        let moved = steps > MIN_ACTIVITY_QUANTA && chance < MOST_CHANCE;
+        if exit == 0.0 {
+            let dithered = steps > MIN_STOP_QUANTA && len >= MIN_STOP;
+            let is_stop = (moved || dithered) && rest != Some(value);
+            self.health.stopped = Some(run).filter(|_| is_stop);
+        }
+        if exit == 0.0 || !moved {
+            return;
+        }
+        self.health.dropout_count += 1;
+        self.health.dropped_samples += len;
+        if self.health.dropped.len() < PLACES_KEPT {
+            self.health.dropped.push(run);
         }
     }
 

@@ -13,13 +13,22 @@ const STRETCH: f64 = 0.05;
 const RISE: f64 = 1.5;
 
 /// Returns `true` where any response rises, or does not ring on as before, when the force rises. A hammer laid down, a swinging hammer and an
-/// electrical spike move no sensor. Without responses, or at the very start of the recording, the
+/// electrical spike move no sensor. Without responses that give a signal, or at the very start of the recording, the
 /// benefit of the doubt is given.
 pub(super) fn is_answered(
     recording: &Recording,
     responses: &[usize],
     event: &Event,
 ) -> Result<bool, RecordingError> {
+    // A sensor that has failed says nothing.
+    let has_failed = |channel: usize| {
+        let stopped = recording.channels().get(channel)?.health.stopped?;
+        Some(stopped.start < event.trigger)
+    };
+    let responses = responses.iter().copied();
+    let responses: Vec<usize> = responses
+        .filter(|channel| has_failed(*channel) != Some(true))
+        .collect();
     let stretch = (STRETCH * recording.sample_rate()) as u64;
     // The filter's ringing ahead of the pulse belongs to neither side.
     let gap = stretch / 10;
@@ -29,7 +38,7 @@ pub(super) fn is_answered(
     let continued = (CONTINUED * recording.sample_rate()) as u64;
     // Two taps lie no nearer, so that the stretch before the trigger is part of what is read.
     let first = (event.trigger - gap).saturating_sub(continued.max(stretch));
-    let samples = recording.read_channels(responses, first..event.trigger + stretch)?;
+    let samples = recording.read_channels(&responses, first..event.trigger + stretch)?;
     let turn = (event.trigger - gap - first) as usize;
     let trigger = (event.trigger - first) as usize;
     let lag = ((LAG * recording.sample_rate()) as usize).max(1);

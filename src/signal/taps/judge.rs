@@ -73,17 +73,64 @@ pub(super) fn facts(
     Ok(facts)
 }
 
+/// Where a response stops for good.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stop {
+    /// Its channel (0-based).
+    channel: usize,
+    /// The first frame that is as all after it.
+    frame: u64,
+}
+
+/// Returns the responses of a file that stop while another channel goes on, or stand still in this file of a recording alone.
+/// Where all stop, the file was filled up.
+pub(super) fn stops(file: &Recording, whole: &Recording, source: &TapSource) -> Vec<Stop> {
+    let moves_after = |channel: usize, frame: u64| {
+        let outline = file.outline(channel).unwrap_or_default();
+        // The first piece may hold frames before.
+        let pieces = outline.pieces_of(frame..file.frames()).skip(1);
+        let mut pieces = pieces.filter_map(|piece| outline.pieces.get(piece));
+        pieces.any(|piece| piece.low < piece.high)
+    };
+    let channels = source.channels();
+    let mut stops = Vec::new();
+    for &channel in source.responses() {
+        let [own, all] = [file, whole].map(|one| one.channels().get(channel));
+        let (Some(own), Some(all)) = (own, all) else {
+            continue;
+        };
+        // A channel that never moves was not connected, and the others are used.
+        let frame = match own.health.constant && !all.health.constant {
+            true => Some(0),
+            false => own.health.stopped.map(|run| run.start),
+        };
+        if let Some(frame) = frame
+            && channels.iter().any(|other| moves_after(*other, frame))
+        {
+            stops.push(Stop { channel, frame });
+        }
+    }
+    stops
+}
+
 /// Judges one event. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).
 pub(super) fn judge(
     event: &Event,
     record: Range<u64>,
     facts: &Facts,
+    stops: &[Stop],
     weakest: f64,
     rate: f64,
     settings: &TapSettings,
 ) -> Tap {
     let double = facts.second_hit;
+    let middle = record.start.midpoint(record.end);
+    let stop = stops.iter().find(|stop| stop.frame < middle);
+    let stopped = stop.map(|stop| Rejection::Stopped {
+        channel: stop.channel + 1,
+    });
     let fault = match double.filter(|double| double.ratio >= settings.double_hit) {
+        _ if stopped.is_some() => stopped,
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
             peak: event.peak,

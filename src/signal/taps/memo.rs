@@ -1,7 +1,7 @@
 //! What was found of a growing recording before, so that a look at it costs little.
 
 use super::answered::is_answered;
-use super::judge::{Facts, facts, judge, record_of};
+use super::judge::{Facts, Stop, facts, judge, record_of};
 use super::search::{SurveyedPiece, find_pulses, find_rises};
 use super::{Found, Tap, TapSettings, TapSource};
 use crate::recording::{Recording, RecordingError};
@@ -133,12 +133,13 @@ impl PartMemo {
         self.answered.clear();
     }
 
-    /// Judges the events of a file. Peaks below `weakest` are too weak.
+    /// Judges the events of a file, of which these responses stop. Peaks below `weakest` are too weak.
     pub(super) fn judge(
         &mut self,
         recording: &Recording,
         source: &TapSource,
         found: &Found,
+        stops: &[Stop],
         weakest: f64,
         settings: &TapSettings,
     ) -> Result<Vec<Tap>, RecordingError> {
@@ -194,6 +195,7 @@ impl PartMemo {
                 event,
                 record,
                 &self.facts[&place],
+                stops,
                 weakest,
                 rate,
                 settings,

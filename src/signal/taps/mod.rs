@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
-use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, reject_short};
+use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, reject_short, stops};
 use search::Survey;
 use tapjoint_numerics::stats::median;
 
@@ -42,6 +42,12 @@ pub enum TapSource {
 }
 
 impl TapSource {
+    /// The channels of the responses.
+    pub fn responses(&self) -> &[usize] {
+        let (TapSource::Hammer { responses, .. } | TapSource::Responses(responses)) = self;
+        responses
+    }
+
     /// All channels involved.
     pub fn channels(&self) -> Vec<usize> {
         match self {
@@ -213,6 +219,11 @@ pub enum Rejection {
     Overload(Overload),
     /// No sensor moved.
     NoResponse,
+    /// A sensor has stopped giving a signal before the record or in its first half, and others go on.
+    Stopped {
+        /// Its channel, 1-based.
+        channel: usize,
+    },
     /// Too weak beside the others.
     TooWeak {
         /// Its peak.
@@ -265,6 +276,9 @@ impl fmt::Display for Rejection {
             Rejection::NoResponse => f.write_str(
                 "no sensor answers it: the hammer was moved or laid down, or a disturbance",
             ),
+            Rejection::Stopped { channel } => {
+                write!(f, "channel {channel} is dead: its samples no longer change")
+            }
             Rejection::TooWeak { peak, limit } => {
                 write!(
                     f,
@@ -554,9 +568,14 @@ pub fn find_taps_again(
     let mut quiet = 0..0;
     for (number, (start, file, found)) in searched.iter().enumerate() {
         let before = taps.len();
-        let judged = memo
-            .part(number)
-            .judge(file, source, found, weakest, settings)?;
+        let judged = memo.part(number).judge(
+            file,
+            source,
+            found,
+            &stops(file, recording, source),
+            weakest,
+            settings,
+        )?;
         for mut tap in judged {
             tap.file = joined.then(|| file.name().to_owned());
             tap.move_by(*start, rate);

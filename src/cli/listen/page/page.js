@@ -3,6 +3,7 @@
 (() => {
   const byId = (id) => document.getElementById(id);
   let chosen = null;
+  let newest = null;
   let bench = { taps: [] };
   let shown = "";
 
@@ -46,7 +47,10 @@
     const taps = bench.taps;
     // The trigger of a tap may move a little: 50 ms name it.
     const own = taps.find((tap) => chosen !== null && Math.abs(tap.time - chosen) <= 0.05);
-    chosen = own ? own.time : null;
+    // The next tap takes the choice back.
+    const last = taps.length ? taps[taps.length - 1].time : null;
+    chosen = own && last <= newest + 0.05 ? own.time : null;
+    newest = last;
     byId("taps").replaceChildren(...taps.map((tap) => {
       const item = document.createElement("li");
       item.className = tap.accepted ? (tap.overruled ? "overruled" : "") : "rejected";
@@ -75,6 +79,7 @@
     byId("next").hidden = !bench.next;
     byId("next").textContent = "Next: " + bench.next;
     // The report says the same and more.
+    byId("result-head").textContent = bench.result_head;
     items(byId("result"), bench.result.length ? bench.result : ["no result yet"]);
     byId("precision").textContent = bench.precision;
     items(byId("notes"), bench.notes.slice().reverse());

@@ -341,6 +341,82 @@ fn regress_digital_silence_between_taps() {
     assert_all_accepted(&taps, 4, "response");
 }
 
+/// Hammer and two responses, four taps 1 s apart from 0.5 s on.
+fn with_two_responses(seed: u64) -> [Vec<f64>; 3] {
+    let rate = 5120.0;
+    let times = [0.5, 1.5, 2.5, 3.5];
+    let pulses = times.map(|time| pulse(time, 2e-3, 20.0));
+    let mut random = random(seed);
+    let response = || ringing(rate, 4.5, &times, &[(120.0, 0.01, 5.0)]);
+    let mut channels = [force(rate, 4.5, &pulses, SHAPES[0]), response(), response()];
+    for samples in &mut channels {
+        add_noise(samples, 1e-2, &mut random);
+    }
+    channels
+}
+
+fn taps_with_two_responses(channels: &[Vec<f64>; 3]) -> Taps {
+    let source = TapSource::Hammer {
+        channel: 0,
+        responses: vec![1, 2],
+    };
+    let recording = recording(5120.0, channels.to_vec());
+    find_taps(&recording, &source, &TapSettings::default()).unwrap()
+}
+
+#[test]
+fn recover_taps_after_a_sensor_has_failed_are_rejected() {
+    for (seed, value) in [(1, 0.0), (2, -0.7)] {
+        let mut channels = with_two_responses(seed);
+        assert_all_accepted(&taps_with_two_responses(&channels), 4, "whole");
+        // In the last third of the second record.
+        channels[2][(2.2 * 5120.0) as usize..].fill(value);
+        let taps = taps_with_two_responses(&channels);
+        let dead = Some(Rejection::Stopped { channel: 3 });
+        let rejections: Vec<_> = taps.taps.iter().map(|tap| &tap.rejection).collect();
+        assert_eq!(rejections, [&None, &None, &dead, &dead]);
+        // In its first third.
+        channels[2][(1.8 * 5120.0) as usize..].fill(value);
+        let taps = taps_with_two_responses(&channels);
+        assert_eq!(taps.accepted().count(), 1);
+        // The only response: not a hammer that was laid down.
+        channels[1] = channels[2].clone();
+        let taps = taps_with_two_responses(&channels);
+        let dead = Some(Rejection::Stopped { channel: 2 });
+        assert_eq!(taps.taps.last().map(|tap| &tap.rejection), Some(&dead));
+    }
+}
+
+#[test]
+fn recover_a_sensor_that_has_failed_in_an_earlier_file() {
+    let (first, mut second) = (with_two_responses(4), with_two_responses(5));
+    second[2].fill(0.3);
+    let source = TapSource::Hammer {
+        channel: 0,
+        responses: vec![1, 2],
+    };
+    let parts = [&first, &second].map(|channels| recording(5120.0, channels.to_vec()));
+    let joined = Recording::joined("both", parts.to_vec()).unwrap();
+    let taps = find_taps(&joined, &source, &TapSettings::default()).unwrap();
+    let accepted: Vec<bool> = taps.taps.iter().map(Tap::accepted).collect();
+    assert_eq!(
+        accepted,
+        [true, true, true, true, false, false, false, false]
+    );
+    // Alone it was never connected, and the other response is used.
+    assert_all_accepted(&taps_with_two_responses(&second), 4, "alone");
+}
+
+#[test]
+fn limit_a_file_that_is_filled_up_rejects_no_tap() {
+    let mut channels = with_two_responses(3);
+    for samples in &mut channels {
+        samples[(3.8 * 5120.0) as usize..].fill(0.0);
+        samples.resize(8 * 5120, 0.0);
+    }
+    assert_all_accepted(&taps_with_two_responses(&channels), 4, "filled up");
+}
+
 #[test]
 fn regress_an_inverted_hammer_is_read_all_the_same() {
     let rate = 5120.0;

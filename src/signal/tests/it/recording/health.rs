@@ -166,6 +166,64 @@ fn prop_lost_samples_are_found_as_zeros_and_as_repeated_values() {
 }
 
 #[test]
+fn prop_short_losses_are_found_in_a_strong_signal_alone() {
+    let lost = |scale: f64, len: usize| {
+        let mut samples: Vec<f64> = ring_down()
+            .iter()
+            .map(|x| (scale * x).round() / scale)
+            .collect();
+        samples[700..700 + len].fill(0.25);
+        health(samples).dropout_count
+    };
+    // It moves by some 0.1 from sample to sample: 4,000 steps of a converter of 16 bits, and 8 samples are too many.
+    assert_eq!([7, 8, 30].map(|len| lost(32_768.0, len)), [0, 1, 1]);
+    // 13 steps of one of 128 levels: by chance 8 equal samples come once in 10^8.
+    assert_eq!([8, 11, 16].map(|len| lost(128.0, len)), [0, 0, 1]);
+}
+
+#[test]
+fn prop_a_channel_that_stops_is_named_with_its_time() {
+    let words = "channel 1: from 2.500000 s on every sample is 0; its sensor or cable probably failed, or the file was filled up; \
+                 check both, and record again";
+    let mut quiet = ChaCha8Rng::seed_from_u64(5);
+    // Noise of two steps each way, between taps.
+    let dither: Vec<f64> = (0..4000)
+        .map(|_| f64::from(quiet.random_range(-2..=2)))
+        .collect();
+    for mut samples in [ring_down(), dither] {
+        samples[2500..].fill(0.0);
+        // The last value before may be the same.
+        samples[2499] = 0.03;
+        let recording = record(samples.clone());
+        let warnings = recording.warnings().into_iter().map(|one| one.to_string());
+        assert_eq!(warnings.collect::<Vec<_>>(), [words]);
+        let stopped = recording.channels()[0].health.stopped.unwrap();
+        assert_eq!(
+            (stopped.start, stopped.len, stopped.value),
+            (2500, 1500, 0.0)
+        );
+        // It lives again.
+        samples.extend(ring_down());
+        assert_eq!(health(samples).stopped, None);
+    }
+}
+
+#[test]
+fn limit_a_signal_that_comes_to_rest_has_not_stopped() {
+    // A decay below one step of a converter.
+    let quantised = |at: usize| {
+        let t = at as f64 / RATE;
+        ((-8.0 * t).exp() * (TAU * 47.0 * t).sin() * 2048.0).round()
+    };
+    assert_eq!(health((0..4000).map(quantised).collect()).stopped, None);
+    // A channel that is cut to 0 wherever it is weak, as it was before the tap.
+    let mut gated = vec![0.0; 1000];
+    gated.extend(ring_down().iter().take(1500));
+    gated.extend([0.0; 1000]);
+    assert_eq!(health(gated).stopped, None);
+}
+
+#[test]
 fn limit_silence_is_no_loss() {
     // A decay that ends below one step of a 12-bit converter, three times.
     let quantised = |at: usize| {

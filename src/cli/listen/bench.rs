@@ -38,7 +38,7 @@ pub(super) struct Level {
 }
 
 /// One recording as it is shown.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Bench {
     /// "recording low.wav, tap at 0.385 m".
     pub(super) title: String,
@@ -56,8 +56,8 @@ pub(super) struct Bench {
     pub(super) is_enough: bool,
     /// What all taps give so far, in sentences.
     pub(super) result: Vec<String>,
-    /// Taps that the result rests on; 0 without a result.
-    pub(super) result_taps: usize,
+    /// True where the taps that count have changed since the result.
+    pub(super) is_result_old: bool,
     /// How narrow the intervals are; empty where there are none.
     pub(super) precision: String,
     /// The first screen of the report on them; `None` where no page is served.
@@ -151,12 +151,10 @@ pub(super) struct Progress<'a> {
 impl Progress<'_> {
     /// Returns whether the taps are enough, and says how many count and what is missing.
     pub(super) fn words(&self) -> (bool, String) {
-        let mut count = tap_count(self.accepted);
-        count.push_str(if self.accepted == 1 {
-            " counts"
-        } else {
-            " count"
-        });
+        let mut count = match self.accepted {
+            1 => "1 tap counts".to_owned(),
+            count => format!("{count} taps count"),
+        };
         match self.apart {
             0 => {}
             1 => count.push_str(", 1 of them does not agree with the others"),
@@ -217,14 +215,6 @@ impl Progress<'_> {
                 (false, why)
             }
         }
-    }
-}
-
-/// "1 tap", "5 taps".
-pub(super) fn tap_count(taps: usize) -> String {
-    match taps {
-        1 => "1 tap".to_owned(),
-        taps => format!("{taps} taps"),
     }
 }
 

@@ -63,6 +63,8 @@ pub(super) struct Hearing<'a, 'v> {
     listener: Option<Listener<'a>>,
     /// How narrow the intervals are by the last state.
     precision: Option<Precision>,
+    /// Times (s) of the taps that counted at the last state.
+    result_counting: Vec<f64>,
     /// Times (s) of the taps that do not agree with the others, by the last state.
     apart: Vec<f64>,
     /// Times (s) of all such taps that were named.
@@ -107,6 +109,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             views,
             listener: None,
             precision: None,
+            result_counting: Vec::new(),
             apart: Vec::new(),
             told_apart: Vec::new(),
             // Taps of earlier files are there before any news.
@@ -213,7 +216,6 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let bench = &mut self.views.bench;
         bench.precision.clear();
         bench.result.clear();
-        bench.result_taps = 0;
         bench.first_screen = None;
         self.states.take().is_some()
     }
@@ -289,10 +291,10 @@ impl<'a, 'v> Hearing<'a, 'v> {
         bench.precision = precision.unwrap_or_default();
         bench.first_screen = so_far.first_screen;
         bench.result.clone_from(&so_far.lines);
-        bench.result_taps = so_far.taps;
         let mut lines = so_far.lines;
         lines.extend(Some(bench.precision.clone()).filter(|words| !words.is_empty()));
         self.precision = so_far.precision;
+        self.result_counting = so_far.counting;
         self.tell_apart(so_far.apart);
         self.advise();
         if before != self.views.bench.advice {
@@ -404,6 +406,11 @@ impl<'a, 'v> Hearing<'a, 'v> {
         }
         let listener = self.listener.as_ref();
         let counting = listener.map_or(Vec::new(), Listener::counting);
+        // The trigger of a tap moves a little from look to look.
+        let mut pairs = counting.iter().zip(&self.result_counting);
+        let is_new = counting.len() == self.result_counting.len()
+            && pairs.all(|(one, other)| (one - other).abs() <= REACH);
+        self.views.bench.is_result_old = !self.views.bench.result.is_empty() && !is_new;
         // One of them may have been rejected since the last result.
         let is_counted = |time: &&f64| counting.iter().any(|own| (own - **time).abs() <= REACH);
         let progress = Progress {
@@ -584,6 +591,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             };
             let missing = match self.arguments.taps.saturating_sub(accepted) {
                 0 => String::new(),
+                1 => "; 1 more was wanted".to_owned(),
                 missing => format!("; {missing} more were wanted"),
             };
             self.views.say(&format!(

@@ -1,6 +1,6 @@
 //! The live screen: the bench in the whole terminal, and keys.
 
-use super::bench::{Action, Bench, Level, tap_count};
+use super::bench::{Action, Bench, Level};
 use super::views::View;
 use crate::listen::JudgedTap;
 use crate::report::Screen;
@@ -173,20 +173,22 @@ impl Chosen {
 /// rows on.
 fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let area = frame.area();
-    let shown = bench.levels.len().min(MOST_LEVELS) as u16;
-    let level_rows = match area.height {
-        0..SHORT => 0,
-        // Results and a doubt need the room more.
-        SHORT..TALL if !bench.notes.is_empty() && !bench.result.is_empty() => 0,
-        SHORT..TALL => 1,
-        _ => LEVEL_ROWS,
-    };
     let screen = Screen::of(usize::from(area.width));
     let newest = bench.notes.back().map(|note| format!("! {note}"));
     let note = fitted(screen, newest.as_slice(), MOST_WORDS);
     let advice = fitted(screen, std::slice::from_ref(&bench.advice), MOST_WORDS);
     let page = bench.address.as_ref();
     let page = page.map(|address| format!("page: {address}"));
+    let shown = bench.levels.len().min(MOST_LEVELS) as u16;
+    let result_rows = result_rows(bench, screen);
+    // Results need the room more than the movement.
+    let needed = result_rows + LEAST_TAP_ROWS + (note.len() + advice.len()) as u16 + 3;
+    let level_rows = match area.height {
+        0..SHORT => 0,
+        height if height < needed + shown => 0,
+        height if height < TALL.max(needed + LEVEL_ROWS * shown) => 1,
+        _ => LEVEL_ROWS,
+    };
     let [
         head,
         levels,
@@ -218,17 +220,13 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
         true => Layout::horizontal([Constraint::Percentage(50); 2]).areas(middle),
         // The taps get up to half, and what the results leave.
         false => {
-            let height = usize::from(middle.height);
             // Of many taps as many as there is room for. One more row: the symbol of the chosen one takes columns.
-            let taps = bench.taps.iter().take(height);
+            let taps = bench.taps.iter().take(usize::from(middle.height));
             let lines = taps.map(|tap| tap_text(tap, screen).len() + 1);
-            let results = result_sentences(bench);
-            let results = results
-                .iter()
-                .map(|text| screen.wrapped(text, 2).lines().count());
-            let left = height.saturating_sub(1 + results.sum::<usize>());
-            let rows = lines.sum::<usize>().min(left.min(height / 2));
-            let taps = Constraint::Length((rows as u16).max(LEAST_TAP_ROWS));
+            let left = middle.height.saturating_sub(result_rows);
+            let rows = lines.sum::<usize>() as u16;
+            let rows = rows.min(left.min(middle.height / 2));
+            let taps = Constraint::Length(rows.max(LEAST_TAP_ROWS));
             Layout::vertical([taps, Constraint::Min(0)]).areas(middle)
         }
     };
@@ -353,10 +351,18 @@ fn result_sentences(bench: &Bench) -> Vec<String> {
     sentences
 }
 
+/// Rows of all of it, with its heading.
+fn result_rows(bench: &Bench, screen: Screen) -> u16 {
+    let sentences = result_sentences(bench).into_iter();
+    let lines = sentences.map(|text| screen.wrapped(&text, 2).lines().count());
+    1 + lines.sum::<usize>() as u16
+}
+
 fn draw_results(frame: &mut Frame<'_>, area: Rect, bench: &Bench) {
-    let title = match bench.result_taps {
-        0 => " results ".to_owned(),
-        taps => format!(" results of {} ", tap_count(taps)),
+    let title = if bench.is_result_old {
+        " earlier results "
+    } else {
+        " results "
     };
     let block = Block::new().borders(Borders::TOP).title(title);
     let inner = block.inner(area);
@@ -454,7 +460,7 @@ mod tests {
         }
         bench.take(&News::Tap(tap(4.905, None)));
         bench.take(&News::Tap(tap(9.871, Some(double))));
-        bench.note("tip (channel 2): no sample has changed since the last tap.");
+        bench.note("channel 2: from 8.1 s on every sample is 0.");
         bench
     }
 
@@ -509,7 +515,7 @@ modes 118.20 ± 0.04 Hz
 
 
 
-! tip (channel 2): no sample has changed since the last tap.
+! channel 2: from 8.1 s on every sample is 0.
 1 tap counts; 4 more are wanted
 page: http://127.0.0.1:8000/0f/
  a  accept   r  reject   u  undo   s  stop   n  next: high.wav   up/down  choose
@@ -526,14 +532,14 @@ page: http://127.0.0.1:8000/0f/
         let long = |name: &str| format!("{name} {}", "118.20 \u{b1} 0.04; ".repeat(12));
         bench.result = ["modes", "Kt", "cause", "remedy"].map(long).to_vec();
         bench.advice = long("advice");
-        let drawn = drawn(80, 24, &bench);
+        let drawn = drawn(80, 20, &bench);
         for begin in [
             "> 40.00 s",
             "modes",
             "Kt",
             "cause",
             "remedy",
-            "! tip",
+            "! channel",
             "advice",
             "page",
             " a ",
@@ -555,7 +561,7 @@ page: http://127.0.0.1:8000/0f/
         }
         drawn(80, 24, &Bench::default());
         let short = drawn(80, 8, &bench());
-        for begin in ["! tip", "1 tap counts", " a  accept"] {
+        for begin in ["! channel", "1 tap counts", " a  accept"] {
             let mut lines = short.lines();
             assert!(
                 lines.any(|line| line.starts_with(begin)),
@@ -586,6 +592,16 @@ page: http://127.0.0.1:8000/0f/
         assert_eq!(press(KeyCode::Up), None);
         assert_eq!(press(KeyCode::Esc), None);
         assert_eq!(press(KeyCode::Char('a')), Some(Action::Accept(Some(9.871))));
+        assert_eq!(press(KeyCode::Char('q')), Some(Action::Stop));
+        // The next tap takes the choice back.
+        assert_eq!(press(KeyCode::Up), None);
+        let mut more = bench.clone();
+        more.take(&News::Tap(tap(14.8, None)));
+        let key = KeyEvent::new(KeyCode::Char('r'), KeyModifiers::NONE);
+        assert_eq!(
+            chosen.action_of(key, &more),
+            Some(Action::Reject(Some(14.8)))
+        );
         let stop = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(chosen.action_of(stop, &bench), Some(Action::Stop));
     }

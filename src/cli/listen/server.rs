@@ -1,6 +1,6 @@
 //! The live page: served to this machine alone, to whoever knows the token in its address.
 
-use super::bench::{Action, Bench, tap_count};
+use super::bench::{Action, Bench};
 use super::views::View;
 use crate::report::joined;
 use anyhow::anyhow;
@@ -198,10 +198,7 @@ fn told(bench: &Bench, reports: u64) -> Value {
         "taps": taps.collect::<Vec<_>>(),
         "left_out": left_out,
         "result": all_joined(bench.result.iter()),
-        "result_head": match bench.result_taps {
-            0 => "So far".to_owned(),
-            taps => format!("So far, of {}", tap_count(taps)),
-        },
+        "result_head": if bench.is_result_old { "Earlier result" } else { "So far" },
         "precision": joined(&bench.precision),
         "report": reports,
         "notes": all_joined(bench.notes.iter()),

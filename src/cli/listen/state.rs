@@ -118,7 +118,7 @@ impl Subject {
         let taps = question.counting.len().saturating_sub(apart.len());
         Ok(SoFar {
             lines: render_progress(&document),
-            taps,
+            counting: question.counting.clone(),
             precision: Precision::of(&document, taps),
             apart,
             first_screen: first_screen.transpose()?,
@@ -130,8 +130,8 @@ impl Subject {
 pub(super) struct SoFar {
     /// In a few sentences.
     pub(super) lines: Vec<String>,
-    /// Taps of the recording that it rests on.
-    pub(super) taps: usize,
+    /// Times of the taps that counted in the recording when it was asked for (s).
+    pub(super) counting: Vec<f64>,
     /// Taps of the recording that count by themselves, but do not agree with the others: times (s) and reasons.
     pub(super) apart: Vec<(f64, Rejection)>,
     /// How narrow the intervals are; `None` without any.

@@ -5,7 +5,7 @@ usage: scripts/listen_check.py PROGRAM [--tests N] [--recordings FILE[:HAMMER] .
 
 Makes N recordings without tapjoint: a hammer and two accelerometers on a structure of five modes. Among the taps are double
 hits, weak taps, overloads, taps without an answer and records that are too short; some recordings have hum, a knocked table
-(the sensors move without a tap), or a hammer of the other sign. Plays each to `listen`, as it plays the given recordings.
+(the sensors move without a tap), a hammer of the other sign, a sensor that fails, or lost samples. Plays each to `listen`, as it plays the given recordings.
 FILE:1 has its hammer in channel 1. Of DIR every file is played, with a hammer in channel 1 and without one; those that hold no
 samples in time are refused. Prints how many decisions after the last sample are those of `run`, how many were reported
 while the recording went on, how many of these were revised later, and how many of the double hits that `run` rejects were
@@ -64,6 +64,13 @@ def recording(random):
         add_decay(samples, axis, random.uniform(0.2, seconds), 0.3, frequencies[:1], [0.05], shapes[:, :1])
     if random.uniform() < 0.2:
         samples[:, 0] *= -1.0
+    if random.uniform() < 0.15:
+        # A sensor fails for good, or the recorder loses samples of all channels.
+        place = int(random.uniform(0.1, 1.0) * frames)
+        if random.uniform() < 0.6:
+            samples[place:, int(random.integers(1, 3))] = random.choice([0.0, random.uniform(-0.2, 0.2)])
+        else:
+            samples[place : place + int(random.integers(8, 400))] = samples[place]
     return samples, rate
 
 

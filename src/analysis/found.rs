@@ -6,7 +6,7 @@ use tapjoint_description::{FoundChannel, FoundContent, FoundRecording, FunctionF
 use tapjoint_signal::recording::{
     FrequencyResponses, ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::taps::{TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{Rejection, Tap, TapSettings, TapSource, Taps, find_taps};
 
 /// Samples of each channel by which a hammer is recognised.
 const LOOKED_AT: u64 = 4_000_000;
@@ -111,25 +111,52 @@ fn hammer(recording: &Recording) -> Result<Option<(usize, &'static str)>, Record
     Ok(sharpest.map(|channel| (channel, "by its short pulses; check it")))
 }
 
-/// Returns a doubt where most taps are rejected, and another channel has the short pulses of a hammer.
+/// Time about a trigger in which the pulse of another channel belongs to it (s): the answer may come first by its noise.
+const TOGETHER: f64 = 0.03;
+
+/// Share of a channel's peak that its pulses reach at taps: tips and hands differ.
+const PULSE_OF_PEAK: f64 = 0.1;
+
+/// Returns a doubt where most taps are no hits of a hammer, and another channel has short pulses at the others.
 pub fn hammer_doubt(recording: &Recording, source: &TapSource, taps: &Taps) -> Option<String> {
     let TapSource::Hammer { channel, .. } = source else {
         return None;
     };
-    let (total, accepted) = (taps.taps.len(), taps.accepted().count());
-    if 2 * accepted >= total {
+    let is_odd = |tap: &&Tap| {
+        use Rejection::{DoubleHit, NoResponse};
+        matches!(tap.rejection, Some(DoubleHit { .. } | NoResponse))
+    };
+    if taps.taps.iter().filter(is_odd).count() <= taps.accepted().count() {
         return None;
     }
     // Without an answer there is no doubt; a file that cannot be read is an error elsewhere.
     let other = channel_of_pulses(recording).ok().flatten()?;
-    let (number, other) = (channel + 1, other + 1);
-    (number != other).then(|| {
+    let hits = taps.taps.iter();
+    let hits = hits.filter(|tap| !matches!(tap.rejection, Some(Rejection::NoResponse)));
+    let together = hits
+        .clone()
+        .filter(|tap| has_pulse(recording, other, tap.time));
+    let coincide = 2 * together.count() > hits.count();
+    (*channel != other && coincide).then(|| {
         format!(
-            "{} of {total} taps are rejected with channel {number} as the hammer's, and channel {other} has the short pulses of a \
-             hammer; if so, say --hammer {other}, or correct the `channel` of the hammer in the description",
-            total - accepted
+            "most taps are rejected with channel {} as the hammer's, and channel {other} has the short pulses of a hammer; if so, say \
+             --hammer {other}, or correct the `channel` of the hammer in the description",
+            channel + 1,
+            other = other + 1
         )
     })
+}
+
+/// Returns true where a channel (0-based) has a pulse about this time (s).
+fn has_pulse(recording: &Recording, channel: usize, time: f64) -> bool {
+    let rate = recording.sample_rate();
+    let frame = |time: f64| (time.max(0.0) * rate) as u64;
+    let about = frame(time - TOGETHER)..frame(time + TOGETHER);
+    let mean = recording.mean(channel);
+    let peak = recording.channels()[channel].health.peak;
+    let samples = recording.read(channel, about).unwrap_or_default();
+    let mut heights = samples.iter().map(|sample| (sample - mean).abs());
+    heights.any(|height| height > PULSE_OF_PEAK * peak)
 }
 
 /// Returns the channel (0-based) whose pulses are far shorter than those of the others; `None` where there is none.

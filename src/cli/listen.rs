@@ -268,7 +268,8 @@ pub(super) fn run(
     views.say(&introduction(arguments, described.as_ref(), &target));
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
     let (mut failed, mut stream_doubts) = (None, Vec::new());
-    let mut has_wrong_rate = false;
+    // Recordings of the same stream.
+    let (mut has_wrong_rate, mut names) = (false, Vec::new());
     let (heard, end) = loop {
         let bare = arguments.run.bare();
         let plan = plan_of(described.as_ref(), &target, &bare);
@@ -293,7 +294,8 @@ pub(super) fn run(
         for doubt in std::mem::take(&mut heard.stream_doubts) {
             stream_doubts.push(format!("{file}, while it was recorded: {doubt}"));
         }
-        has_wrong_rate |= heard.has_wrong_rate;
+        has_wrong_rate = heard.has_wrong_rate;
+        names.push(file_name(&target.file));
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
         let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
@@ -347,8 +349,9 @@ pub(super) fn run(
     // Every frequency would be wrong.
     let refused = has_wrong_rate.then(|| {
         format!(
-            "no report: samples came at another rate than stated. Remove {name} and record it again. If the stated rate is right, \
-             `tapjoint run` gives the report\n"
+            "no report: samples came at another rate than stated. Remove {} and record again. If the stated rate is right, \
+             `tapjoint run` gives the report\n",
+            names.join(", ")
         )
     });
     if let Some(words) = refused.or(split).or(next) {

@@ -1,14 +1,13 @@
 //! Sudden rises of a signal, by its swing in short steps.
 
-/// A tap raises the swing of a step by this factor at least. 1.5, chosen: beyond the scatter of noise, and a false alarm costs
-/// little.
-const RISE: f64 = 1.5;
 /// Steps before the rise that are compared. 4 of 50 ms: two taps are 0.2 s apart at least.
 const COMPARED: usize = 4;
 
 /// Watches for taps. The next look finds a tap that it misses. A false alarm costs a look.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Alarm {
+    /// Least factor by which a swing rises.
+    rise: f64,
     /// Swings of the last steps, the newest last, of each channel.
     recent: Vec<Vec<f64>>,
     /// Steps for which it stays silent: what rises so soon belongs to the same tap.
@@ -16,6 +15,15 @@ pub(crate) struct Alarm {
 }
 
 impl Alarm {
+    /// Begins. A swing has to rise by this factor at least.
+    pub(crate) fn new(rise: f64) -> Self {
+        Self {
+            rise,
+            recent: Vec::new(),
+            silent: 0,
+        }
+    }
+
     /// Takes the swings (highest less lowest value) of the watched channels in the next step. Returns true if one of them
     /// rises.
     pub(crate) fn hears(&mut self, swings: &[f64]) -> bool {
@@ -23,7 +31,7 @@ impl Alarm {
         let mut rises = false;
         for (recent, swing) in self.recent.iter_mut().zip(swings) {
             let before = recent.iter().copied().fold(0.0, f64::max);
-            rises |= !recent.is_empty() && *swing > RISE * before;
+            rises |= !recent.is_empty() && *swing > self.rise * before;
             recent.push(*swing);
             if recent.len() > COMPARED {
                 recent.remove(0);
@@ -45,7 +53,7 @@ mod tests {
     use super::*;
 
     fn alarms(swings: &[f64]) -> Vec<usize> {
-        let mut alarm = Alarm::default();
+        let mut alarm = Alarm::new(1.5);
         let heard = swings.iter().map(|swing| alarm.hears(&[*swing]));
         let heard: Vec<bool> = heard.collect();
         (0..swings.len()).filter(|step| heard[*step]).collect()
@@ -67,7 +75,7 @@ mod tests {
         let twice = [1.0, 20.0, 15.0, 12.0, 9.0, 7.0, 25.0, 20.0];
         assert_eq!(alarms(&twice), [1, 6]);
         // Any of several channels.
-        let mut alarm = Alarm::default();
+        let mut alarm = Alarm::new(1.5);
         assert!(!alarm.hears(&[1.0, 1.0]));
         assert!(alarm.hears(&[1.0, 2.0]));
     }

@@ -1,15 +1,15 @@
 //! A hammer's channel from which nothing comes while the structure rings.
 
-/// Rises of the responses before the first tap after which a hammer that shows nothing is doubted. 3: the first ones may be
-/// knocks while the sensors are moved.
+/// Rises of the responses after which a hammer that shows nothing is doubted. 3: the first ones may be knocks while the sensors
+/// are moved.
 const RISES: usize = 3;
 
-/// Watches for a hammer whose samples never change. It counts only samples that are all equal: noise is a sign of life.
+/// Watches for a hammer whose samples do not change. It counts only samples that are all equal: noise is a sign of life.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Silence {
-    /// Channels that have moved.
+    /// Channels that have moved since the last rise of the responses.
     moved: Vec<bool>,
-    /// Rises of the responses since the beginning.
+    /// Rises of the responses since the hammer moved.
     rises: usize,
 }
 
@@ -24,10 +24,9 @@ impl Silence {
 
     /// Takes a rise of the responses. Returns true once, if the hammer has shown nothing for several of them.
     pub(crate) fn rises_without(&mut self, hammer: usize) -> bool {
-        if self.moved.get(hammer) != Some(&false) {
-            return false;
-        }
-        self.rises += 1;
+        let has_moved = self.moved.get(hammer) != Some(&false);
+        self.moved.fill(false);
+        self.rises = if has_moved { 0 } else { self.rises + 1 };
         self.rises == RISES
     }
 }
@@ -49,6 +48,11 @@ mod tests {
         let mut silence = Silence::default();
         silence.takes(&[1e-9, 9.0]);
         silence.takes(&[0.0, 9.0]);
-        assert_eq!([0; 5].map(|_| silence.rises_without(0)), [false; 5]);
+        assert!(!silence.rises_without(0));
+        // The hammer's cable breaks.
+        assert_eq!(
+            [0; 3].map(|_| silence.rises_without(0)),
+            [false, false, true]
+        );
     }
 }

@@ -41,6 +41,22 @@ impl Warning {
         Warning::about(file, "hammer-channel", text)
     }
 
+    /// A sensor gives no signal in some taps.
+    fn stopped_channel(file: &str, taps: &Taps) -> Option<Self> {
+        let stopped = taps.taps.iter().filter_map(|tap| match tap.rejection {
+            Some(Rejection::Stopped { channel }) => Some((channel, tap.time)),
+            _ => None,
+        });
+        let (channel, time) = stopped.clone().next()?;
+        let count = stopped.filter(|(other, _)| *other == channel).count();
+        let text = format!(
+            "channel {channel} gives no signal in {count} of {} taps, first at {time:.2} s; its sensor or cable has probably failed; \
+             check both, and record again",
+            taps.taps.len()
+        );
+        Some(Warning::about(file, "stopped-channel", text))
+    }
+
     /// One tap alone stands for a recording with a hammer.
     fn single_tap(file: &str) -> Self {
         let text = "only one tap was averaged, so nothing shows how well it repeats and a \
@@ -419,6 +435,7 @@ pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
             warnings.push(Warning::of_file(one.name(), &warning));
         }
     }
+    warnings.extend(Warning::stopped_channel(file, taps));
     for remark in &taps.remarks {
         warnings.push(Warning::about(file, "taps", remark));
     }

@@ -94,10 +94,7 @@ pub const WARNING_CODES: [(&str, &str); 80] = [
         "dropped-samples",
         "samples are repeated inside the moving signal",
     ),
-    (
-        "stopped-channel",
-        "the samples of a channel no longer change up to the end",
-    ),
+    ("stopped-channel", "a sensor gives no signal in some taps"),
     ("offset", "the mean of a channel is large beside its peak"),
     (
         "header-length",

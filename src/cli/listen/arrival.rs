@@ -3,8 +3,10 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// The rate is judged after this time (s). 10 s: a tap or two, and a recorder's buffer of 0.1 s is then 1 %.
-const JUDGED_AFTER: f64 = 10.0;
+/// Pieces before this time (s) may hold what a recorder has kept. 2 s: no usual buffer is longer.
+const BACKLOG: f64 = 2.0;
+/// The rate is judged each time after so long (s). 10 s: a tap or two, and a recorder's buffer of 0.1 s is then 1 %.
+const JUDGED_EACH: f64 = 10.0;
 /// A rate that is off by less is that of the stated clock (1). 2 %: usual rates lie 8 % apart at least (44.1 and 48 kHz), and
 /// the clocks of two devices differ by far less.
 const RATE_TOLERANCE: f64 = 0.02;
@@ -18,21 +20,24 @@ const WITHIN: f64 = 60.0;
 const LATE: f64 = 5.0;
 
 /// Usual rates (Hz), of sound and of vibration.
-const USUAL_RATES: [f64; 24] = [
-    1000.0, 1024.0, 2000.0, 2048.0, 2560.0, 4096.0, 5120.0, 8000.0, 8192.0, 10_240.0, 11_025.0,
-    12_800.0, 16_000.0, 20_480.0, 22_050.0, 25_600.0, 32_000.0, 44_100.0, 48_000.0, 51_200.0,
-    65_536.0, 96_000.0, 102_400.0, 192_000.0,
+const USUAL_RATES: [f64; 31] = [
+    1000.0, 1024.0, 2000.0, 2048.0, 2560.0, 4096.0, 5120.0, 8000.0, 8192.0, 10_000.0, 10_240.0,
+    11_025.0, 12_000.0, 12_800.0, 16_000.0, 20_000.0, 20_480.0, 22_050.0, 24_000.0, 25_000.0,
+    25_600.0, 32_000.0, 44_100.0, 48_000.0, 50_000.0, 51_200.0, 65_536.0, 96_000.0, 100_000.0,
+    102_400.0, 192_000.0,
 ];
-/// A measured rate this near to a usual one is taken for it (1). 1 %: usual rates lie 2.4 % apart at least.
+/// A measured rate this near to a usual one is taken for it (1). 1 %: usual rates lie 2 % apart at least.
 const NEAR_USUAL: f64 = 0.01;
 
-/// Something wrong with the arrival of a stream.
+/// What the arrival of a stream shows, in sentences.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct ArrivalDoubt {
-    /// In sentences.
-    pub(super) text: String,
-    /// True where the rate is wrong, and with it every frequency; false of a loss.
-    pub(super) is_rate: bool,
+pub(super) enum Shown {
+    /// Samples come at another rate than stated.
+    WrongRate(String),
+    /// Samples come at the stated rate after all.
+    RightRate(String),
+    /// Samples are missing.
+    Loss(String),
 }
 
 /// Watches the arrival of a stream.
@@ -46,6 +51,8 @@ pub(super) struct Arrival {
     longest_gap: f64,
     /// Frames after the first piece.
     frames: f64,
+    /// Time since the first piece from which on the rate is judged next (s), and the frames then.
+    judged_from: Option<(f64, f64)>,
     /// Times of the last minute, a second apart at least, and how far samples were behind the clock then (s).
     behind: VecDeque<[f64; 2]>,
     /// Time since which more of them are behind (s).
@@ -62,6 +69,7 @@ impl Arrival {
             times: None,
             longest_gap: 0.0,
             frames: 0.0,
+            judged_from: None,
             behind: VecDeque::new(),
             behind_since: None,
             is_judged: false,
@@ -69,8 +77,8 @@ impl Arrival {
         }
     }
 
-    /// Takes the arrival of so many frames at this time. Returns what is wrong, once.
-    pub(super) fn takes(&mut self, now: Duration, frames: f64) -> Option<ArrivalDoubt> {
+    /// Takes the arrival of so many frames at this time. Returns what is new.
+    pub(super) fn takes(&mut self, now: Duration, frames: f64) -> Option<Shown> {
         let now = now.as_secs_f64();
         let Some((first, last)) = &mut self.times else {
             self.times = Some((now, now));
@@ -81,38 +89,56 @@ impl Arrival {
         *last = now;
         // A piece may hold the samples of the pause before it, so a long pause widens the tolerance of the rate.
         self.longest_gap = self.longest_gap.max(gap);
-        if !self.is_judged && elapsed >= JUDGED_AFTER {
-            self.is_judged = true;
-            return self.judge_rate(elapsed);
-        }
-        if self.is_off {
+        if elapsed < BACKLOG {
             return None;
         }
-        self.judge_loss(elapsed)
+        let (start, before) = *self.judged_from.get_or_insert((elapsed, self.frames));
+        // The first time so that ten seconds are enough.
+        if elapsed >= JUDGED_EACH && (elapsed - start >= JUDGED_EACH || !self.is_judged) {
+            self.judged_from = Some((elapsed, self.frames));
+            return self.judge_rate(self.frames - before, elapsed - start);
+        }
+        match self.is_off {
+            true => None,
+            false => self.judge_loss(elapsed),
+        }
     }
 
-    fn judge_rate(&mut self, elapsed: f64) -> Option<ArrivalDoubt> {
-        let speed = self.frames / elapsed / self.rate;
-        let tolerance = RATE_TOLERANCE + self.longest_gap / elapsed;
+    /// Judges the rate by frames that came in so many seconds. A rate that was right once stays so: what is missing later is
+    /// lost.
+    fn judge_rate(&mut self, frames: f64, seconds: f64) -> Option<Shown> {
+        let speed = frames / seconds / self.rate;
+        let tolerance = RATE_TOLERANCE + self.longest_gap / seconds;
+        let was_right = self.is_judged && !self.is_off;
+        let was_wrong = self.is_judged && self.is_off;
+        self.is_judged = true;
+        if was_right {
+            return None;
+        }
         self.is_off = (speed - 1.0).abs() > tolerance;
-        if !self.is_off || speed > FILE_SPEED {
+        if was_wrong && !self.is_off {
+            self.behind.clear();
+            self.behind_since = None;
+            let text = "samples arrive at the stated rate now. Those before may be at wrong times";
+            return Some(Shown::RightRate(text.to_owned()));
+        }
+        if was_wrong || !self.is_off || speed > FILE_SPEED {
             return None;
         }
         let (found, stated) = (speed * self.rate, self.rate);
         let is_near = |usual: &&f64| (found / *usual - 1.0).abs() <= NEAR_USUAL;
-        let rate = USUAL_RATES.iter().find(is_near).unwrap_or(&found);
-        Some(ArrivalDoubt {
-            text: format!(
-                "{found:.0} samples a second arrive, and {stated:.0} Hz is stated: every frequency is multiplied by {:.3}. Remove \
-                 the file, and record it again with the rate {rate:.0} Hz. If {stated:.0} Hz is right, check --channels and --format, \
-                 and whether the recorder drops samples",
-                stated / rate
-            ),
-            is_rate: true,
-        })
+        let (likely, rate) = match USUAL_RATES.iter().find(is_near) {
+            Some(usual) => (*usual, format!("the rate {usual:.0} Hz")),
+            None => (found, "the recorder's rate".to_owned()),
+        };
+        Some(Shown::WrongRate(format!(
+            "{found:.0} samples a second arrive, and {stated:.0} Hz is stated. If the recorder loses none, every frequency is \
+             multiplied by {:.3}: remove the file, and record it again with {rate}. Check --channels and --format, too",
+            stated / likely
+        )))
     }
 
-    fn judge_loss(&mut self, elapsed: f64) -> Option<ArrivalDoubt> {
+    fn judge_loss(&mut self, elapsed: f64) -> Option<Shown> {
         let behind = elapsed - self.frames / self.rate;
         self.behind.retain(|[then, _]| *then > elapsed - WITHIN);
         let earlier = self.behind.iter().map(|[_, behind]| *behind);
@@ -136,19 +162,22 @@ impl Arrival {
         }
         self.behind_since = None;
         self.behind.clear();
-        Some(ArrivalDoubt {
-            text: format!(
-                "{lost:.1} s of samples are missing within the last minute: the recorder drops them. The taps of this minute may \
-                 be wrong"
-            ),
-            is_rate: false,
-        })
+        Some(Shown::Loss(format!(
+            "{lost:.1} s of samples are missing within the last minute: the recorder drops them. The taps of this minute may be \
+             wrong"
+        )))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn words(shown: Shown) -> String {
+        match shown {
+            Shown::WrongRate(text) | Shown::RightRate(text) | Shown::Loss(text) => text,
+        }
+    }
 
     /// What is said of pieces of `piece` seconds of samples that come at `speed` of the stated rate. The pieces from
     /// `lost` on, given in seconds, do not come.
@@ -161,7 +190,7 @@ mod tests {
             let frames = 1000.0 * piece * speed;
             (!is_lost).then(|| arrival.takes(Duration::from_secs_f64(now), frames))?
         });
-        said.map(|doubt| doubt.text).collect()
+        said.map(words).collect()
     }
 
     #[test]
@@ -177,20 +206,19 @@ mod tests {
 
     #[test]
     fn recover_a_wrong_rate_and_a_loss() {
-        let words = |found: &str, factor: &str, rate: &str| {
+        let wrong = |found: &str, factor: &str, rate: &str| {
             format!(
-                "{found} samples a second arrive, and 1000 Hz is stated: every frequency is multiplied by {factor}. Remove the \
-                 file, and record it again with the rate {rate} Hz. If 1000 Hz is right, check --channels and --format, and whether \
-                 the recorder drops samples"
+                "{found} samples a second arrive, and 1000 Hz is stated. If the recorder loses none, every frequency is multiplied \
+                 by {factor}: remove the file, and record it again with {rate}. Check --channels and --format, too"
             )
         };
-        let slow = words("919", "1.088", "919");
+        let slow = wrong("919", "1.088", "the recorder's rate");
         assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [slow]);
         // Near a usual rate.
-        let twice = words("2010", "0.500", "2000");
+        let twice = wrong("2010", "0.500", "the rate 2000 Hz");
         assert_eq!(said(2.01, 0.1, 60.0, 0.0..0.0), [twice]);
         // Half of the channels that are stated.
-        let half = words("500", "2.000", "500");
+        let half = wrong("500", "2.000", "the recorder's rate");
         assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), [half]);
         // Soon, or after an hour.
         for lost in [29.95, 3599.95] {
@@ -202,6 +230,35 @@ mod tests {
                 ]
             );
         }
+    }
+
+    #[test]
+    fn limit_a_backlog_at_the_beginning_is_no_wrong_rate() {
+        let mut arrival = Arrival::new(1000.0);
+        for piece in 0..600 {
+            let now = f64::from(piece) * 0.1;
+            // A recorder that has kept 1 s, and gives it with its second piece.
+            let frames = if piece == 1 { 1100.0 } else { 100.0 };
+            let now = Duration::from_secs_f64(now);
+            assert_eq!(arrival.takes(now, frames), None, "{piece}");
+        }
+    }
+
+    #[test]
+    fn recover_a_rate_that_becomes_right() {
+        let mut arrival = Arrival::new(1000.0);
+        let mut said = Vec::new();
+        for piece in 1..600 {
+            let now = Duration::from_secs_f64(f64::from(piece) * 0.1);
+            let frames = if piece < 150 { 80.0 } else { 100.0 };
+            said.extend(arrival.takes(now, frames));
+        }
+        let kinds = said.iter().map(|shown| match shown {
+            Shown::WrongRate(_) => "wrong",
+            Shown::RightRate(_) => "right",
+            Shown::Loss(_) => "loss",
+        });
+        assert_eq!(kinds.collect::<Vec<_>>(), ["wrong", "right"]);
     }
 
     #[test]

@@ -198,9 +198,9 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 self.views.warn(&words);
             }
             Event::Doubt(text) => self.doubt_stream(text),
-            Event::WrongRate(text) => {
-                self.has_wrong_rate = true;
-                // Each of its frequencies would be wrong.
+            Event::Rate { text, is_wrong } => {
+                self.has_wrong_rate = is_wrong;
+                // Each of their frequencies may be wrong.
                 self.end_results();
                 self.advise();
                 self.doubt_stream(text);

@@ -83,6 +83,7 @@ pub(super) fn restore() {
 
 impl View for LiveScreen {
     fn show(&mut self, bench: &Bench) -> io::Result<()> {
+        self.chosen.follow(bench);
         let chosen = &self.chosen;
         self.terminal.draw(|frame| draw(frame, bench, chosen))?;
         Ok(())
@@ -107,14 +108,19 @@ impl Chosen {
     /// Returns the place of the tap among all.
     fn place(&self, bench: &Bench) -> Option<usize> {
         let last = bench.taps.len().checked_sub(1)?;
-        let time = self
-            .time
-            .filter(|_| bench.taps[last].time <= self.last + REACH);
-        let found = time.and_then(|time| {
+        let found = self.time.and_then(|time| {
             let mut taps = bench.taps.iter();
             taps.position(|tap| (tap.time - time).abs() <= REACH)
         });
         Some(found.unwrap_or(last))
+    }
+
+    /// Gives the choice back to the last tap once a later one has come.
+    fn follow(&mut self, bench: &Bench) {
+        let newest = bench.taps.last().map_or(0.0, |tap| tap.time);
+        if newest > self.last + REACH {
+            self.time = None;
+        }
     }
 
     /// Returns the time of the tap (s).
@@ -141,6 +147,7 @@ impl Chosen {
         if key.kind == KeyEventKind::Release {
             return None;
         }
+        self.follow(bench);
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
             KeyCode::Char('c' | 'd') if is_control => Some(Action::Stop),

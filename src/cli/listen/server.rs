@@ -202,7 +202,7 @@ fn told(bench: &Bench, reports: u64) -> Value {
         "precision": joined(&bench.precision),
         "report": reports,
         "notes": all_joined(bench.notes.iter()),
-        "next": bench.next,
+        "next": bench.next.as_deref().map(joined),
         "ended": bench.ended,
     })
 }

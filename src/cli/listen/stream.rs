@@ -1,6 +1,6 @@
 //! The stream of samples, from standard input or a file, and the thread that writes it.
 
-use super::arrival::Arrival;
+use super::arrival::{Arrival, Shown};
 use super::recorder::{Destination, Names, Recorder};
 use crate::recording::{Format, PcmLayout, Recording, SampleForm};
 use anyhow::{Context, bail};
@@ -50,8 +50,13 @@ pub(super) enum Event {
     NotTurned(String),
     /// Something is wrong with the stream, which goes on.
     Doubt(String),
-    /// Samples come at another rate than stated, in words. The stream goes on.
-    WrongRate(String),
+    /// The stream arrives at another rate than stated, or again at this one. It goes on.
+    Rate {
+        /// In words.
+        text: String,
+        /// True of another rate.
+        is_wrong: bool,
+    },
     /// The stream has ended, or it cannot be read or written.
     Ended(anyhow::Result<End>),
 }
@@ -283,13 +288,17 @@ impl Stream {
             }
             if self.is_live
                 && let frames = count as f64 / layout.frame_bytes as f64
-                && let Some(doubt) = arrival.takes(start.elapsed(), frames)
+                && let Some(shown) = arrival.takes(start.elapsed(), frames)
             {
-                let event = match doubt.is_rate {
-                    true => Event::WrongRate(doubt.text),
-                    false => Event::Doubt(doubt.text),
+                let (text, is_wrong) = match shown {
+                    Shown::WrongRate(text) => (text, Some(true)),
+                    Shown::RightRate(text) => (text, Some(false)),
+                    Shown::Loss(text) => (text, None),
                 };
-                let _ = report.send(event);
+                let _ = report.send(match is_wrong {
+                    Some(is_wrong) => Event::Rate { text, is_wrong },
+                    None => Event::Doubt(text),
+                });
             }
             bytes.extend_from_slice(&piece[..count]);
             // Chunks behind the samples are no samples.

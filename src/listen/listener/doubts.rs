@@ -17,10 +17,6 @@ const MIXED: f64 = 0.8;
 impl Listener<'_> {
     /// Returns a doubt where the responses rise and the hammer shows nothing.
     pub(super) fn silent_hammer(&mut self, now: u64) -> Vec<News> {
-        // A hammer that has struck is connected, and rests at 0 between taps.
-        if !self.reported.is_empty() {
-            return Vec::new();
-        }
         let source = self.latest.as_ref().map(|found| &found.source);
         let Some(TapSource::Hammer { channel, responses }) = source else {
             return Vec::new();
@@ -52,7 +48,7 @@ impl Listener<'_> {
             _ => "a response".to_owned(),
         };
         Some(News::Doubt(format!(
-            "no tap shows on {whose} in the first {NO_TAP:.0} s. If you have tapped, check the cables, the gain and the numbers of \
+            "no tap in the first {NO_TAP:.0} s on {whose}. If you have tapped, check the cables, the gain and the numbers of \
              the channels."
         )))
     }

@@ -24,6 +24,12 @@ const ENOUGH_OF_BAND: f64 = 0.8;
 /// Noise before the taps is read over this length (s). 1 s: a thousand samples and more, and a bound on memory.
 const QUIET: f64 = 1.0;
 
+/// A tap raises the swing of a step by this factor at least. 1.5, chosen: beyond the scatter of noise, and a false alarm costs
+/// little.
+const RISE: f64 = 1.5;
+/// The same where the hammer shows nothing. 5, chosen: modes that beat rise and fall more slowly.
+const CLEAR_RISE: f64 = 5.0;
+
 /// Reasons for which listening ends.
 #[derive(Debug, thiserror::Error)]
 pub enum ListenError {
@@ -143,8 +149,8 @@ impl<'a> Listener<'a> {
             earlier_by_hand: Vec::new(),
             swings: Vec::new(),
             watched: Vec::new(),
-            alarm: Alarm::default(),
-            answers: Alarm::default(),
+            alarm: Alarm::new(RISE),
+            answers: Alarm::new(CLEAR_RISE),
             silence: Silence::default(),
             memo: TapMemo::default(),
             due: None,
@@ -337,7 +343,6 @@ impl<'a> Listener<'a> {
         // Before the first tap a channel may rest, and nothing is strange about it.
         if self.latest.is_some() {
             news.extend(self.new_doubts(&found, is_growing));
-            news.extend(self.mixed_channels(&found));
         }
         let taps = &found.taps.taps;
         let mut reported = Vec::with_capacity(taps.len());
@@ -373,6 +378,9 @@ impl<'a> Listener<'a> {
             reported.push(tap.into());
         }
         news.extend(earlier.map(|one| News::Gone { time: one.time }));
+        if self.latest.is_some() {
+            news.extend(self.mixed_channels(&found));
+        }
         if let Some(time) = waiting {
             // Another alarm came just before it.
             let end = time + self.record(&found) - start;

@@ -384,9 +384,6 @@ fn recover_channels_from_which_nothing_comes() {
     for frame in &mut dead[(2.5 * RATE) as usize..] {
         frame[1] = 0.05;
     }
-    let told = "channel 2: from 2.500000 s on every sample is 0.05; its sensor or cable probably failed, or the file was \
-                filled up; check both, and record again";
-    assert_eq!(doubts(&dead), [told]);
     let (_, news) = listened(&dead, &path, &bare);
     let dead = news.iter().filter_map(rejection);
     let is_dead = |why: &Rejection| matches!(why, Rejection::Stopped { channel: 2 });
@@ -417,12 +414,12 @@ fn recover_what_is_wrong_before_the_first_tap_that_counts() {
         doubts.collect::<Vec<_>>()
     };
     // Nothing but noise.
-    let told = "no tap shows on the hammer's channel (number 1) in the first 20 s. If you have tapped, check the cables, the gain \
+    let told = "no tap in the first 20 s on the hammer's channel (number 1). If you have tapped, check the cables, the gain \
                 and the numbers of the channels.";
     assert_eq!(doubts(&samples(25.0, &[]), 1), [told]);
     assert_eq!(doubts(&samples(19.0, &[]), 1), [""; 0]);
     // Hammer and sensor are exchanged.
-    let told = "3 of 4 taps are rejected with channel 2 as the hammer's, and channel 1 has the short pulses of a hammer; if so, say --hammer \
+    let told = "most taps are rejected with channel 2 as the hammer's, and channel 1 has the short pulses of a hammer; if so, say --hammer \
                 1, or correct the `channel` of the hammer in the description";
     let hits = [(0.8, 1.0), (3.0, 1.1), (5.5, 1.0), (8.0, 1.0)];
     assert_eq!(doubts(&samples(10.0, &hits), 2), [told]);

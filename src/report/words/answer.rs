@@ -223,9 +223,7 @@ fn action(document: &Document) -> Option<String> {
     let series = document.recordings.iter().flatten();
     let mut series = series.filter(|one| one.sample_rate.is_some()).peekable();
     if series.peek().is_some() && series.all(|one| one.taps.is_empty()) {
-        let text =
-            "Check the cables, the gain, and the numbers of the channels, the hammer's first.";
-        return Some(text.to_owned());
+        return Some("Check the cables, the gain and the numbers of the channels.".to_owned());
     }
     described(document)
 }

@@ -49,8 +49,12 @@ const LOPSIDED_OF_PEAK: f64 = 1e-6;
 /// A peak beyond this multiple of the rms is no steady tone, which repeats its crest exactly.
 const PEAK_OF_TONE: f64 = 3.0;
 
-/// Shortest run of equal samples that counts as dropped, however strongly the signal moves. 8: shorter ones do little harm.
-const MIN_DROPOUT: u64 = 8;
+/// Shortest run of equal samples that counts as dropped. Recorders lose whole buffers, of 32
+/// samples at least; a moving signal does not repeat a value that often by chance.
+const MIN_DROPOUT: u64 = 32;
+
+/// Shortest run that counts as dropped where the signal moves strongly before and after it. 8: shorter ones do little harm.
+const LEAST_DROPOUT: u64 = 8;
 
 /// Logarithm of the chance that a moving signal repeats a value so often, below which samples count as dropped. A signal that
 /// moves by n quantisation steps repeats a value with a chance of about 1/n. One in 10^12: 15 samples at 8 steps, 8 from 52 on.
@@ -64,8 +68,8 @@ const MIN_ACTIVITY_QUANTA: f64 = 8.0;
 /// steps of a decay are single ones, with pauses between them.
 const MIN_STOP_QUANTA: f64 = 1.0;
 
-/// Shortest run of equal samples at the end that counts as a stop where the signal moved by a few quantisation steps alone.
-/// 128: such noise repeats a value with a chance of a half at most.
+/// Shortest run of equal samples at the end that counts as a stop. 128: noise of a few quantisation steps repeats a value with a
+/// chance of a half at most.
 const MIN_STOP: u64 = 128;
 
 /// Weight of the newest step in the running mean of steps: a memory of about 16 samples. The mean before a run is used, so
@@ -208,9 +212,12 @@ pub struct ChannelHealth {
     pub dropout_count: u64,
     /// Samples in all of them together.
     pub dropped_samples: u64,
-    /// The equal samples with which the recording ends, where the signal moved before them and never rested at their value.
+    /// The equal samples with which the recording ends, 128 at least, where the signal moved before them.
     #[serde(skip)]
     pub stopped: Option<EqualRun>,
+    /// Smallest step between two samples (the channel's unit); infinite without any.
+    #[serde(skip)]
+    pub step: f64,
     /// All samples are equal: nothing was connected, or nothing was recorded.
     #[serde(skip)]
     pub constant: bool,
@@ -227,6 +234,7 @@ impl ChannelHealth {
         scaled.mean *= factor;
         scaled.rms *= factor.abs();
         scaled.peak *= factor.abs();
+        scaled.step *= factor.abs();
         (scaled.minimum, scaled.maximum) = (low.min(high), low.max(high));
         scaled.rails = self.rails.map(|rail| rail.map(|level| level * factor));
         if factor < 0.0 {
@@ -253,6 +261,7 @@ impl ChannelHealth {
         both.peak = self.peak.max(other.peak);
         both.minimum = self.minimum.min(other.minimum);
         both.maximum = self.maximum.max(other.maximum);
+        both.step = self.step.min(other.step);
         both.full_scale_samples += other.full_scale_samples;
         let later = other.first_full_scale.map(|first| first + frames);
         both.first_full_scale = self.first_full_scale.or(later);
@@ -333,14 +342,6 @@ impl ChannelHealth {
             );
             doubts.push(("dropped-samples", problem));
         }
-        if let Some(EqualRun { start, value, .. }) = self.stopped {
-            let problem = format!(
-                "from {:.6} s on every sample is {}; its sensor or cable probably failed, or the file was filled up; check both, and record again",
-                start as f64 / sample_rate,
-                short(value)
-            );
-            doubts.push(("stopped-channel", problem));
-        }
         if mean.abs() > OFFSET_OF_PEAK * peak {
             let problem = format!(
                 "mean {mean:.4e} where the peak is {peak:.4e}; the sensor's supply or the amplifier's zero probably shifts it; couple it AC, or ignore this where the mean is removed"
@@ -368,8 +369,6 @@ pub(super) struct HealthMeter {
     low: Side,
     /// Samples in all runs that are long enough for a dropout.
     still_samples: u64,
-    /// Value at which the signal rested last, for [`MIN_STOP`] samples at least.
-    rest: Option<f64>,
     outline: Outline,
     /// Weights of the steps of a piece in the running mean at its end.
     weights: [f64; PIECE],
@@ -479,7 +478,6 @@ impl HealthMeter {
             high: Side::new(1.0),
             low: Side::new(-1.0),
             still_samples: 0,
-            rest: None,
             outline: Outline::default(),
             weights: std::array::from_fn(|place| {
                 ACTIVITY_WEIGHT * (1.0 - ACTIVITY_WEIGHT).powi((PIECE - 1 - place) as i32)
@@ -626,29 +624,25 @@ impl HealthMeter {
                 }
             }
         }
-        if len < MIN_DROPOUT {
-            return;
-        }
-        self.still_samples += len;
-        let rest = self.rest;
-        if len >= MIN_STOP {
-            self.rest = Some(value);
-        }
-        // A long run at a limit is a flat top, whatever else it looks like.
-        let at_limit = extreme && value.abs() >= MIN_LEVEL_OF_PEAK * peak;
-        if at_limit {
+        if len < LEAST_DROPOUT {
             return;
         }
         let run = EqualRun { start, len, value };
         let steps = activity / self.quantum;
-        let chance = -steps.ln() * (len - 1) as f64;
-        let moved = steps > MIN_ACTIVITY_QUANTA && chance < MOST_CHANCE;
-        if exit == 0.0 {
-            let dithered = steps > MIN_STOP_QUANTA && len >= MIN_STOP;
-            let is_stop = (moved || dithered) && rest != Some(value);
-            self.health.stopped = Some(run).filter(|_| is_stop);
+        if exit == 0.0 && len >= MIN_STOP && steps > MIN_STOP_QUANTA {
+            self.health.stopped = Some(run);
         }
-        if exit == 0.0 || !moved {
+        // A long run at a limit is a flat top, whatever else it looks like.
+        let at_limit = extreme && value.abs() >= MIN_LEVEL_OF_PEAK * peak;
+        let moved = steps > MIN_ACTIVITY_QUANTA && exit > 0.0 && !at_limit;
+        // A short one has to interrupt the motion on both sides.
+        let interrupts = entry.min(exit) > MIN_ACTIVITY_QUANTA * self.quantum && !extreme;
+        let chance = -steps.ln() * (len - 1) as f64;
+        let is_dropped = moved && (len >= MIN_DROPOUT || interrupts && chance < MOST_CHANCE);
+        if len >= MIN_DROPOUT || is_dropped {
+            self.still_samples += len;
+        }
+        if !is_dropped {
             return;
         }
         self.health.dropout_count += 1;
@@ -669,6 +663,7 @@ impl HealthMeter {
         (health.maximum, health.minimum) = (self.high.level, -self.low.level);
         health.rms = (self.sum_of_squares / self.count as f64).sqrt();
         health.peak = health.maximum.abs().max(health.minimum.abs());
+        health.step = self.quantum;
         health.constant = health.maximum == health.minimum;
         for (side, rail) in [self.low, self.high].into_iter().zip(&mut health.rails) {
             if !health.constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * health.peak {

@@ -24,22 +24,25 @@ pub(super) struct Facts {
     pulse: Option<Pulse>,
     second_hit: Option<SecondHit>,
     overload: Option<Overload>,
+    /// Responses (0-based) of which no sample differs from the others in the first half of the record.
+    still: Vec<usize>,
 }
 
 /// Frames of an event's record. It ends with the pre-trigger of the next tap, or with the file.
 pub(super) fn record_of(
     recording: &Recording,
-    events: &[Event],
+    found: &Found,
     index: usize,
     weakest: f64,
     settings: &TapSettings,
 ) -> Range<u64> {
+    let events = &found.events;
     let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
     let mut later = events.iter().skip(index + 1);
     let next = later.find(|next| next.is_hit(weakest));
-    let end = next.map_or(recording.frames(), |next| {
-        next.trigger.saturating_sub(before)
-    });
+    // Taps that the hammer does not show end a record, too.
+    let next = next.map(|next| next.trigger).or(found.unheard);
+    let end = next.map_or(recording.frames(), |next| next.saturating_sub(before));
     let start = events[index].trigger.saturating_sub(before);
     start..end.max(start)
 }
@@ -60,7 +63,15 @@ pub(super) fn facts(
         pulse: None,
         second_hit: None,
         overload: overload(recording, source, record)?,
+        still: Vec::new(),
     };
+    // A glitch may come later.
+    let first_half = record.start..record.start.midpoint(record.end);
+    for &channel in source.responses() {
+        if is_still(recording, channel, &first_half)? {
+            facts.still.push(channel);
+        }
+    }
     if let Some(force) = force_of(recording, source, found, index, record, settings)? {
         let own = force.index(record.end.min(event.trigger + least));
         let end = force.pulse_end(event, own);
@@ -73,68 +84,82 @@ pub(super) fn facts(
     Ok(facts)
 }
 
-/// Where a response stops for good.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stop {
-    /// Its channel (0-based).
-    channel: usize,
-    /// The first frame that is as all after it.
-    frame: u64,
-}
+/// Swing of a channel that answers taps, in its smallest steps. 64: a tap of a tenth of the usual peak still moves it by several.
+const LEAST_SWING: f64 = 64.0;
 
-/// Returns the responses of a file that stop while another channel goes on, or stand still in this file of a recording alone.
-/// Where all stop, the file was filled up.
-pub(super) fn stops(file: &Recording, whole: &Recording, source: &TapSource) -> Vec<Stop> {
-    let moves_after = |channel: usize, frame: u64| {
-        let outline = file.outline(channel).unwrap_or_default();
-        // The first piece may hold frames before.
-        let pieces = outline.pieces_of(frame..file.frames()).skip(1);
-        let mut pieces = pieces.filter_map(|piece| outline.pieces.get(piece));
-        pieces.any(|piece| piece.low < piece.high)
+/// Returns the responses that move in a recording. The others were not connected, or hear nothing.
+pub(super) fn living(recording: &Recording, source: &TapSource) -> Vec<usize> {
+    let responses = source.responses().iter().copied();
+    let lives = |channel: &usize| {
+        let health = recording.channels().get(*channel).map(|info| &info.health);
+        health.is_some_and(|own| own.maximum - own.minimum >= LEAST_SWING * own.step)
     };
-    let channels = source.channels();
-    let mut stops = Vec::new();
-    for &channel in source.responses() {
-        let [own, all] = [file, whole].map(|one| one.channels().get(channel));
-        let (Some(own), Some(all)) = (own, all) else {
-            continue;
-        };
-        // A channel that never moves was not connected, and the others are used.
-        let frame = match own.health.constant && !all.health.constant {
-            true => Some(0),
-            false => own.health.stopped.map(|run| run.start),
-        };
-        if let Some(frame) = frame
-            && channels.iter().any(|other| moves_after(*other, frame))
-        {
-            stops.push(Stop { channel, frame });
-        }
-    }
-    stops
+    responses.filter(lives).collect()
 }
 
-/// Judges one event. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).
+/// Returns true where no sample of a channel differs from the others of a stretch.
+fn is_still(
+    recording: &Recording,
+    channel: usize,
+    stretch: &Range<u64>,
+) -> Result<bool, RecordingError> {
+    let outline = recording.outline(channel).unwrap_or_default();
+    let pieces = outline.pieces_of(stretch.clone());
+    // The first and the last piece may hold other samples.
+    let inner = pieces.start + 1..pieces.end.saturating_sub(1);
+    let mut inner = outline.pieces.get(inner).unwrap_or_default().iter();
+    if inner.any(|piece| piece.low < piece.high) {
+        return Ok(false);
+    }
+    let samples = recording.read(channel, stretch.clone())?;
+    Ok(samples.windows(2).all(|pair| pair[0] == pair[1]))
+}
+
+/// Returns the channel among `living` that gives no signal in the first half of a tap's record, or stops there and gives none at
+/// the `next` tap.
+pub(super) fn stopped(
+    recording: &Recording,
+    living: &[usize],
+    record: &Range<u64>,
+    own: &Facts,
+    next: Option<&Facts>,
+) -> Option<usize> {
+    let lives = |channel: &&usize| living.contains(*channel);
+    if let Some(channel) = own.still.iter().find(lives) {
+        return Some(*channel);
+    }
+    let middle = record.start.midpoint(record.end);
+    let stops = |channel: &&usize| {
+        let health = recording.channels().get(**channel).map(|info| &info.health);
+        let runs = health
+            .into_iter()
+            .flat_map(|own| own.dropped.iter().chain(&own.stopped));
+        let mut runs = runs.map(|run| run.start..run.start + run.len);
+        runs.any(|run| run.start < middle && record.end <= run.end)
+    };
+    let next = next?.still.iter().filter(lives);
+    next.clone().find(stops).copied()
+}
+
+/// Judges one event, in whose record the channel `stopped` (0-based) gives no signal. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).
 pub(super) fn judge(
     event: &Event,
     record: Range<u64>,
     facts: &Facts,
-    stops: &[Stop],
+    stopped: Option<usize>,
     weakest: f64,
     rate: f64,
     settings: &TapSettings,
 ) -> Tap {
     let double = facts.second_hit;
-    let middle = record.start.midpoint(record.end);
-    let stop = stops.iter().find(|stop| stop.frame < middle);
-    let stopped = stop.map(|stop| Rejection::Stopped {
-        channel: stop.channel + 1,
-    });
     let fault = match double.filter(|double| double.ratio >= settings.double_hit) {
-        _ if stopped.is_some() => stopped,
         _ if !event.answered => Some(Rejection::NoResponse),
         _ if event.peak < weakest => Some(Rejection::TooWeak {
             peak: event.peak,
             limit: weakest,
+        }),
+        _ if stopped.is_some() => stopped.map(|channel| Rejection::Stopped {
+            channel: channel + 1,
         }),
         Some(double) => Some(Rejection::DoubleHit {
             delay: double.delay,

@@ -1,9 +1,9 @@
 //! What was found of a growing recording before, so that a look at it costs little.
 
 use super::answered::is_answered;
-use super::judge::{Facts, Stop, facts, judge, record_of};
+use super::judge::{Facts, facts, judge, record_of, stopped};
 use super::search::{SurveyedPiece, find_pulses, find_rises};
-use super::{Found, Tap, TapSettings, TapSource};
+use super::{Found, Tap, TapRemark, TapSettings, TapSource};
 use crate::recording::{Recording, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -90,6 +90,36 @@ impl Conditions {
     }
 }
 
+/// Rises of the responses without a signal of the hammer that show a broken cable. 2: one may be a knock.
+const LEAST_UNHEARD: usize = 2;
+
+/// Looks for taps after the hammer has stopped giving a signal. A simulated hammer without noise, and one behind a force window,
+/// rest as well, but no response rises then.
+fn add_unheard(
+    recording: &Recording,
+    hammer: usize,
+    responses: &[usize],
+    settings: &TapSettings,
+    found: &mut Found,
+) -> Result<(), RecordingError> {
+    let info = recording.channels().get(hammer);
+    let Some(stopped) = info.and_then(|info| info.health.stopped) else {
+        return Ok(());
+    };
+    let after = stopped.start + settings.least_distance_in(recording);
+    let rises = find_rises(recording, responses, settings)?.events;
+    let unheard = rises.iter().filter(|event| event.trigger > after);
+    let count = unheard.clone().count();
+    if count >= LEAST_UNHEARD {
+        found.unheard = unheard.map(|event| event.trigger).next();
+        found.remarks.push(TapRemark::SilentHammer {
+            time: stopped.start as f64 / recording.sample_rate(),
+            rises: count,
+        });
+    }
+    Ok(())
+}
+
 impl PartMemo {
     /// Finds the events of a file.
     pub(super) fn search(
@@ -118,6 +148,10 @@ impl PartMemo {
                         self.answered.insert(frame, event.answered);
                     }
                 }
+                // While a recording goes on, its hammer may be at rest.
+                if !settings.is_growing {
+                    add_unheard(recording, *channel, responses, settings, &mut found)?;
+                }
                 found
             }
             TapSource::Responses(channels) => find_rises(recording, channels, settings)?,
@@ -133,13 +167,13 @@ impl PartMemo {
         self.answered.clear();
     }
 
-    /// Judges the events of a file, of which these responses stop. Peaks below `weakest` are too weak.
+    /// Judges the events of a file, whose responses `living` give a signal somewhere. Peaks below `weakest` are too weak.
     pub(super) fn judge(
         &mut self,
         recording: &Recording,
         source: &TapSource,
         found: &Found,
-        stops: &[Stop],
+        living: &[usize],
         weakest: f64,
         settings: &TapSettings,
     ) -> Result<Vec<Tap>, RecordingError> {
@@ -155,7 +189,7 @@ impl PartMemo {
         let events = &found.events;
         let mut places = Vec::with_capacity(events.len());
         for (index, event) in events.iter().enumerate() {
-            let record = record_of(recording, events, index, weakest, settings);
+            let record = record_of(recording, found, index, weakest, settings);
             let before = index.checked_sub(1).map(|before| events[before].trigger);
             let place = Place {
                 trigger: event.trigger,
@@ -189,13 +223,15 @@ impl PartMemo {
         self.facts = facts;
         let rate = recording.sample_rate();
         let mut taps = Vec::with_capacity(events.len());
-        for (event, place) in events.iter().zip(places) {
+        for (index, (event, place)) in events.iter().zip(&places).enumerate() {
             let record = place.record();
+            let next = places.get(index + 1).map(|next| &self.facts[next]);
+            let stopped = stopped(recording, living, &record, &self.facts[place], next);
             taps.push(judge(
                 event,
                 record,
-                &self.facts[&place],
-                stops,
+                &self.facts[place],
+                stopped,
                 weakest,
                 rate,
                 settings,

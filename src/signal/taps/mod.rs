@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
-use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, reject_short, stops};
+use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, living, reject_short};
 use search::Survey;
 use tapjoint_numerics::stats::median;
 
@@ -219,7 +219,7 @@ pub enum Rejection {
     Overload(Overload),
     /// No sensor moved.
     NoResponse,
-    /// A sensor has stopped giving a signal before the record or in its first half, and others go on.
+    /// A sensor gives no signal, which it gives elsewhere, while another one answers.
     Stopped {
         /// Its channel, 1-based.
         channel: usize,
@@ -277,7 +277,10 @@ impl fmt::Display for Rejection {
                 "no sensor answers it: the hammer was moved or laid down, or a disturbance",
             ),
             Rejection::Stopped { channel } => {
-                write!(f, "channel {channel} is dead: its samples no longer change")
+                write!(
+                    f,
+                    "channel {channel} gives no signal: its samples do not change"
+                )
             }
             Rejection::TooWeak { peak, limit } => {
                 write!(
@@ -319,6 +322,13 @@ pub enum TapRemark {
     InvertedForce,
     /// The recording begins after the tap, or in its pulse.
     StartsWithinTap,
+    /// The hammer gives no signal any more, and the responses show more taps.
+    SilentHammer {
+        /// Time of its last change (s).
+        time: f64,
+        /// Number of rises of the responses after that.
+        rises: usize,
+    },
     /// The force stayed up for longer than any hammer pulse.
     LongExcursion {
         /// Number of times.
@@ -368,6 +378,11 @@ impl fmt::Display for TapRemark {
                 "the recording begins within a tap: the start of its pulse is lost, so that its \
                  frequency response is doubtful (its frequencies are not); start the recorder earlier \
                  or use its pre-trigger",
+            ),
+            TapRemark::SilentHammer { time, rises } => write!(
+                f,
+                "the hammer gives no signal from {time:.2} s of its file on, and the responses rise {rises} times after that: these \
+                 taps are not seen; check the hammer and its cable, and record again"
             ),
             TapRemark::LongExcursion { count } => write!(
                 f,
@@ -503,6 +518,8 @@ struct Found {
     noise: f64,
     /// Survey of the force channel, where there is one.
     survey: Option<Survey>,
+    /// Frame at which the responses rise first once the hammer gives no signal; `None` where it gives one to the end.
+    unheard: Option<u64>,
     remarks: Vec<TapRemark>,
 }
 
@@ -549,6 +566,7 @@ pub fn find_taps_again(
         .map(|event| event.peak)
         .collect();
     let weakest = settings.weak * median(&mut peaks);
+    let living = living(recording, source);
     let rate = recording.sample_rate();
     let starts: Vec<f64> = searched
         .iter()
@@ -568,14 +586,9 @@ pub fn find_taps_again(
     let mut quiet = 0..0;
     for (number, (start, file, found)) in searched.iter().enumerate() {
         let before = taps.len();
-        let judged = memo.part(number).judge(
-            file,
-            source,
-            found,
-            &stops(file, recording, source),
-            weakest,
-            settings,
-        )?;
+        let judged = memo
+            .part(number)
+            .judge(file, source, found, &living, weakest, settings)?;
         for mut tap in judged {
             tap.file = joined.then(|| file.name().to_owned());
             tap.move_by(*start, rate);

@@ -275,6 +275,7 @@ pub(super) fn find_pulses(
         events: group(&excursions, distance, settings.double_hit),
         noise: survey.noise,
         survey: Some(survey),
+        unheard: None,
         remarks,
     })
 }
@@ -558,6 +559,7 @@ pub(super) fn find_rises(
         events,
         noise: envelope.floors.first().map_or(0.0, |first| first / 2.0),
         survey: None,
+        unheard: None,
         remarks,
     })
 }

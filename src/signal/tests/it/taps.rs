@@ -371,20 +371,95 @@ fn recover_taps_after_a_sensor_has_failed_are_rejected() {
         assert_all_accepted(&taps_with_two_responses(&channels), 4, "whole");
         // In the last third of the second record.
         channels[2][(2.2 * 5120.0) as usize..].fill(value);
-        let taps = taps_with_two_responses(&channels);
         let dead = Some(Rejection::Stopped { channel: 3 });
-        let rejections: Vec<_> = taps.taps.iter().map(|tap| &tap.rejection).collect();
-        assert_eq!(rejections, [&None, &None, &dead, &dead]);
-        // In its first third.
+        let rejections = |channels: &[Vec<f64>; 3]| {
+            let taps = taps_with_two_responses(channels).taps.into_iter();
+            taps.map(|tap| tap.rejection).collect::<Vec<_>>()
+        };
+        let late = [None, None, dead.clone(), dead.clone()];
+        assert_eq!(rejections(&channels), late, "{value}");
+        // Once more a single sample, zeros before, and a file that is filled up.
+        let mut more = channels.clone();
+        more[2][..300].fill(value);
+        let end = more[2].len();
+        more[2][end - 5] = 0.01;
+        assert_eq!(rejections(&more), late, "{value}");
+        for samples in &mut more {
+            samples.extend([0.0; 50]);
+        }
+        assert_eq!(rejections(&more), late, "{value}");
+        // In its first third: this record holds the failure.
         channels[2][(1.8 * 5120.0) as usize..].fill(value);
-        let taps = taps_with_two_responses(&channels);
-        assert_eq!(taps.accepted().count(), 1);
-        // The only response: not a hammer that was laid down.
+        let early = [None, dead.clone(), dead.clone(), dead];
+        assert_eq!(rejections(&channels), early, "{value}");
+        // The only responses: not a hammer that was laid down.
         channels[1] = channels[2].clone();
-        let taps = taps_with_two_responses(&channels);
         let dead = Some(Rejection::Stopped { channel: 2 });
-        assert_eq!(taps.taps.last().map(|tap| &tap.rejection), Some(&dead));
+        assert_eq!(
+            rejections(&channels),
+            [None, dead.clone(), dead.clone(), dead],
+            "{value}"
+        );
     }
+}
+
+#[test]
+fn recover_a_sensor_that_is_stuck_at_its_limit() {
+    let mut channels = with_two_responses(8);
+    channels[2][(2.2 * 5120.0) as usize..].fill(30.0);
+    let taps = taps_with_two_responses(&channels).taps;
+    let dead = Some(Rejection::Stopped { channel: 3 });
+    assert!(matches!(taps[1].rejection, Some(Rejection::Overload(_))));
+    assert_eq!([&taps[2].rejection, &taps[3].rejection], [&dead, &dead]);
+}
+
+#[test]
+fn limit_a_channel_at_rest_has_not_failed() {
+    // Steps of 0.05: the responses rest at 0 before each tap and soon after it.
+    let mut channels = with_two_responses(6);
+    for samples in &mut channels[1..] {
+        for sample in samples {
+            *sample = (*sample / 0.05).round() * 0.05;
+        }
+    }
+    // The hammer is laid down at 1.0 s.
+    for (at, sample) in channels[0][5120..5130].iter_mut().enumerate() {
+        *sample += 10.0 * (PI * at as f64 / 10.0).sin();
+    }
+    let taps = taps_with_two_responses(&channels);
+    let rejections: Vec<_> = taps.taps.iter().map(|tap| &tap.rejection).collect();
+    let laid = &Some(Rejection::NoResponse);
+    assert_eq!(rejections, [&None, laid, &None, &None, &None]);
+    // A sensor of which hardly anything is seen.
+    for sample in &mut channels[2] {
+        *sample = (*sample / 4.0).round();
+    }
+    assert_eq!(taps_with_two_responses(&channels).accepted().count(), 4);
+}
+
+#[test]
+fn recover_taps_that_a_dead_hammer_does_not_show() {
+    let mut channels = with_two_responses(7);
+    channels[0][(1.8 * 5120.0) as usize..].fill(0.0);
+    let taps = taps_with_two_responses(&channels);
+    assert_all_accepted(&taps, 2, "seen");
+    // The record of the last tap that is seen ends before the next one.
+    let end = taps.taps[1].record.end as f64 / 5120.0;
+    assert!((2.45..2.5).contains(&end), "{end}");
+    let [remark] = &taps.remarks[..] else {
+        panic!("{:?}", taps.remarks)
+    };
+    assert_eq!(
+        remark.to_string(),
+        "the hammer gives no signal from 1.80 s of its file on, and the responses rise 2 times after that: these taps are not \
+         seen; check the hammer and its cable, and record again"
+    );
+    // A hammer without noise rests after its last pulse.
+    let pulses = [0.5, 1.5, 2.5, 3.5].map(|time| pulse(time, 2e-3, 20.0));
+    channels[0] = force(5120.0, 4.5, &pulses, SHAPES[0]);
+    let taps = taps_with_two_responses(&channels);
+    assert_all_accepted(&taps, 4, "noise-free");
+    assert_eq!(taps.remarks, []);
 }
 
 #[test]

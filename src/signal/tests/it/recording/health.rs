@@ -182,45 +182,52 @@ fn prop_short_losses_are_found_in_a_strong_signal_alone() {
 }
 
 #[test]
-fn prop_a_channel_that_stops_is_named_with_its_time() {
-    let words = "channel 1: from 2.500000 s on every sample is 0; its sensor or cable probably failed, or the file was filled up; \
-                 check both, and record again";
+fn limit_noise_behind_a_pulse_is_no_loss() {
+    // The hammer of a 16-bit recorder, whose noise is half a step: it repeats values soon after each pulse.
+    let noise = rand_distr::Normal::new(0.0, 0.5).unwrap();
+    for seed in 0..20 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let hammer = |at: usize| {
+            let after = (at % 5000) as f64;
+            let pulse = if after < 50.0 {
+                (TAU * after / 100.0).sin()
+            } else {
+                0.0
+            };
+            (8000.0 * pulse + random.sample(noise)).round()
+        };
+        let health = health((0..50_000).map(hammer).collect());
+        assert_eq!(health.dropout_count, 0, "seed {seed}: {:?}", health.dropped);
+    }
+}
+
+#[test]
+fn prop_a_signal_that_stops_while_it_moves_is_told() {
     let mut quiet = ChaCha8Rng::seed_from_u64(5);
     // Noise of two steps each way, between taps.
     let dither: Vec<f64> = (0..4000)
         .map(|_| f64::from(quiet.random_range(-2..=2)))
         .collect();
     for mut samples in [ring_down(), dither] {
-        samples[2500..].fill(0.0);
-        // The last value before may be the same.
-        samples[2499] = 0.03;
-        let recording = record(samples.clone());
-        let warnings = recording.warnings().into_iter().map(|one| one.to_string());
-        assert_eq!(warnings.collect::<Vec<_>>(), [words]);
-        let stopped = recording.channels()[0].health.stopped.unwrap();
-        assert_eq!(
-            (stopped.start, stopped.len, stopped.value),
-            (2500, 1500, 0.0)
-        );
+        samples[2499] = 1.5;
+        for value in [0.0, 9.0] {
+            samples[2500..].fill(value);
+            let stopped = health(samples.clone()).stopped.unwrap();
+            assert_eq!(
+                (stopped.start, stopped.len, stopped.value),
+                (2500, 1500, value)
+            );
+        }
         // It lives again.
         samples.extend(ring_down());
         assert_eq!(health(samples).stopped, None);
     }
-}
-
-#[test]
-fn limit_a_signal_that_comes_to_rest_has_not_stopped() {
     // A decay below one step of a converter.
     let quantised = |at: usize| {
         let t = at as f64 / RATE;
         ((-8.0 * t).exp() * (TAU * 47.0 * t).sin() * 2048.0).round()
     };
     assert_eq!(health((0..4000).map(quantised).collect()).stopped, None);
-    // A channel that is cut to 0 wherever it is weak, as it was before the tap.
-    let mut gated = vec![0.0; 1000];
-    gated.extend(ring_down().iter().take(1500));
-    gated.extend([0.0; 1000]);
-    assert_eq!(health(gated).stopped, None);
 }
 
 #[test]

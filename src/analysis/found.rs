@@ -6,7 +6,7 @@ use tapjoint_description::{FoundChannel, FoundContent, FoundRecording, FunctionF
 use tapjoint_signal::recording::{
     FrequencyResponses, ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::taps::{Rejection, Tap, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{Rejection, TapSettings, TapSource, Taps, find_taps};
 
 /// Samples of each channel by which a hammer is recognised.
 const LOOKED_AT: u64 = 4_000_000;
@@ -122,14 +122,10 @@ pub fn hammer_doubt(recording: &Recording, source: &TapSource, taps: &Taps) -> O
     let TapSource::Hammer { channel, .. } = source else {
         return None;
     };
-    let is_odd = |tap: &&Tap| {
-        use Rejection::{DoubleHit, NoResponse};
-        matches!(tap.rejection, Some(DoubleHit { .. } | NoResponse))
-    };
-    if taps.taps.iter().filter(is_odd).count() <= taps.accepted().count() {
+    if taps.odd() <= taps.accepted().count() {
         return None;
     }
-    // Without an answer there is no doubt; a file that cannot be read is an error elsewhere.
+    // A file that cannot be read is an error elsewhere.
     let other = channel_of_pulses(recording).ok().flatten()?;
     let hits = taps.taps.iter();
     let hits = hits.filter(|tap| !matches!(tap.rejection, Some(Rejection::NoResponse)));

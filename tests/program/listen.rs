@@ -766,7 +766,7 @@ fn recover_a_test_in_one_stream_by_next() {
     input.write_all(&low[head..]).unwrap();
     let taps = |bench: &Value| bench["taps"].as_array().unwrap().len();
     let first = benches.find(|bench| taps(bench) == 5).unwrap();
-    assert_eq!(first["next"], "high.wav, tap at 0.385 m");
+    assert_eq!(first["next"], "high.wav, tap at 0.385\u{a0}m");
     let last = &first["taps"][4]["time"];
     let reject = format!("{{\"action\": \"reject\", \"time\": {last}}}");
     assert_eq!(page.act(&reject), 204);

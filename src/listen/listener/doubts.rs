@@ -4,7 +4,7 @@ use super::Listener;
 use crate::news::News;
 use std::mem::discriminant;
 use tapjoint_analysis::{TapsSoFar, hammer_doubt};
-use tapjoint_signal::taps::{Rejection, TapRemark, TapSource};
+use tapjoint_signal::taps::{TapRemark, TapSource};
 
 /// Time without a tap after which that is said (s). 20 s: longer than an engineer who has started the recorder waits.
 const NO_TAP: f64 = 20.0;
@@ -63,11 +63,7 @@ impl Listener<'_> {
         // The whole recording is read for it.
         self.checked_taps = total;
         let doubt = hammer_doubt(&found.recording, &found.source, taps);
-        let odd = taps.taps.iter().filter(|tap| {
-            use Rejection::{DoubleHit, NoResponse};
-            matches!(tap.rejection, Some(DoubleHit { .. } | NoResponse))
-        });
-        if doubt.is_none() && (odd.count() as f64) < MIXED * total as f64 {
+        if doubt.is_none() && (taps.odd() as f64) < MIXED * total as f64 {
             return None;
         }
         self.are_mixed = true;

@@ -477,6 +477,13 @@ impl Taps {
         self.taps.iter().filter(|tap| tap.accepted())
     }
 
+    /// Number of double hits and of taps that no sensor answers. Many of them come of a wrong hammer channel.
+    pub fn odd(&self) -> usize {
+        use Rejection::{DoubleHit, NoResponse};
+        let is_odd = |tap: &&Tap| matches!(tap.rejection, Some(DoubleHit { .. } | NoResponse));
+        self.taps.iter().filter(is_odd).count()
+    }
+
     /// Length of the shortest accepted record (frames).
     pub fn shortest(&self) -> Option<u64> {
         self.accepted().map(Tap::frames).min()

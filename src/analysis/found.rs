@@ -135,9 +135,8 @@ pub fn hammer_doubt(recording: &Recording, source: &TapSource, taps: &Taps) -> O
     let coincide = 2 * together.count() > hits.count();
     (*channel != other && coincide).then(|| {
         format!(
-            "most taps are rejected with channel {} as the hammer's, and channel {other} has the short pulses of a hammer; if so, say \
-             --hammer {other}, or correct the `channel` of the hammer in the description",
-            channel + 1,
+            "most taps are rejected. Channel {other} has the short pulses of a hammer. If it is the hammer, say --hammer {other}, or \
+             correct the hammer's `channel` in the description",
             other = other + 1
         )
     })

@@ -268,8 +268,8 @@ pub(super) fn run(
     views.say(&introduction(arguments, described.as_ref(), &target));
     let (mut headers, mut first, mut split) = (begun.headers, None, None);
     let (mut failed, mut stream_doubts) = (None, Vec::new());
-    // Recordings of the same stream.
-    let (mut has_wrong_rate, mut names) = (false, Vec::new());
+    // Recordings of the same stream, and those of them with a wrong rate.
+    let (mut names, mut wrong, mut is_rate_wrong) = (Vec::new(), Vec::new(), false);
     let (heard, end) = loop {
         let bare = arguments.run.bare();
         let plan = plan_of(described.as_ref(), &target, &bare);
@@ -285,8 +285,8 @@ pub(super) fn run(
         if begun.aside.is_none() {
             hearing.log = Some(Log::beside(&target.file));
         }
-        hearing.has_wrong_rate = has_wrong_rate;
-        if begun.has_states && !has_wrong_rate {
+        hearing.begin_at(is_rate_wrong);
+        if begun.has_states && !is_rate_wrong {
             hearing.with_states();
         }
         let mut heard = hearing.listen(&stream, first.take());
@@ -294,8 +294,12 @@ pub(super) fn run(
         for doubt in std::mem::take(&mut heard.stream_doubts) {
             stream_doubts.push(format!("{file}, while it was recorded: {doubt}"));
         }
-        has_wrong_rate = heard.has_wrong_rate;
         names.push(file_name(&target.file));
+        // The rate is judged once some of it is there.
+        if heard.has_wrong_rate {
+            wrong.clone_from(&names);
+        }
+        is_rate_wrong = heard.is_rate_wrong;
         split = split.or_else(|| files_beside(described.as_ref(), &target, &heard));
         let ended = std::mem::replace(&mut heard.ended, Ok(End::default()));
         let Some((next, file)) = heard.turned.take() else {
@@ -347,11 +351,11 @@ pub(super) fn run(
         })
     });
     // Every frequency would be wrong.
-    let refused = has_wrong_rate.then(|| {
+    let refused = (!wrong.is_empty()).then(|| {
         format!(
             "no report: samples came at another rate than stated. Remove {} and record again. If the stated rate is right, \
              `tapjoint run` gives the report\n",
-            names.join(", ")
+            wrong.join(", ")
         )
     });
     if let Some(words) = refused.or(split).or(next) {
@@ -362,7 +366,7 @@ pub(super) fn run(
         }
         repeat(&terminal, &stream_doubts);
         views.finish(&words);
-        return Ok(Outcome::of(heard.accepted > 0 && !has_wrong_rate));
+        return Ok(Outcome::of(heard.accepted > 0 && wrong.is_empty()));
     }
     if let Some(by_hand) = heard.by_hand {
         terminal.say(&by_hand_words(

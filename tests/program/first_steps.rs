@@ -145,8 +145,8 @@ fn regress_a_hammer_that_is_named_or_forgotten_is_suggested() {
     let taps = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/cantilever/low.wav");
     std::fs::copy(taps, folder.path().join("low.wav")).unwrap();
     let (text, _) = told(folder.path(), &["run", "low.wav", "--hammer", "2"], 1);
-    let wanted = "> low.wav: most taps are rejected with channel 2 as the hammer's, and channel 1\n  has the short pulses of a hammer; if \
-                  so, say --hammer 1, or correct the\n  `channel` of the hammer in the description.\n";
+    let wanted = "> low.wav: most taps are rejected. Channel 1 has the short pulses of a hammer.\n  If it is the hammer, say --hammer 1, or \
+                  correct the hammer's `channel` in the\n  description.\n";
     assert!(text.contains(wanted), "{text}");
     // Nothing but noise.
     let mut noise = String::from("time,a\n");

@@ -10,6 +10,8 @@ const JUDGED_EACH: f64 = 10.0;
 /// A rate that is off by less is that of the stated clock (1). 2 %: usual rates lie 8 % apart at least (44.1 and 48 kHz), and
 /// the clocks of two devices differ by far less.
 const RATE_TOLERANCE: f64 = 0.02;
+/// A rate is right only where the tolerance is as narrow as this (1). 5 %: below the distance of 44.1 and 48 kHz.
+const MOST_TOLERANCE: f64 = 0.05;
 /// What arrives this much faster than stated is a file, and no clock drives it. 8: beyond any pair of usual rates by mistake.
 const FILE_SPEED: f64 = 8.0;
 /// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
@@ -40,6 +42,19 @@ pub(super) enum Shown {
     Loss(String),
 }
 
+/// A stretch of the stream.
+#[derive(Debug, Clone)]
+struct Window {
+    /// Its beginning since the first piece (s).
+    start: f64,
+    /// Frames at its beginning.
+    frames: f64,
+    /// Longest time between two of its pieces (s).
+    longest_gap: f64,
+    /// Time at which it is judged (s).
+    next: f64,
+}
+
 /// Watches the arrival of a stream.
 #[derive(Debug, Clone)]
 pub(super) struct Arrival {
@@ -47,12 +62,10 @@ pub(super) struct Arrival {
     rate: f64,
     /// Time of the first piece, and of the last one (s).
     times: Option<(f64, f64)>,
-    /// Longest time between two pieces (s).
-    longest_gap: f64,
     /// Frames after the first piece.
     frames: f64,
-    /// Time since the first piece from which on the rate is judged next (s), and the frames then.
-    judged_from: Option<(f64, f64)>,
+    /// The stretch by which the rate is judged; `None` before it begins.
+    window: Option<Window>,
     /// Times of the last minute, a second apart at least, and how far samples were behind the clock then (s).
     behind: VecDeque<[f64; 2]>,
     /// Time since which more of them are behind (s).
@@ -67,9 +80,8 @@ impl Arrival {
         Self {
             rate,
             times: None,
-            longest_gap: 0.0,
             frames: 0.0,
-            judged_from: None,
+            window: None,
             behind: VecDeque::new(),
             behind_since: None,
             is_judged: false,
@@ -87,16 +99,27 @@ impl Arrival {
         self.frames += frames;
         let (elapsed, gap) = (now - *first, now - *last);
         *last = now;
-        // A piece may hold the samples of the pause before it, so a long pause widens the tolerance of the rate.
-        self.longest_gap = self.longest_gap.max(gap);
         if elapsed < BACKLOG {
             return None;
         }
-        let (start, before) = *self.judged_from.get_or_insert((elapsed, self.frames));
-        // The first time so that ten seconds are enough.
-        if elapsed >= JUDGED_EACH && (elapsed - start >= JUDGED_EACH || !self.is_judged) {
-            self.judged_from = Some((elapsed, self.frames));
-            return self.judge_rate(self.frames - before, elapsed - start);
+        // A window begins with what a pause before it has held back.
+        let Some(window) = &mut self.window else {
+            self.window = Some(Window {
+                start: elapsed,
+                frames: self.frames,
+                longest_gap: 0.0,
+                // The first time so that ten seconds of a recording are enough.
+                next: match self.is_judged {
+                    true => elapsed + JUDGED_EACH,
+                    false => JUDGED_EACH,
+                },
+            });
+            return None;
+        };
+        window.longest_gap = window.longest_gap.max(gap);
+        if elapsed >= window.next {
+            window.next = elapsed + JUDGED_EACH;
+            return self.judge_rate(elapsed);
         }
         match self.is_off {
             true => None,
@@ -104,25 +127,27 @@ impl Arrival {
         }
     }
 
-    /// Judges the rate by frames that came in so many seconds. A rate that was right once stays so: what is missing later is
-    /// lost.
-    fn judge_rate(&mut self, frames: f64, seconds: f64) -> Option<Shown> {
-        let speed = frames / seconds / self.rate;
-        let tolerance = RATE_TOLERANCE + self.longest_gap / seconds;
-        let was_right = self.is_judged && !self.is_off;
-        let was_wrong = self.is_judged && self.is_off;
-        self.is_judged = true;
-        if was_right {
+    /// Judges the rate by what came in the window. A rate that was right once stays so: what is missing later is lost.
+    fn judge_rate(&mut self, elapsed: f64) -> Option<Shown> {
+        let window = self.window.as_ref()?;
+        let seconds = elapsed - window.start;
+        let speed = (self.frames - window.frames) / seconds / self.rate;
+        // A piece may hold the samples of the pause before it.
+        let tolerance = RATE_TOLERANCE + window.longest_gap / seconds;
+        let is_off = (speed - 1.0).abs() > tolerance;
+        let (was_right, was_wrong) = (self.is_judged && !self.is_off, self.is_off);
+        // After long pauses a longer window decides.
+        if was_right || !is_off && tolerance > MOST_TOLERANCE {
             return None;
         }
-        self.is_off = (speed - 1.0).abs() > tolerance;
-        if was_wrong && !self.is_off {
+        (self.is_judged, self.is_off, self.window) = (true, is_off, None);
+        if was_wrong && !is_off {
             self.behind.clear();
             self.behind_since = None;
-            let text = "samples arrive at the stated rate now. Those before may be at wrong times";
+            let text = "samples arrive at the stated rate now. The taps before may be wrong";
             return Some(Shown::RightRate(text.to_owned()));
         }
-        if was_wrong || !self.is_off || speed > FILE_SPEED {
+        if was_wrong || !is_off || speed > FILE_SPEED {
             return None;
         }
         let (found, stated) = (speed * self.rate, self.rate);
@@ -131,10 +156,14 @@ impl Arrival {
             Some(usual) => (*usual, format!("the rate {usual:.0} Hz")),
             None => (found, "the recorder's rate".to_owned()),
         };
+        let (word, factor) = match stated > likely {
+            true => ("high", stated / likely),
+            false => ("low", likely / stated),
+        };
         Some(Shown::WrongRate(format!(
-            "{found:.0} samples a second arrive, and {stated:.0} Hz is stated. If the recorder loses none, every frequency is \
-             multiplied by {:.3}: remove the file, and record it again with {rate}. Check --channels and --format, too",
-            stated / likely
+            "{found:.0} samples a second arrive, and {stated:.0} Hz is stated. Every frequency would be too {word} by a factor of \
+             {factor:.3}. Remove the file, and record it again with {rate}. If {stated:.0} Hz is right, the recorder loses samples, or \
+             the number of channels or the sample format is wrong"
         )))
     }
 
@@ -208,18 +237,23 @@ mod tests {
     fn recover_a_wrong_rate_and_a_loss() {
         let wrong = |found: &str, factor: &str, rate: &str| {
             format!(
-                "{found} samples a second arrive, and 1000 Hz is stated. If the recorder loses none, every frequency is multiplied \
-                 by {factor}: remove the file, and record it again with {rate}. Check --channels and --format, too"
+                "{found} samples a second arrive, and 1000 Hz is stated. Every frequency would be too {factor}. Remove the file, and \
+                 record it again with {rate}. If 1000 Hz is right, the recorder loses samples, or the number of channels or the \
+                 sample format is wrong"
             )
         };
-        let slow = wrong("919", "1.088", "the recorder's rate");
+        let slow = wrong("919", "high by a factor of 1.088", "the recorder's rate");
         assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [slow]);
         // Near a usual rate.
-        let twice = wrong("2010", "0.500", "the rate 2000 Hz");
+        let twice = wrong("2010", "low by a factor of 2.000", "the rate 2000 Hz");
         assert_eq!(said(2.01, 0.1, 60.0, 0.0..0.0), [twice]);
-        // Half of the channels that are stated.
-        let half = wrong("500", "2.000", "the recorder's rate");
-        assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), [half]);
+        // Half of the channels that are stated, in pieces as long as the time after which it is judged.
+        let half = wrong("500", "high by a factor of 2.000", "the recorder's rate");
+        assert_eq!(said(0.5, 0.1, 60.0, 0.0..0.0), std::slice::from_ref(&half));
+        assert_eq!(said(0.5, 11.0, 120.0, 0.0..0.0), [half]);
+        // A pause at the beginning.
+        let paused = said(0.919, 0.1, 60.0, 0.3..3.3);
+        assert_eq!(paused.len(), 1, "{paused:?}");
         // Soon, or after an hour.
         for lost in [29.95, 3599.95] {
             assert_eq!(

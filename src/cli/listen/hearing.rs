@@ -39,8 +39,10 @@ pub(super) struct Heard {
     pub(super) is_unwritten: bool,
     /// Doubts about the stream itself, which its file does not show.
     pub(super) stream_doubts: Vec<String>,
-    /// True where samples came at another rate than stated.
+    /// True where taps, or the end, came at another rate than stated.
     pub(super) has_wrong_rate: bool,
+    /// True where samples come at another rate at the end.
+    pub(super) is_rate_wrong: bool,
     /// How the stream ended.
     pub(super) ended: anyhow::Result<End>,
     /// The recording that follows in the same stream, and its first file.
@@ -75,8 +77,10 @@ pub(super) struct Hearing<'a, 'v> {
     waits: u64,
     /// Doubts about the stream itself.
     stream_doubts: Vec<String>,
-    /// True where samples come at another rate than stated.
-    pub(super) has_wrong_rate: bool,
+    /// True where taps, or the last samples, came at another rate than stated.
+    has_wrong_rate: bool,
+    /// True where samples come at another rate now.
+    is_rate_wrong: bool,
     files: Vec<PathBuf>,
     /// Why taps are no longer judged.
     fault: Option<ListenError>,
@@ -117,12 +121,18 @@ impl<'a, 'v> Hearing<'a, 'v> {
             waits: 0,
             stream_doubts: Vec::new(),
             has_wrong_rate: false,
+            is_rate_wrong: false,
             files: target.earlier.clone(),
             fault: None,
             is_unwritten: false,
             turns_to: None,
             has_ended: false,
         }
+    }
+
+    /// Begins in a stream whose rate is wrong, or is not known to be.
+    pub(super) fn begin_at(&mut self, is_rate_wrong: bool) {
+        (self.has_wrong_rate, self.is_rate_wrong) = (is_rate_wrong, is_rate_wrong);
     }
 
     /// Works out results between the taps.
@@ -199,7 +209,10 @@ impl<'a, 'v> Hearing<'a, 'v> {
             }
             Event::Doubt(text) => self.doubt_stream(text),
             Event::Rate { text, is_wrong } => {
-                self.has_wrong_rate = is_wrong;
+                self.is_rate_wrong = is_wrong;
+                let has_taps = self.listener.as_ref().is_some_and(|own| own.taps() > 0);
+                // Taps that were recorded at a wrong rate stay wrong.
+                self.has_wrong_rate = is_wrong || self.has_wrong_rate && has_taps;
                 // Each of their frequencies may be wrong.
                 self.end_results();
                 self.advise();
@@ -608,6 +621,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             is_unwritten: self.is_unwritten,
             stream_doubts: self.stream_doubts,
             has_wrong_rate: self.has_wrong_rate,
+            is_rate_wrong: self.is_rate_wrong,
             ended: match self.fault {
                 Some(fault) if is_refused => Err(fault.into()),
                 Some(fault) => Err(anyhow!(

@@ -4,7 +4,7 @@ use super::Listener;
 use crate::news::News;
 use std::mem::discriminant;
 use tapjoint_analysis::{TapsSoFar, hammer_doubt};
-use tapjoint_signal::taps::{TapRemark, TapSource};
+use tapjoint_signal::taps::{Rejection, TapRemark, TapSource};
 
 /// Time without a tap after which that is said (s). 20 s: longer than an engineer who has started the recorder waits.
 const NO_TAP: f64 = 20.0;
@@ -45,7 +45,7 @@ impl Listener<'_> {
             Some(TapSource::Hammer { channel, .. }) => {
                 format!("the hammer's channel (number {})", channel + 1)
             }
-            _ => "a response".to_owned(),
+            _ => "any channel".to_owned(),
         };
         Some(News::Doubt(format!(
             "no tap in the first {NO_TAP:.0} s on {whose}. If you have tapped, check the cables, the gain and the numbers of \
@@ -63,13 +63,16 @@ impl Listener<'_> {
         // The whole recording is read for it.
         self.checked_taps = total;
         let doubt = hammer_doubt(&found.recording, &found.source, taps);
-        if doubt.is_none() && (taps.odd() as f64) < MIXED * total as f64 {
+        // Who has only double hits hits too long.
+        let mut rejections = taps.taps.iter().map(|tap| &tap.rejection);
+        let are_mixed = taps.odd() as f64 >= MIXED * total as f64
+            && rejections.any(|why| *why == Some(Rejection::NoResponse));
+        if doubt.is_none() && !are_mixed {
             return None;
         }
         self.are_mixed = true;
         Some(News::Doubt(doubt.unwrap_or_else(|| {
-            "most taps are rejected. Check the number of channels, the form of the samples and the hammer's channel: \
-             a wrong one mixes the channels"
+            "most taps are rejected. Check the number of channels, the sample format and the hammer's channel"
                 .to_owned()
         })))
     }

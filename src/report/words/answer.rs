@@ -216,16 +216,22 @@ fn action(document: &Document) -> Option<String> {
         };
         return next_in_short(gap).filter(|_| needs);
     }
-    let mut warnings = document.warnings.iter();
-    if let Some(forgotten) = warnings.find(|one| one.code == "hammer-channel") {
+    let warning = |code: &str| document.warnings.iter().find(|one| one.code == code);
+    if let Some(forgotten) = warning("hammer-channel") {
         return Some(format!("{}.", forgotten.text));
     }
-    let series = document.recordings.iter().flatten();
-    let mut series = series.filter(|one| one.sample_rate.is_some()).peekable();
-    if series.peek().is_some() && series.all(|one| one.taps.is_empty()) {
-        return Some("Check the cables, the gain and the numbers of the channels.".to_owned());
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let in_time = recordings.iter().filter(|one| one.sample_rate.is_some());
+    let taps = in_time.clone().flat_map(|one| &one.taps);
+    if in_time.count() == 0 || taps.clone().any(|tap| tap.accepted) {
+        return described(document);
     }
-    described(document)
+    // Without taps a description would help nothing.
+    Some(match (taps.count(), warning("stopped-channel")) {
+        (0, _) => "Check the cables, the gain and the numbers of the channels.".to_owned(),
+        (_, Some(stopped)) => format!("{}.", stopped.text),
+        _ => "Each tap is rejected. Read the reasons in the list of taps (--full).".to_owned(),
+    })
 }
 
 /// Returns each kind of doubt once, the worst first, but for the one that `reason` gives.

@@ -4,7 +4,7 @@ use super::double_hit::{SecondHit, least_candidate, second_hit};
 use super::pulse::Pulse;
 use super::search::Force;
 use super::{Event, Found, Overload, Rejection, Tap, TapSettings, TapSource};
-use crate::recording::{Recording, RecordingError};
+use crate::recording::{Extremes, Recording, RecordingError};
 use std::ops::Range;
 use tapjoint_numerics::stats::median;
 
@@ -24,8 +24,8 @@ pub(super) struct Facts {
     pulse: Option<Pulse>,
     second_hit: Option<SecondHit>,
     overload: Option<Overload>,
-    /// Responses (0-based) of which no sample differs from the others in the first half of the record.
-    still: Vec<usize>,
+    /// Swing of each response in the first half of the record (its unit); empty of a short record.
+    swings: Vec<f64>,
 }
 
 /// Frames of an event's record. It ends with the pre-trigger of the next tap, or with the file.
@@ -63,13 +63,15 @@ pub(super) fn facts(
         pulse: None,
         second_hit: None,
         overload: overload(recording, source, record)?,
-        still: Vec::new(),
+        swings: Vec::new(),
     };
-    // A glitch may come later.
+    // A glitch may come later. A record that is shorter says nothing.
     let first_half = record.start..record.start.midpoint(record.end);
-    for &channel in source.responses() {
-        if is_still(recording, channel, &first_half)? {
-            facts.still.push(channel);
+    if first_half.end >= event.trigger + (ANSWERED_WITHIN * recording.sample_rate()) as u64 {
+        for &channel in source.responses() {
+            facts
+                .swings
+                .push(swing(recording, channel, first_half.clone())?);
         }
     }
     if let Some(force) = force_of(recording, source, found, index, record, settings)? {
@@ -87,58 +89,80 @@ pub(super) fn facts(
 /// Swing of a channel that answers taps, in its smallest steps. 64: a tap of a tenth of the usual peak still moves it by several.
 const LEAST_SWING: f64 = 64.0;
 
-/// Returns the responses that move in a recording. The others were not connected, or hear nothing.
-pub(super) fn living(recording: &Recording, source: &TapSource) -> Vec<usize> {
-    let responses = source.responses().iter().copied();
-    let lives = |channel: &usize| {
-        let health = recording.channels().get(*channel).map(|info| &info.health);
-        health.is_some_and(|own| own.maximum - own.minimum >= LEAST_SWING * own.step)
-    };
-    responses.filter(lives).collect()
+/// Time after the trigger by which a sensor answers (s). 50 ms: sound passes 15 m of air in it.
+const ANSWERED_WITHIN: f64 = 0.05;
+
+/// Returns which responses answer taps in a recording. The others were not connected, or hear nothing. `facts` are those of
+/// the events that are answered.
+pub(super) fn answering<'a>(
+    recording: &Recording,
+    source: &TapSource,
+    facts: impl Iterator<Item = &'a Facts>,
+) -> Vec<usize> {
+    let responses = source.responses();
+    let mut largest = vec![0.0; responses.len()];
+    for own in facts {
+        for (largest, swing) in largest.iter_mut().zip(&own.swings) {
+            *largest = f64::max(*largest, *swing);
+        }
+    }
+    let mut answering = Vec::new();
+    for (&channel, swing) in responses.iter().zip(largest) {
+        let info = recording.channels().get(channel);
+        if info.is_some_and(|info| swing >= LEAST_SWING * info.health.step) {
+            answering.push(channel);
+        }
+    }
+    answering
 }
 
-/// Returns true where no sample of a channel differs from the others of a stretch.
-fn is_still(
+/// Highest less lowest value of a channel in a stretch. It may leave out what lies at its ends, unless that alone moves.
+pub(super) fn swing(
     recording: &Recording,
     channel: usize,
-    stretch: &Range<u64>,
-) -> Result<bool, RecordingError> {
+    stretch: Range<u64>,
+) -> Result<f64, RecordingError> {
     let outline = recording.outline(channel).unwrap_or_default();
     let pieces = outline.pieces_of(stretch.clone());
     // The first and the last piece may hold other samples.
     let inner = pieces.start + 1..pieces.end.saturating_sub(1);
-    let mut inner = outline.pieces.get(inner).unwrap_or_default().iter();
-    if inner.any(|piece| piece.low < piece.high) {
-        return Ok(false);
+    let inner = outline.pieces.get(inner).unwrap_or_default().iter();
+    let inner = inner.fold(Extremes::NONE, |all, piece| all.with(*piece));
+    if inner.low < inner.high {
+        return Ok(inner.high - inner.low);
     }
-    let samples = recording.read(channel, stretch.clone())?;
-    Ok(samples.windows(2).all(|pair| pair[0] == pair[1]))
+    let all = Extremes::of(&recording.read(channel, stretch)?);
+    Ok((all.high - all.low).max(0.0))
 }
 
-/// Returns the channel among `living` that gives no signal in the first half of a tap's record, or stops there and gives none at
-/// the `next` tap.
+/// Returns the channel (0-based) among those that answer taps that gives no signal in the first half of a tap's record, or
+/// stops there and gives none at the `next` tap.
 pub(super) fn stopped(
     recording: &Recording,
-    living: &[usize],
+    source: &TapSource,
+    answering: &[usize],
     record: &Range<u64>,
     own: &Facts,
     next: Option<&Facts>,
 ) -> Option<usize> {
-    let lives = |channel: &&usize| living.contains(*channel);
-    if let Some(channel) = own.still.iter().find(lives) {
+    let still = |facts: &Facts| {
+        let swings = source.responses().iter().zip(&facts.swings);
+        let still = swings.filter(|(channel, swing)| **swing == 0.0 && answering.contains(channel));
+        still.map(|(channel, _)| *channel).collect::<Vec<_>>()
+    };
+    if let Some(channel) = still(own).first() {
         return Some(*channel);
     }
     let middle = record.start.midpoint(record.end);
-    let stops = |channel: &&usize| {
-        let health = recording.channels().get(**channel).map(|info| &info.health);
+    let stops = |channel: &usize| {
+        let health = recording.channels().get(*channel).map(|info| &info.health);
         let runs = health
             .into_iter()
             .flat_map(|own| own.dropped.iter().chain(&own.stopped));
         let mut runs = runs.map(|run| run.start..run.start + run.len);
         runs.any(|run| run.start < middle && record.end <= run.end)
     };
-    let next = next?.still.iter().filter(lives);
-    next.clone().find(stops).copied()
+    still(next?).into_iter().find(stops)
 }
 
 /// Judges one event, in whose record the channel `stopped` (0-based) gives no signal. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).

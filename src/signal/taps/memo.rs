@@ -1,7 +1,7 @@
 //! What was found of a growing recording before, so that a look at it costs little.
 
 use super::answered::is_answered;
-use super::judge::{Facts, facts, judge, record_of, stopped};
+use super::judge::{Facts, facts, judge, record_of, stopped, swing};
 use super::search::{SurveyedPiece, find_pulses, find_rises};
 use super::{Found, Tap, TapRemark, TapSettings, TapSource};
 use crate::recording::{Recording, RecordingError};
@@ -21,6 +21,11 @@ pub struct TapMemo {
 }
 
 impl TapMemo {
+    /// What was found of each file.
+    pub(super) fn parts(&self) -> &[PartMemo] {
+        &self.parts
+    }
+
     /// Returns what was found of a file (0-based).
     pub(super) fn part(&mut self, number: usize) -> &mut PartMemo {
         if self.parts.len() <= number {
@@ -93,8 +98,10 @@ impl Conditions {
 /// Rises of the responses without a signal of the hammer that show a broken cable. 2: one may be a knock.
 const LEAST_UNHEARD: usize = 2;
 
-/// Looks for taps after the hammer has stopped giving a signal. A simulated hammer without noise, and one behind a force window,
-/// rest as well, but no response rises then.
+/// Time before a tap in which a hammer without noise shows no change (s). 0.1 s: half the least time between two taps.
+const RESTS: f64 = 0.1;
+
+/// Looks for taps after the hammer has stopped giving a signal.
 fn add_unheard(
     recording: &Recording,
     hammer: usize,
@@ -106,6 +113,20 @@ fn add_unheard(
     let Some(stopped) = info.and_then(|info| info.health.stopped) else {
         return Ok(());
     };
+    // A hammer that is at rest before a pulse is so after it.
+    let rate = recording.sample_rate();
+    let frames = |seconds: f64| (seconds * rate) as u64;
+    let Some(last) = found.events.last() else {
+        return Ok(());
+    };
+    let before = last.trigger.saturating_sub(frames(RESTS)).max(1)
+        ..last
+            .trigger
+            .saturating_sub(frames(settings.pre_trigger))
+            .max(1);
+    if swing(recording, hammer, before)? == 0.0 {
+        return Ok(());
+    }
     let after = stopped.start + settings.least_distance_in(recording);
     let rises = find_rises(recording, responses, settings)?.events;
     let unheard = rises.iter().filter(|event| event.trigger > after);
@@ -113,7 +134,7 @@ fn add_unheard(
     if count >= LEAST_UNHEARD {
         found.unheard = unheard.map(|event| event.trigger).next();
         found.remarks.push(TapRemark::SilentHammer {
-            time: stopped.start as f64 / recording.sample_rate(),
+            time: stopped.start as f64 / rate,
             rises: count,
         });
     }
@@ -167,16 +188,15 @@ impl PartMemo {
         self.answered.clear();
     }
 
-    /// Judges the events of a file, whose responses `living` give a signal somewhere. Peaks below `weakest` are too weak.
-    pub(super) fn judge(
+    /// Measures the events of a file. Peaks below `weakest` are too weak to end a record.
+    pub(super) fn measure(
         &mut self,
         recording: &Recording,
         source: &TapSource,
         found: &Found,
-        living: &[usize],
         weakest: f64,
         settings: &TapSettings,
-    ) -> Result<Vec<Tap>, RecordingError> {
+    ) -> Result<(), RecordingError> {
         let now = Conditions::of(recording, found);
         if self
             .conditions
@@ -221,22 +241,40 @@ impl PartMemo {
             facts.insert(place, measured);
         }
         self.facts = facts;
+        Ok(())
+    }
+
+    /// What was measured of the events that a sensor answers.
+    pub(super) fn answered<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Facts> {
+        // Both are in order of time.
+        let events = found.events.iter().zip(self.facts.values());
+        let answered = events.filter(|(event, _)| event.answered);
+        answered.map(|(_, facts)| facts)
+    }
+
+    /// Judges the events of a file, which were measured. The responses `answering` answer taps somewhere. Peaks below `weakest`
+    /// are too weak.
+    pub(super) fn judge(
+        &self,
+        recording: &Recording,
+        source: &TapSource,
+        found: &Found,
+        answering: &[usize],
+        weakest: f64,
+        settings: &TapSettings,
+    ) -> Vec<Tap> {
         let rate = recording.sample_rate();
-        let mut taps = Vec::with_capacity(events.len());
-        for (index, (event, place)) in events.iter().zip(&places).enumerate() {
+        let mut measured = self.facts.iter().peekable();
+        let mut taps = Vec::with_capacity(found.events.len());
+        for event in &found.events {
+            let Some((place, own)) = measured.next() else {
+                break;
+            };
+            let next = measured.peek().map(|(_, next)| *next);
             let record = place.record();
-            let next = places.get(index + 1).map(|next| &self.facts[next]);
-            let stopped = stopped(recording, living, &record, &self.facts[place], next);
-            taps.push(judge(
-                event,
-                record,
-                &self.facts[place],
-                stopped,
-                weakest,
-                rate,
-                settings,
-            ));
+            let stopped = stopped(recording, source, answering, &record, own, next);
+            taps.push(judge(event, record, own, stopped, weakest, rate, settings));
         }
-        Ok(taps)
+        taps
     }
 }

@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::recording::{Recording, RecordingError};
-use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, living, reject_short};
+use judge::{CUT_OF_SHORTEST, SHORT_OF_MEDIAN, answering, reject_short};
 use search::Survey;
 use tapjoint_numerics::stats::median;
 
@@ -381,8 +381,8 @@ impl fmt::Display for TapRemark {
             ),
             TapRemark::SilentHammer { time, rises } => write!(
                 f,
-                "the hammer gives no signal from {time:.2} s of its file on, and the responses rise {rises} times after that: these \
-                 taps are not seen; check the hammer and its cable, and record again"
+                "the hammer gives no signal from {time:.2} s of its file on. The responses rise {rises} times after that. These may be \
+                 taps that it does not show. Check the hammer and its cable, and record again"
             ),
             TapRemark::LongExcursion { count } => write!(
                 f,
@@ -573,7 +573,6 @@ pub fn find_taps_again(
         .map(|event| event.peak)
         .collect();
     let weakest = settings.weak * median(&mut peaks);
-    let living = living(recording, source);
     let rate = recording.sample_rate();
     let starts: Vec<f64> = searched
         .iter()
@@ -587,6 +586,13 @@ pub fn find_taps_again(
             .collect();
         remarks = settings.by_hand.mark(&mut files, &starts, rate);
     }
+    for (number, (_, file, found)) in searched.iter().enumerate() {
+        memo.part(number)
+            .measure(file, source, found, weakest, settings)?;
+    }
+    let numbered = searched.iter().zip(memo.parts());
+    let measured = numbered.flat_map(|((.., found), part)| part.answered(found));
+    let answering = answering(recording, source, measured);
     let mut taps = Vec::with_capacity(peaks.len());
     // Last tap of each file.
     let mut lasts = Vec::new();
@@ -595,7 +601,7 @@ pub fn find_taps_again(
         let before = taps.len();
         let judged = memo
             .part(number)
-            .judge(file, source, found, &living, weakest, settings)?;
+            .judge(file, source, found, &answering, weakest, settings);
         for mut tap in judged {
             tap.file = joined.then(|| file.name().to_owned());
             tap.move_by(*start, rate);

@@ -430,6 +430,20 @@ fn limit_a_channel_at_rest_has_not_failed() {
     let rejections: Vec<_> = taps.taps.iter().map(|tap| &tap.rejection).collect();
     let laid = &Some(Rejection::NoResponse);
     assert_eq!(rejections, [&None, laid, &None, &None, &None]);
+    // A channel that answers no tap, but moved once: an unused input, or one for marks.
+    let mut more = channels.clone();
+    more[2].fill(0.0);
+    for place in [100, 20_000] {
+        more[2][place..place + 200].fill(3.0);
+    }
+    assert_eq!(taps_with_two_responses(&more).accepted().count(), 4);
+    // The recording ends with a tap, and the responses still rest.
+    for samples in &mut more {
+        samples.truncate((3.504 * 5120.0) as usize);
+    }
+    more[1][(3.49 * 5120.0) as usize..].fill(0.0);
+    let last = taps_with_two_responses(&more).taps.pop().unwrap();
+    assert!(!matches!(last.rejection, Some(Rejection::Stopped { .. })));
     // A sensor of which hardly anything is seen.
     for sample in &mut channels[2] {
         *sample = (*sample / 4.0).round();
@@ -451,12 +465,21 @@ fn recover_taps_that_a_dead_hammer_does_not_show() {
     };
     assert_eq!(
         remark.to_string(),
-        "the hammer gives no signal from 1.80 s of its file on, and the responses rise 2 times after that: these taps are not \
-         seen; check the hammer and its cable, and record again"
+        "the hammer gives no signal from 1.80 s of its file on. The responses rise 2 times after that. These may be taps that it \
+         does not show. Check the hammer and its cable, and record again"
     );
     // A hammer without noise rests after its last pulse.
     let pulses = [0.5, 1.5, 2.5, 3.5].map(|time| pulse(time, 2e-3, 20.0));
     channels[0] = force(5120.0, 4.5, &pulses, SHAPES[0]);
+    channels[0].resize(7 * 5120, 0.0);
+    // The table is knocked twice.
+    let knocks = ringing(5120.0, 7.0, &[5.0, 6.0], &[(120.0, 0.01, 5.0)]);
+    for samples in &mut channels[1..] {
+        samples.resize(7 * 5120, 0.0);
+        for (sample, knock) in samples.iter_mut().zip(&knocks) {
+            *sample += knock;
+        }
+    }
     let taps = taps_with_two_responses(&channels);
     assert_all_accepted(&taps, 4, "noise-free");
     assert_eq!(taps.remarks, []);

@@ -71,8 +71,10 @@ pub(super) struct Arrival {
     /// Time since which more of them are behind (s).
     behind_since: Option<f64>,
     is_judged: bool,
-    /// True of a stream that no clock drives, or whose rate is wrong: losses cannot be told.
+    /// True where the rate is wrong: losses cannot be told.
     is_off: bool,
+    /// True of a stream that no clock drives.
+    is_file: bool,
 }
 
 impl Arrival {
@@ -86,6 +88,7 @@ impl Arrival {
             behind_since: None,
             is_judged: false,
             is_off: false,
+            is_file: false,
         }
     }
 
@@ -99,7 +102,7 @@ impl Arrival {
         self.frames += frames;
         let (elapsed, gap) = (now - *first, now - *last);
         *last = now;
-        if elapsed < BACKLOG {
+        if elapsed < BACKLOG || self.is_file {
             return None;
         }
         // A window begins with what a pause before it has held back.
@@ -140,6 +143,7 @@ impl Arrival {
         if was_right || !is_off && tolerance > MOST_TOLERANCE {
             return None;
         }
+        self.is_file = speed > FILE_SPEED;
         (self.is_judged, self.is_off, self.window) = (true, is_off, None);
         if was_wrong && !is_off {
             self.behind.clear();
@@ -147,7 +151,7 @@ impl Arrival {
             let text = "samples arrive at the stated rate now. The taps before may be wrong";
             return Some(Shown::RightRate(text.to_owned()));
         }
-        if was_wrong || !is_off || speed > FILE_SPEED {
+        if was_wrong || !is_off || self.is_file {
             return None;
         }
         let (found, stated) = (speed * self.rate, self.rate);

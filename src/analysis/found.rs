@@ -111,10 +111,11 @@ fn hammer(recording: &Recording) -> Result<Option<(usize, &'static str)>, Record
     Ok(sharpest.map(|channel| (channel, "by its short pulses; check it")))
 }
 
-/// Time about a trigger in which the pulse of another channel belongs to it (s): the answer may come first by its noise.
+/// Time about a trigger in which the pulse of another channel belongs to it (s). 30 ms: the trigger on a
+/// response comes later than the pulse.
 const TOGETHER: f64 = 0.03;
 
-/// Share of a channel's peak that its pulses reach at taps: tips and hands differ.
+/// Share of a channel's peak that its pulses reach at taps (1). 10 %: hits differ in strength.
 const PULSE_OF_PEAK: f64 = 0.1;
 
 /// Returns a doubt where most taps are no hits of a hammer, and another channel has short pulses at the others.

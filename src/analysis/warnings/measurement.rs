@@ -6,6 +6,7 @@ use crate::amplitude::{AmplitudeChanges, Way};
 use crate::explained::UnlistedPeak;
 use crate::found::hammer_doubt;
 use crate::selection::{Choice, Disagreement, LEAST_TAPS, OTHER_LEVEL};
+use std::collections::BTreeMap;
 use std::fmt;
 use tapjoint_description::DescriptionError;
 use tapjoint_identify::pairing::{MeasuredPeak, MissingCause, MissingMode, Pairing};
@@ -41,20 +42,25 @@ impl Warning {
         Warning::about(file, "hammer-channel", text)
     }
 
-    /// A sensor gives no signal in some taps.
-    fn stopped_channel(file: &str, taps: &Taps) -> Option<Self> {
-        let stopped = taps.taps.iter().filter_map(|tap| match tap.rejection {
-            Some(Rejection::Stopped { channel }) => Some((channel, tap.time)),
-            _ => None,
+    /// A sensor gives no signal in some taps: one doubt for each such sensor.
+    fn stopped_channels(file: &str, taps: &Taps) -> Vec<Self> {
+        let mut stopped: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for tap in &taps.taps {
+            if let Some(Rejection::Stopped { channel }) = tap.rejection {
+                stopped.entry(channel).or_default().push(tap.time);
+            }
+        }
+        let total = taps.taps.len();
+        let doubts = stopped.into_iter().map(|(channel, times)| {
+            let text = format!(
+                "channel {channel} gives no signal in {} of {total} taps, first at {:.2} s; its sensor or cable has probably \
+                 failed; check both, and record again",
+                times.len(),
+                times[0]
+            );
+            Warning::about(file, "stopped-channel", text)
         });
-        let (channel, time) = stopped.clone().next()?;
-        let count = stopped.filter(|(other, _)| *other == channel).count();
-        let text = format!(
-            "channel {channel} gives no signal in {count} of {} taps, first at {time:.2} s; its sensor or cable has probably failed; \
-             check both, and record again",
-            taps.taps.len()
-        );
-        Some(Warning::about(file, "stopped-channel", text))
+        doubts.collect()
     }
 
     /// One tap alone stands for a recording with a hammer.
@@ -435,7 +441,7 @@ pub(crate) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
             warnings.push(Warning::of_file(one.name(), &warning));
         }
     }
-    warnings.extend(Warning::stopped_channel(file, taps));
+    warnings.extend(Warning::stopped_channels(file, taps));
     for remark in &taps.remarks {
         warnings.push(Warning::about(file, "taps", remark));
     }

@@ -7,11 +7,9 @@ use std::time::Duration;
 const BACKLOG: f64 = 2.0;
 /// The rate is judged each time after so long (s). 10 s: a tap or two, and a recorder's buffer of 0.1 s is then 1 %.
 const JUDGED_EACH: f64 = 10.0;
-/// A rate that is off by less is that of the stated clock (1). 2 %: usual rates lie 8 % apart at least (44.1 and 48 kHz), and
-/// the clocks of two devices differ by far less.
+/// A rate that is off by less is that of the stated clock (1). 2 %: usual rates lie 2.4 % apart at least, and the clocks of two
+/// devices differ by far less.
 const RATE_TOLERANCE: f64 = 0.02;
-/// A rate is right only where the tolerance is as narrow as this (1). 5 %: below the distance of 44.1 and 48 kHz.
-const MOST_TOLERANCE: f64 = 0.05;
 /// What arrives this much faster than stated is a file, and no clock drives it. 8: beyond any pair of usual rates by mistake.
 const FILE_SPEED: f64 = 8.0;
 /// Samples that are missing for less than this are in a buffer (s). 0.5 s: beyond what recorders hold back.
@@ -28,7 +26,7 @@ const USUAL_RATES: [f64; 31] = [
     25_600.0, 32_000.0, 44_100.0, 48_000.0, 50_000.0, 51_200.0, 65_536.0, 96_000.0, 100_000.0,
     102_400.0, 192_000.0,
 ];
-/// A measured rate this near to a usual one is taken for it (1). 1 %: usual rates lie 2 % apart at least.
+/// A measured rate this near to a usual one is taken for it (1). 1 %: less than half of the least distance.
 const NEAR_USUAL: f64 = 0.01;
 
 /// What the arrival of a stream shows, in sentences.
@@ -70,11 +68,19 @@ pub(super) struct Arrival {
     behind: VecDeque<[f64; 2]>,
     /// Time since which more of them are behind (s).
     behind_since: Option<f64>,
-    is_judged: bool,
-    /// True where the rate is wrong: losses cannot be told.
-    is_off: bool,
-    /// True of a stream that no clock drives.
-    is_file: bool,
+    verdict: Verdict,
+}
+
+/// What is known of the rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Verdict {
+    /// It is not known yet. A wrong rate looks like a loss.
+    Open,
+    Right,
+    /// Losses cannot be told.
+    Wrong,
+    /// No clock drives the stream.
+    File,
 }
 
 impl Arrival {
@@ -86,9 +92,7 @@ impl Arrival {
             window: None,
             behind: VecDeque::new(),
             behind_since: None,
-            is_judged: false,
-            is_off: false,
-            is_file: false,
+            verdict: Verdict::Open,
         }
     }
 
@@ -102,7 +106,7 @@ impl Arrival {
         self.frames += frames;
         let (elapsed, gap) = (now - *first, now - *last);
         *last = now;
-        if elapsed < BACKLOG || self.is_file {
+        if elapsed < BACKLOG || self.verdict == Verdict::File {
             return None;
         }
         // A window begins with what a pause before it has held back.
@@ -112,9 +116,9 @@ impl Arrival {
                 frames: self.frames,
                 longest_gap: 0.0,
                 // The first time so that ten seconds of a recording are enough.
-                next: match self.is_judged {
-                    true => elapsed + JUDGED_EACH,
-                    false => JUDGED_EACH,
+                next: match self.verdict {
+                    Verdict::Open => JUDGED_EACH,
+                    _ => elapsed + JUDGED_EACH,
                 },
             });
             return None;
@@ -124,9 +128,9 @@ impl Arrival {
             window.next = elapsed + JUDGED_EACH;
             return self.judge_rate(elapsed);
         }
-        match self.is_off {
-            true => None,
-            false => self.judge_loss(elapsed),
+        match self.verdict {
+            Verdict::Wrong => None,
+            _ => self.judge_loss(elapsed),
         }
     }
 
@@ -135,24 +139,30 @@ impl Arrival {
         let window = self.window.as_ref()?;
         let seconds = elapsed - window.start;
         let speed = (self.frames - window.frames) / seconds / self.rate;
-        // A piece may hold the samples of the pause before it.
-        let tolerance = RATE_TOLERANCE + window.longest_gap / seconds;
-        let is_off = (speed - 1.0).abs() > tolerance;
-        let (was_right, was_wrong) = (self.is_judged && !self.is_off, self.is_off);
-        // After long pauses a longer window decides.
-        if was_right || !is_off && tolerance > MOST_TOLERANCE {
+        // A piece may hold the samples of the pause before it, at either end of the window.
+        let uncertain = window.longest_gap / seconds;
+        let off = (speed - 1.0).abs();
+        let now = match off {
+            _ if speed > FILE_SPEED => Verdict::File,
+            off if off > RATE_TOLERANCE + uncertain => Verdict::Wrong,
+            off if off <= RATE_TOLERANCE - uncertain => Verdict::Right,
+            // A longer window decides.
+            _ => return None,
+        };
+        let before = self.verdict;
+        if before == Verdict::Right {
             return None;
         }
-        self.is_file = speed > FILE_SPEED;
-        (self.is_judged, self.is_off, self.window) = (true, is_off, None);
-        if was_wrong && !is_off {
-            self.behind.clear();
-            self.behind_since = None;
-            let text = "samples arrive at the stated rate now. The taps before may be wrong";
-            return Some(Shown::RightRate(text.to_owned()));
-        }
-        if was_wrong || !is_off || self.is_file {
-            return None;
+        (self.verdict, self.window) = (now, None);
+        match (before, now) {
+            (Verdict::Open, Verdict::Wrong) => {}
+            (Verdict::Wrong, Verdict::Right) => {
+                self.behind.clear();
+                self.behind_since = None;
+                let text = "samples arrive at the stated rate now. Earlier ones did not";
+                return Some(Shown::RightRate(text.to_owned()));
+            }
+            _ => return None,
         }
         let (found, stated) = (speed * self.rate, self.rate);
         let is_near = |usual: &&f64| (found / *usual - 1.0).abs() <= NEAR_USUAL;
@@ -189,8 +199,7 @@ impl Arrival {
             return None;
         }
         let since = *self.behind_since.get_or_insert(elapsed);
-        // Until the rate is judged, a wrong one looks like a loss.
-        if elapsed - since < LATE || !self.is_judged {
+        if elapsed - since < LATE || self.verdict != Verdict::Right {
             return None;
         }
         self.behind_since = None;
@@ -248,6 +257,17 @@ mod tests {
         };
         let slow = wrong("919", "high by a factor of 1.088", "the recorder's rate");
         assert_eq!(said(0.919, 0.1, 60.0, 0.0..0.0), [slow]);
+        // The nearest two of the usual rates.
+        let near = said(1024.0 / 1000.0, 0.1, 120.0, 0.0..0.0);
+        assert_eq!(
+            near,
+            [wrong(
+                "1024",
+                "low by a factor of 1.024",
+                "the rate 1024 Hz"
+            )]
+        );
+        assert_eq!(said(1000.0 / 1024.0, 0.1, 120.0, 0.0..0.0).len(), 1);
         // Near a usual rate.
         let twice = wrong("2010", "low by a factor of 2.000", "the rate 2000 Hz");
         assert_eq!(said(2.01, 0.1, 60.0, 0.0..0.0), [twice]);

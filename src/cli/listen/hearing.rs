@@ -88,6 +88,8 @@ pub(super) struct Hearing<'a, 'v> {
     is_unwritten: bool,
     /// The recording that is to follow.
     turns_to: Option<Target>,
+    /// True where results are wanted between the taps.
+    wants_states: bool,
     /// True once nothing more comes.
     has_ended: bool,
 }
@@ -126,6 +128,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
             fault: None,
             is_unwritten: false,
             turns_to: None,
+            wants_states: false,
             has_ended: false,
         }
     }
@@ -137,6 +140,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
 
     /// Works out results between the taps.
     pub(super) fn with_states(&mut self) {
+        self.wants_states = true;
         let bare = self.arguments.run.bare();
         let subject = Subject::of(self.described, self.target, &bare);
         self.states = Some(States::begin(subject, self.plan.by_hand()));
@@ -213,8 +217,12 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 let has_taps = self.listener.as_ref().is_some_and(|own| own.taps() > 0);
                 // Taps that were recorded at a wrong rate stay wrong.
                 self.has_wrong_rate = is_wrong || self.has_wrong_rate && has_taps;
-                // Each of their frequencies may be wrong.
-                self.end_results();
+                match self.has_wrong_rate {
+                    // Each of its frequencies is wrong.
+                    true => drop(self.end_results()),
+                    false if self.wants_states => self.with_states(),
+                    false => {}
+                }
                 self.advise();
                 self.doubt_stream(text);
             }
@@ -229,6 +237,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
         let bench = &mut self.views.bench;
         bench.precision.clear();
         bench.result.clear();
+        bench.is_result_old = false;
         bench.first_screen = None;
         self.states.take().is_some()
     }
@@ -413,7 +422,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
         if self.has_wrong_rate {
             let file = file_name(&self.target.file);
             self.views.bench.advice =
-                format!("the sample rate is wrong: end, remove {file}, and record it again");
+                format!("samples came at a wrong rate: end, remove {file}, and record it again");
             self.views.bench.is_enough = false;
             return;
         }
@@ -602,7 +611,7 @@ impl<'a, 'v> Hearing<'a, 'v> {
                 1 => "; 1 of them does not agree with the others".to_owned(),
                 more => format!("; {more} of them do not agree with the others"),
             };
-            let missing = match self.arguments.taps.saturating_sub(accepted) {
+            let missing = match (self.arguments.taps + self.apart.len()).saturating_sub(accepted) {
                 0 => String::new(),
                 1 => "; 1 more was wanted".to_owned(),
                 missing => format!("; {missing} more were wanted"),

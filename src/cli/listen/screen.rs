@@ -187,9 +187,17 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
     let page = bench.address.as_ref();
     let page = page.map(|address| format!("page: {address}"));
     let shown = bench.levels.len().min(MOST_LEVELS) as u16;
-    let result_rows = result_rows(bench, screen);
+    let is_wide = area.width >= WIDE;
+    let result_rows = match is_wide {
+        true => result_rows(bench, Screen::of(usize::from(area.width / 2))),
+        false => result_rows(bench, screen),
+    };
+    let middle_rows = match is_wide {
+        true => result_rows.max(LEAST_TAP_ROWS),
+        false => result_rows + LEAST_TAP_ROWS,
+    };
     // Results need the room more than the movement.
-    let needed = result_rows + LEAST_TAP_ROWS + (note.len() + advice.len()) as u16 + 3;
+    let needed = middle_rows + (note.len() + advice.len()) as u16 + 3;
     let level_rows = match area.height {
         0..SHORT => 0,
         height if height < needed + shown => 0,
@@ -223,7 +231,7 @@ fn draw(frame: &mut Frame<'_>, bench: &Bench, chosen: &Chosen) {
         };
         draw_level(frame, area.intersection(levels), level);
     }
-    let [taps, results] = match middle.width >= WIDE {
+    let [taps, results] = match is_wide {
         true => Layout::horizontal([Constraint::Percentage(50); 2]).areas(middle),
         // The taps get up to half, and what the results leave.
         false => {
@@ -276,15 +284,20 @@ fn fitted(screen: Screen, sentences: &[String], rows: usize) -> Vec<String> {
     lines
 }
 
-/// Ends a line of at most so many columns with an ellipsis. Words are not cut: a number would become another one.
+/// Ends a line of at most so many columns with an ellipsis. It is cut between words: a number would become another one.
 fn mark(line: &mut String, columns: usize) {
     let most = columns.saturating_sub(2);
     if line.ends_with('\u{2026}') {
         return;
     }
     if line.chars().count() > most {
-        *line = line.chars().take(most + 1).collect();
-        line.truncate(line.rfind(' ').unwrap_or(line.len()));
+        let indent = line.len() - line.trim_start().len();
+        let kept: String = line.chars().take(most + 1).collect();
+        // One long word alone is cut.
+        *line = match kept.rfind(' ').filter(|space| *space > indent) {
+            Some(space) => kept[..space].to_owned(),
+            None => kept.chars().take(most).collect(),
+        };
     }
     line.push_str(" \u{2026}");
 }
@@ -486,6 +499,14 @@ mod tests {
 
     #[test]
     fn limit_a_line_that_is_cut_ends_between_words() {
+        for (text, wanted) in [
+            ("recordings/cantilever.wav", "recordin \u{2026}"),
+            ("  recordings/cantilever.wav", "  record \u{2026}"),
+        ] {
+            let mut line = text.to_owned();
+            mark(&mut line, 10);
+            assert_eq!(line, wanted);
+        }
         let text = "620.4509 \u{b1} 0.0002; 975";
         for columns in 12..40 {
             let mut line = text.to_owned();

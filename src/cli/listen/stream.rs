@@ -290,14 +290,12 @@ impl Stream {
                 && let frames = count as f64 / layout.frame_bytes as f64
                 && let Some(shown) = arrival.takes(start.elapsed(), frames)
             {
-                let (text, is_wrong) = match shown {
-                    Shown::WrongRate(text) => (text, Some(true)),
-                    Shown::RightRate(text) => (text, Some(false)),
-                    Shown::Loss(text) => (text, None),
-                };
-                let _ = report.send(match is_wrong {
-                    Some(is_wrong) => Event::Rate { text, is_wrong },
-                    None => Event::Doubt(text),
+                let is_wrong = matches!(shown, Shown::WrongRate(_));
+                let _ = report.send(match shown {
+                    Shown::WrongRate(text) | Shown::RightRate(text) => {
+                        Event::Rate { text, is_wrong }
+                    }
+                    Shown::Loss(text) => Event::Doubt(text),
                 });
             }
             bytes.extend_from_slice(&piece[..count]);

@@ -26,7 +26,7 @@ pub(super) struct Target {
 /// The one at `without` (0-based) is passed over.
 ///
 /// # Errors
-/// None is missing; its name is not that of a WAV file; the file played is none of it.
+/// None is missing; its name is not that of a WAV file, or its folder does not exist; the file played is none of it.
 pub(super) fn described_target(
     file: &TestFile,
     replayed: Option<&Path>,
@@ -100,7 +100,7 @@ pub(super) fn described_target(
 /// Returns the recording without a description.
 ///
 /// # Errors
-/// The file is there already, or its name is not that of a WAV file.
+/// The file is there already; its name is not that of a WAV file, or its folder does not exist.
 pub(super) fn bare_target(
     path: &Path,
     replayed: Option<&Path>,

@@ -378,9 +378,7 @@ impl<'a> Listener<'a> {
             reported.push(tap.into());
         }
         news.extend(earlier.map(|one| News::Gone { time: one.time }));
-        if self.latest.is_some() {
-            news.extend(self.mixed_channels(&found));
-        }
+        news.extend(self.mixed_channels(&found));
         if let Some(time) = waiting {
             // Another alarm came just before it.
             let end = time + self.record(&found) - start;
@@ -477,11 +475,7 @@ impl<'a> Listener<'a> {
 /// sunk into their noise. Of a long record its beginning and its end are read.
 fn remaining(found: &TapsSoFar, tap: &Tap) -> Result<Option<f64>, RecordingError> {
     let recording = &found.recording;
-    let (TapSource::Hammer {
-        responses: channels,
-        ..
-    }
-    | TapSource::Responses(channels)) = &found.source;
+    let channels = found.source.responses();
     let frames = |seconds: f64| (seconds * recording.sample_rate()) as u64;
     let quiet = &found.taps.quiet;
     let quiet = quiet.start.max(quiet.end.saturating_sub(frames(QUIET)))..quiet.end;

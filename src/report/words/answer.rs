@@ -230,7 +230,7 @@ fn action(document: &Document) -> Option<String> {
     Some(match (taps.count(), warning("stopped-channel")) {
         (0, _) => "Check the cables, the gain and the numbers of the channels.".to_owned(),
         (_, Some(stopped)) => format!("{}.", stopped.text),
-        _ => "Each tap is rejected. Read the reasons in the list of taps (--full).".to_owned(),
+        _ => "Each tap is rejected. The list of taps has the reasons.".to_owned(),
     })
 }
 

@@ -65,7 +65,7 @@ pub(super) fn facts(
         overload: overload(recording, source, record)?,
         swings: Vec::new(),
     };
-    // A glitch may come later. A record that is shorter says nothing.
+    // The second half may hold a glitch of a dead sensor. A short record ends before the sensors answer.
     let first_half = record.start..record.start.midpoint(record.end);
     if first_half.end >= event.trigger + (ANSWERED_WITHIN * recording.sample_rate()) as u64 {
         for &channel in source.responses() {
@@ -116,7 +116,8 @@ pub(super) fn answering<'a>(
     answering
 }
 
-/// Highest less lowest value of a channel in a stretch. It may leave out what lies at its ends, unless that alone moves.
+/// Highest less lowest value of a channel in a stretch (its unit). It is exact where it is 0. Otherwise the ends of the stretch may
+/// be left out.
 pub(super) fn swing(
     recording: &Recording,
     channel: usize,
@@ -136,7 +137,7 @@ pub(super) fn swing(
 }
 
 /// Returns the channel (0-based) among those that answer taps that gives no signal in the first half of a tap's record, or
-/// stops there and gives none at the `next` tap.
+/// stops there and gives none at the `next` tap of the file.
 pub(super) fn stopped(
     recording: &Recording,
     source: &TapSource,
@@ -165,7 +166,8 @@ pub(super) fn stopped(
     still(next?).into_iter().find(stops)
 }
 
-/// Judges one event, in whose record the channel `stopped` (0-based) gives no signal. Peaks below `weakest` are too weak. `rate` is the sample rate (Hz).
+/// Judges one event. `stopped` is a channel (0-based) that gives no signal in its record, if there is one. Peaks below `weakest`
+/// are too weak. `rate` is the sample rate (Hz).
 pub(super) fn judge(
     event: &Event,
     record: Range<u64>,

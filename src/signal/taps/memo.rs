@@ -7,6 +7,7 @@ use super::{Found, Tap, TapRemark, TapSettings, TapSource};
 use crate::recording::{Recording, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Bound::{Excluded, Unbounded};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -113,7 +114,7 @@ fn add_unheard(
     let Some(stopped) = info.and_then(|info| info.health.stopped) else {
         return Ok(());
     };
-    // A hammer that is at rest before a pulse is so after it.
+    // A hammer without noise has no change before its pulse either.
     let rate = recording.sample_rate();
     let frames = |seconds: f64| (seconds * rate) as u64;
     let Some(last) = found.events.last() else {
@@ -245,7 +246,10 @@ impl PartMemo {
     }
 
     /// What was measured of the events that a sensor answers.
-    pub(super) fn answered<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Facts> {
+    pub(super) fn answered_facts<'a>(
+        &'a self,
+        found: &'a Found,
+    ) -> impl Iterator<Item = &'a Facts> {
         // Both are in order of time.
         let events = found.events.iter().zip(self.facts.values());
         let answered = events.filter(|(event, _)| event.answered);
@@ -264,13 +268,11 @@ impl PartMemo {
         settings: &TapSettings,
     ) -> Vec<Tap> {
         let rate = recording.sample_rate();
-        let mut measured = self.facts.iter().peekable();
         let mut taps = Vec::with_capacity(found.events.len());
-        for event in &found.events {
-            let Some((place, own)) = measured.next() else {
-                break;
-            };
-            let next = measured.peek().map(|(_, next)| *next);
+        // Both are in order of time.
+        for (event, (place, own)) in found.events.iter().zip(&self.facts) {
+            let next = self.facts.range((Excluded(place), Unbounded)).next();
+            let next = next.map(|(_, next)| next);
             let record = place.record();
             let stopped = stopped(recording, source, answering, &record, own, next);
             taps.push(judge(event, record, own, stopped, weakest, rate, settings));

@@ -591,7 +591,7 @@ pub fn find_taps_again(
             .measure(file, source, found, weakest, settings)?;
     }
     let numbered = searched.iter().zip(memo.parts());
-    let measured = numbered.flat_map(|((.., found), part)| part.answered(found));
+    let measured = numbered.flat_map(|((.., found), part)| part.answered_facts(found));
     let answering = answering(recording, source, measured);
     let mut taps = Vec::with_capacity(peaks.len());
     // Last tap of each file.
